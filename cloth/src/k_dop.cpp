@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tauguard/geometry/aabb.hpp"
+#include "tauguard/geometry/k_dop.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
 namespace tauguard::cloth {
@@ -16,12 +17,6 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Edge diagonals before corner diagonals, so that 16 is a prefix of 18 and 18 of 26.
-constexpr std::int8_t all_axes[13][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0},  {1, 0, 1},
-                                         {0, 1, 1},  {1, -1, 0}, {1, 0, -1}, {0, 1, -1}, {1, 1, 1},
-                                         {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
-constexpr std::int8_t corner_axes[7][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 1},
-                                           {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 constexpr std::size_t grain = 4096;
 
 Aabb bounds(const Ends& x, std::size_t n, int threads) {
@@ -54,9 +49,9 @@ const std::int8_t (*axes_of(int k))[3] {
     case 16:
     case 18:
     case 26:
-      return all_axes;
+      return geometry::k_dop_axes;
     case 14:
-      return corner_axes;
+      return geometry::k_dop_corner_axes;
     default:
       throw std::invalid_argument("k_dop" + std::to_string(k) + ": k is 6, 14, 16, 18 or 26");
   }

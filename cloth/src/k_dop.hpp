@@ -1,8 +1,7 @@
-// Discrete oriented polytopes (k-DOPs, Klosowski et al. 1998) of moving points: k / 2 fixed axes,
-// an interval on each. A volume either sweeps the step (one interval over both ends of the motion)
-// or moves with it (an interval at each end). Moving volumes are apart where one axis separates
-// them on the same side at both ends: every difference of two points is linear in time, so it keeps
-// its sign in between.
+// k-DOPs of moving points. A volume either sweeps the step (one interval over both ends of the
+// motion) or moves with it (an interval at each end). Moving volumes are apart where one axis
+// separates them on the same side at both ends: every difference of two points is linear in time,
+// so it keeps its sign in between.
 #pragma once
 
 #include <cstddef>

@@ -11,15 +11,9 @@
 
 namespace tauguard::cloth {
 
-using geometry::cross;
-using geometry::dot;
 using geometry::largest;
-using geometry::mix;
 using geometry::unit_roundoff;
 using geometry::Vec3;
-using geometry::operator+;
-using geometry::operator-;
-using geometry::operator*;
 
 // Differences of positions at both ends of the step. The cubic is p . (q x r). A direction
 // separates the features if all differences in `gap` have one sign along it. `big` is the largest

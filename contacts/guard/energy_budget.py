@@ -7,9 +7,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.contacts._contacts import Sheet
 
 
 @dataclass(frozen=True)
@@ -52,41 +52,19 @@ class EnergyMeter:
 
 
 def sheets_of(model: Any) -> list[Sheet]:
-    """The elastic flexes of triangles."""
+    """The elastic flexes of triangles, whose stretch energy MuJoCo leaves out."""
     return [
-        Sheet(model, flex)
+        _sheet(model, flex)
         for flex in range(model.nflex)
         if model.flex_dim[flex] == 2 and model.flex_stiffnessadr[flex] >= 0
     ]
 
 
-class Sheet:
-    """The stretch energy of one elastic flex of triangles (St. Venant-Kirchhoff).
-
-    With e the change of an element's three squared edge lengths and K its stiffness, the energy is
-    e K e / 4, whose gradient is MuJoCo's spring force.
-    """
-
-    def __init__(self, model: Any, flex: int) -> None:
-        """Copy the elements' edges and stiffness."""
-        elements, edges = int(model.flex_elemnum[flex]), int(model.flex_edgeadr[flex])
-        begin, place = int(model.flex_elemedgeadr[flex]), int(model.flex_stiffnessadr[flex])
-        own = model.flex_elemedge[begin : begin + 3 * elements].reshape(-1, 3) + edges
-        self._ends = model.flex_edge[own] + int(model.flex_vertadr[flex])
-        self._rest = model.flexedge_length0[own] ** 2
-        packed = model.flex_stiffness[place : place + 21 * elements].reshape(-1, 21)
-        upper = np.triu_indices(3)
-        self._stiffness = np.zeros((elements, 3, 3))
-        self._stiffness[:, upper[0], upper[1]] = packed[:, :6]
-        self._stiffness[:, upper[1], upper[0]] = packed[:, :6]
-
-    def rows(self) -> tuple[NDArray[np.int32], Array, Array]:
-        """Ends of each element's edges, their squares at rest and the stiffness, all flat."""
-        ends = np.ascontiguousarray(self._ends, dtype=np.int32).ravel()
-        return ends, np.ascontiguousarray(self._rest).ravel(), self._stiffness.ravel()
-
-    def energy(self, vertices: Array) -> float:
-        """At these positions [J]."""
-        edges = vertices[self._ends[..., 0]] - vertices[self._ends[..., 1]]
-        change = (edges**2).sum(axis=-1) - self._rest
-        return float(np.einsum("ki,kij,kj->", change, self._stiffness, change)) / 4
+def _sheet(model: Any, flex: int) -> Sheet:
+    elements, edges = int(model.flex_elemnum[flex]), int(model.flex_edgeadr[flex])
+    begin, place = int(model.flex_elemedgeadr[flex]), int(model.flex_stiffnessadr[flex])
+    own = model.flex_elemedge[begin : begin + 3 * elements] + edges
+    ends = (model.flex_edge[own] + int(model.flex_vertadr[flex])).astype(np.int32).ravel()
+    packed = model.flex_stiffness[place : place + 21 * elements].reshape(-1, 21)
+    stiffness = packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]  # of its upper triangle, by rows
+    return Sheet(ends, model.flexedge_length0[own] ** 2, np.ascontiguousarray(stiffness).ravel())

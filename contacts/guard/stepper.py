@@ -105,7 +105,7 @@ class GuardedStepper:
         covered = Covered(model, self._guard, self._rigid, self._cloth)
         self._pairs, self._uncovered = tuple(covered.pairs), tuple(covered.uncovered)
         for sheet in sheets_of(model):
-            self._guard.sheet(*sheet.rows())
+            self._guard.sheet(sheet)
         self._guard.spins(_turning(model))
         self._guard.pulled(pulled(model))
         self._elements = [elements(model, flex) for flex in range(model.nflex)]

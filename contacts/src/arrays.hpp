@@ -31,8 +31,8 @@ auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
   return nb::ndarray<nb::numpy, T>(held->data(), N, shape.data(), owner);
 }
 
-inline std::vector<Vec> vectors(const Rows3& rows) {
-  std::vector<Vec> out(rows.shape(0));
+inline std::vector<Vec3> vectors(const Rows3& rows) {
+  std::vector<Vec3> out(rows.shape(0));
   for (std::size_t i = 0; i < out.size(); ++i)
     out[i] = {rows.data()[3 * i], rows.data()[3 * i + 1], rows.data()[3 * i + 2]};
   return out;
@@ -54,7 +54,7 @@ inline std::pair<Shape, LocalFrame> shape_of(int core, const Doubles& size, doub
               {},
               {},
               {}};
-  for (const Vec& v : vectors(vertices))
+  for (const Vec3& v : vectors(vertices))
     shape.x.push_back(v[0]), shape.y.push_back(v[1]), shape.z.push_back(v[2]);
   LocalFrame frame;
   for (int i = 0; i < 3; ++i) {

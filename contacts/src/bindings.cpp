@@ -45,13 +45,13 @@ class Scene {
 
   // The surface of the geom added last, instead of its hull.
   void surface(Rows3 vertices, IntRows faces) {
-    const std::vector<Vec> points = vectors(vertices);
+    const std::vector<Vec3> points = vectors(vertices);
     Surface surface;
     for (std::size_t i = 0; i < faces.shape(0); ++i) {
       Shape triangle{Core::hull, {0, 0, 0}, 0, {}, {}, {}, {}, {}};
-      Vec middle{};
+      Vec3 middle{};
       for (int k = 0; k < 3; ++k) {
-        const Vec& p = points[faces.data()[3 * i + k]];
+        const Vec3& p = points[faces.data()[3 * i + k]];
         triangle.x.push_back(p[0]), triangle.y.push_back(p[1]), triangle.z.push_back(p[2]);
         middle = middle + (1.0 / 3) * p;
       }

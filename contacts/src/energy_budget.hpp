@@ -5,13 +5,14 @@
 
 namespace tauguard::contacts {
 
-// An elastic flex of triangles. For each element it holds the vertices at the ends of the edges,
-// the squared edge lengths at rest, and the stiffness matrix K. With e the change of the squared
-// lengths, the energy of an element is e K e / 4.
+// An elastic flex of triangles (St. Venant-Kirchhoff). For each element it holds the vertices at
+// the ends of the edges, the squared edge lengths at rest, and the stiffness matrix K. With e the
+// change of the squared lengths, the energy of an element is e K e / 4, whose gradient is MuJoCo's
+// spring force.
 struct Sheet {
-  std::vector<std::int32_t> ends;       // 6 an element
-  std::vector<double> rest, stiffness;  // 3 and 9 an element
-  double energy(const double* x) const;
+  std::vector<std::int32_t> ends;        // 6 an element
+  std::vector<double> rest, stiffness;   // 3 and 9 an element
+  double energy(const double* x) const;  // at vertices x (n, 3) [J]
 };
 
 struct EnergyChange {

@@ -160,9 +160,7 @@ class Guard {
       pairs_.push_back({place(0), place(2), place(4)}), last_.push_back(r[6]);
     }
   }
-  void sheet(Ints ends, Doubles rest, Doubles stiffness) {
-    sheets_.push_back({list<std::int32_t>(ends), list<double>(rest), list<double>(stiffness)});
-  }
+  void sheet(const Sheet& sheet) { sheets_.push_back(sheet); }
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
@@ -355,6 +353,14 @@ class Guard {
 }  // namespace
 
 void bind_guard(nb::module_& m) {
+  nb::class_<Sheet>(m, "Sheet")
+      .def(
+          "__init__",
+          [](Sheet* self, Ints ends, Doubles rest, Doubles stiffness) {
+            new (self) Sheet{list<std::int32_t>(ends), list<double>(rest), list<double>(stiffness)};
+          },
+          "ends"_a, "rest"_a, "stiffness"_a)
+      .def("energy", [](const Sheet& self, Rows3 x) { return self.energy(x.data()); }, "x"_a);
   nb::class_<Guard>(m, "Guard")
       .def(nb::init<nb::typed<nb::dict, nb::str, int>, nb::typed<nb::dict, nb::str, double>,
                     nb::object>(),
@@ -364,7 +370,7 @@ void bind_guard(nb::module_& m) {
       .def("pair", &Guard::pair, "a"_a, "b"_a)
       .def("flex_pair", &Guard::flex_pair, "a"_a, "radii"_a, "elements"_a, "skip"_a)
       .def("partners", &Guard::partners, "rows"_a)
-      .def("sheet", &Guard::sheet, "ends"_a, "rest"_a, "stiffness"_a)
+      .def("sheet", &Guard::sheet, "sheet"_a)
       .def("spins", &Guard::spins, "dofs"_a)
       .def("pulled", &Guard::pulled, "equalities"_a)
       .def("start", &Guard::start, "sheets"_a)

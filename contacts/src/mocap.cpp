@@ -22,18 +22,18 @@ void normalize(const double* quat, double* out) {
 }
 
 // The shortest rotation vector from one orientation to another [rad].
-Vec turn_between(const double* from, const double* to) {
+Vec3 turn_between(const double* from, const double* to) {
   double a[4], b[4], d[4];
   normalize(from, a), normalize(to, b);
   const double back[4] = {a[0], -a[1], -a[2], -a[3]};
   multiply(b, back, d);
   const double sign = d[0] < 0 ? -1 : 1;
-  const Vec axis = {sign * d[1], sign * d[2], sign * d[3]};
+  const Vec3 axis = {sign * d[1], sign * d[2], sign * d[3]};
   const double sine = norm(axis);
-  return sine > 0 ? (2 * std::atan2(sine, sign * d[0]) / sine) * axis : Vec{};
+  return sine > 0 ? (2 * std::atan2(sine, sign * d[0]) / sine) * axis : Vec3{};
 }
 
-void turn_by(const Vec& turn, const double* quat, double* out) {
+void turn_by(const Vec3& turn, const double* quat, double* out) {
   const double angle = norm(turn), half = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
   const double d[4] = {std::cos(angle / 2), half * turn[0], half * turn[1], half * turn[2]};
   double unit[4];
@@ -42,10 +42,10 @@ void turn_by(const Vec& turn, const double* quat, double* out) {
 }
 
 // A vector turned by a rotation vector (Rodrigues).
-Vec turned(const Vec& turn, const Vec& v) {
+Vec3 turned(const Vec3& turn, const Vec3& v) {
   const double angle = norm(turn);
   if (angle == 0) return v;
-  const Vec axis = (1 / angle) * turn;
+  const Vec3 axis = (1 / angle) * turn;
   return std::cos(angle) * v + std::sin(angle) * cross(axis, v) +
          ((1 - std::cos(angle)) * dot(axis, v)) * axis;
 }
@@ -127,7 +127,7 @@ void Mocap::add_turns(double* turn) const {
   for (int b = 1; b < e_.nbody; ++b) {
     const int m = e_.body_mocapid[e_.body_rootid[b]];
     if (m < 0) continue;
-    const Vec own = turn_between(from_[m].quat, to_[m].quat);
+    const Vec3 own = turn_between(from_[m].quat, to_[m].quat);
     for (int k = 0; k < 3; ++k) turn[3 * b + k] += own[k];
   }
 }
@@ -142,13 +142,13 @@ bool Mocap::shifted() {
 
 // The displacement of a point that moves with the carrier of a body. The point is given in the
 // kinematics of the data: at the start of a sub-step, at the end of a step that jumps.
-Vec Mocap::way(int body, const double* point) const {
+Vec3 Mocap::way(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
   if (m < 0) return {};
   const Pose &from = from_[m], &to = to_[m], &at = jumps_ ? to : from;
-  Vec arm, shift;
+  Vec3 arm, shift;
   for (int k = 0; k < 3; ++k) arm[k] = point[k] - at.pos[k], shift[k] = to.pos[k] - from.pos[k];
-  const Vec turn = turn_between(from.quat, to.quat);
+  const Vec3 turn = turn_between(from.quat, to.quat);
   return jumps_ ? shift + arm - turned(-1.0 * turn, arm) : shift + turned(turn, arm) - arm;
 }
 
@@ -164,7 +164,7 @@ double Mocap::parting(const Contact& contact) const {
   double sum = 0;
   for (int i = 0; i < 2; ++i) {
     if (contact.geom[i] < 0) continue;
-    const Vec w = way(e_.geom_bodyid[contact.geom[i]], contact.at);
+    const Vec3 w = way(e_.geom_bodyid[contact.geom[i]], contact.at);
     for (int k = 0; k < 3; ++k) sum += (i ? 1 : -1) * contact.normal[k] * w[k];
   }
   return sum;

@@ -69,7 +69,7 @@ class Mocap {
   void read(Poses* poses) const;
   void write(const Poses& poses);
   void stand(const Poses& poses);
-  Vec way(int body, const double* point) const;
+  Vec3 way(int body, const double* point) const;
 
   const Engine& e_;
   std::vector<char> pulled_;

@@ -7,10 +7,10 @@
 namespace tauguard::contacts {
 namespace {
 
-Box box_at(const SupportShape& m) {
-  Box box;
+Aabb box_at(const SupportShape& m) {
+  Aabb box;
   for (int k = 0; k < 3; ++k) {
-    Vec d{};
+    Vec3 d{};
     d[k] = 1;
     box.hi[k] = m.support(d)[k] + m.radius();
     d[k] = -1;
@@ -19,18 +19,13 @@ Box box_at(const SupportShape& m) {
   return box;
 }
 
-void grow(Box* box, const Box& other) {
-  for (int k = 0; k < 3; ++k)
-    box->lo[k] = std::min(box->lo[k], other.lo[k]), box->hi[k] = std::max(box->hi[k], other.hi[k]);
-}
-
-Box widened(Box box, double by) {
-  for (int k = 0; k < 3; ++k) box.lo[k] -= by, box.hi[k] += by;
+Aabb widened(Aabb box, double by) {
+  box.widen(by);
   return box;
 }
 
 rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const RigidMotion& motion,
-                              const Vec& origin) {
+                              const Vec3& origin) {
   rigid::MovingBody body(motion, origin);
   if (s.core == Core::hull)
     for (std::size_t i = 0; i < s.x.size(); ++i)
@@ -40,8 +35,8 @@ rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const R
       body.add_vertex(
           in_body.out({corner & 1 ? s.size[0] : -s.size[0], corner & 2 ? s.size[1] : -s.size[1],
                        corner & 4 ? s.size[2] : -s.size[2]}));
-  for (const Vec& n : s.normals) body.add_normal(in_body.turn(n));
-  for (const Vec& e : s.edges) body.add_edge(in_body.turn(e));
+  for (const Vec3& n : s.normals) body.add_normal(in_body.turn(n));
+  for (const Vec3& e : s.edges) body.add_edge(in_body.turn(e));
   body.complete = !s.normals.empty();
   return body;
 }
@@ -50,15 +45,15 @@ rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const R
 
 // The box of both ends holds the chord of every point's way; the arc leaves its chord by at most
 // rho (1 - cos(angle / 2)). The last term covers rounding.
-Box swept(SupportShape m, const RigidMotion& motion) {
+Aabb swept(SupportShape m, const RigidMotion& motion) {
   if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
   m.move_to(0);
-  Box box = box_at(m);
+  Aabb box = box_at(m);
   m.move_to(1);
-  grow(&box, box_at(m));
+  box.add(box_at(m));
   const double sine = std::sin(0.25 * std::min(motion.speed, 2 * M_PI));
   const double bulge = 2 * m.reach() * sine * sine + 64 * unit_roundoff * m.magnitude();
-  for (int k = 0; k < 3; ++k) box.lo[k] -= bulge, box.hi[k] += bulge;
+  box.widen(bulge);
   return box;
 }
 
@@ -77,7 +72,7 @@ void Geoms::add(Shape shape, int body, const LocalFrame& in_body) {
   boxes_.resize(shapes_.size());
 }
 
-SupportShape Geoms::mover(int geom, const Vec& origin) const {
+SupportShape Geoms::mover(int geom, const Vec3& origin) const {
   return SupportShape(shapes_[geom], in_body_[geom], motions_[body_[geom]], origin);
 }
 
@@ -97,36 +92,36 @@ void Geoms::update(const Poses& p) {
     ++moved_;
   }
   for (std::size_t g = 0; g < shapes_.size(); ++g)
-    if (!same_[body_[g]]) boxes_[g] = swept(mover(static_cast<int>(g), Vec{}), motions_[body_[g]]);
+    if (!same_[body_[g]]) boxes_[g] = swept(mover(static_cast<int>(g), Vec3{}), motions_[body_[g]]);
 }
 
 namespace {
 
 // For polytopes without a threshold the kernel of rigid/ is used, which follows their features.
-Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, SupportShape& a,
+Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& origin, SupportShape& a,
                       SupportShape& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);
   auto y = vertices_of(geoms.shape(pair.b), geoms.in_body(pair.b), geoms.motion(pair.b), origin);
   const rigid::Impact impact = rigid::first_contact(x, y, 0, 1);
   if (!impact.hit) return {};
   a.move_to(impact.t), b.move_to(impact.t);
-  return describe(a, b, distance_of(a, b, impact.normal, 0), impact.t > 0 ? impact.normal : Vec{},
+  return describe(a, b, distance_of(a, b, impact.normal, 0), impact.t > 0 ? impact.normal : Vec3{},
                   impact.t);
 }
 
 // The first triangle of b's surface that a touches; of several at one time the deepest.
-Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec& origin,
+Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec3& origin,
                     std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);
   const RigidMotion& motion = geoms.motion(pair.b);
   const LocalFrame &in_body = geoms.in_body(pair.b),
                    body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
-  const Box near = widened(geoms.box(pair.a), threshold);
+  const Aabb near = widened(geoms.box(pair.a), threshold);
   const double drift = norm(motion.linear);
   SupportShape a = geoms.mover(pair.a, origin);
   Touch first;
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const Vec y = in_body.out(surface.centre[i]), c = body.out(y);
+    const Vec3 y = in_body.out(surface.centre[i]), c = body.out(y);
     // No point of the triangle leaves this ball; the factor covers rounding.
     const double way =
         (surface.radius[i] * (1 + motion.speed) + drift + motion.speed * norm(y)) * (1 + 0x1p-40);
@@ -157,10 +152,10 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
       continue;
     }
     cached = {true, false, {}};
-    if (!widened(geoms.box(pair.a), pair.reach).meets(geoms.box(pair.b))) continue;
+    if (!widened(geoms.box(pair.a), pair.reach).overlaps(geoms.box(pair.b))) continue;
     ++counts.candidates;
-    const Vec origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0
-                                                                    : geoms.motion(pair.a).x0;
+    const Vec3 origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0
+                                                                     : geoms.motion(pair.a).x0;
     std::int32_t face = -1;
     const auto touch_within = [&](double threshold) {
       if (!geoms.surface(pair.b).triangles.empty() && geoms.shape(pair.a).core != Core::half_space)
@@ -184,39 +179,30 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
 Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
                  const std::int32_t* elements, std::size_t count, int corners, double radius,
                  const std::vector<FlexPair>& pairs, std::vector<Row>* rows) {
-  constexpr std::size_t block = 32;  // simplices that fraction a box
+  constexpr std::size_t block = 32;  // simplices that share a box
   geoms.update(poses);
   Counts counts;
   counts.moved = geoms.moved();
-  std::vector<Box> boxes(count), blocks((count + block - 1) / block);
+  std::vector<Aabb> boxes(count), blocks((count + block - 1) / block);
   for (std::size_t e = 0; e < count; ++e) {
-    Box box{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (int i = 0; i < corners; ++i) {
-      const double *p = x_t0 + 3 * elements[corners * e + i],
-                   *q = x_t1 + 3 * elements[corners * e + i];
-      for (int k = 0; k < 3; ++k) {
-        box.lo[k] = std::min(box.lo[k], std::min(p[k], q[k]));
-        box.hi[k] = std::max(box.hi[k], std::max(p[k], q[k]));
-      }
-    }
-    boxes[e] = widened(box, radius * (1 + 4 * unit_roundoff));
-    if (e % block == 0)
-      blocks[e / block] = boxes[e];
-    else
-      grow(&blocks[e / block], boxes[e]);
+    Aabb& box = boxes[e];
+    for (int i = 0; i < corners; ++i)
+      for (const double* x : {x_t0, x_t1}) box.add(x + 3 * elements[corners * e + i]);
+    box.widen(radius * (1 + 4 * unit_roundoff));
+    blocks[e / block].add(box);
   }
   for (const FlexPair& pair : pairs) {
-    const Box reach = widened(geoms.box(pair.geom), pair.reach);
+    const Aabb reach = widened(geoms.box(pair.geom), pair.reach);
     for (std::size_t group = 0; group < blocks.size(); ++group) {
-      if (!reach.meets(blocks[group])) continue;
+      if (!reach.overlaps(blocks[group])) continue;
       for (std::size_t e = block * group; e < std::min(count, block * (group + 1)); ++e) {
-        if (pair.skip[e] || !reach.meets(boxes[e])) continue;
+        if (pair.skip[e] || !reach.overlaps(boxes[e])) continue;
         ++counts.candidates;
         const double *start[4], *end[4];
         for (int i = 0; i < corners; ++i)
           start[i] = x_t0 + 3 * elements[corners * e + i],
           end[i] = x_t1 + 3 * elements[corners * e + i];
-        const Vec origin = {start[0][0], start[0][1], start[0][2]};
+        const Vec3 origin = geometry::load(start[0]);
         SupportShape a = geoms.mover(pair.geom, origin);
         SupportShape b(start, end, corners, radius, origin);
         Touch touch = first_contact(a, b, 0, 0);
@@ -237,7 +223,7 @@ bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t*
     start[0][i] = x_t0 + 3 * a[i], end[0][i] = x_t1 + 3 * a[i];
     start[1][i] = x_t0 + 3 * b[i], end[1][i] = x_t1 + 3 * b[i];
   }
-  const Vec origin = {start[0][0][0], start[0][0][1], start[0][0][2]};
+  const Vec3 origin = geometry::load(start[0][0]);
   SupportShape x(start[0], end[0], corners, 0.5 * distance, origin),
       y(start[1], end[1], corners, 0.5 * distance, origin);
   *touch = first_contact(x, y, 0, 0);

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "tauguard/geometry/aabb.hpp"
 #include "tauguard/rigid/first_contact.hpp"
 
 namespace tauguard::contacts {
 
 using namespace rigid;  // the convex kernel
+using geometry::Aabb;
 
 // The distance up to which contacts are listed: up to `reach`, even if the surfaces do not touch.
 struct GeomPair {
@@ -19,19 +21,11 @@ struct GeomPair {
 struct Row {
   std::int32_t first, second, feature;
   double t, distance;
-  Vec point, normal;
+  Vec3 point, normal;
 };
 
-struct Box {
-  Vec lo, hi;
-  bool meets(const Box& o) const {
-    return lo[0] <= o.hi[0] && o.lo[0] <= hi[0] && lo[1] <= o.hi[1] && o.lo[1] <= hi[1] &&
-           lo[2] <= o.hi[2] && o.lo[2] <= hi[2];
-  }
-};
-
-// Holds all of a moving shape on its way; `motion` is its body's.
-Box swept(SupportShape mover, const RigidMotion& motion);
+// The box of all places of a moving shape in the step; `motion` is its body's.
+Aabb swept(SupportShape mover, const RigidMotion& motion);
 
 // Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9). `turn`, if given, is
 // about how far each turns between them (nbody, 3) [rad]: it decides how many whole turns are made.
@@ -47,7 +41,7 @@ struct Counts {
 // The triangles of a mesh, for pairs in which its surface counts and not its hull.
 struct Surface {
   std::vector<Shape> triangles;
-  std::vector<Vec> centre;  // of a ball around each, in the geom's frame
+  std::vector<Vec3> centre;  // of a ball around each, in the geom's frame
   std::vector<double> radius;
 };
 
@@ -65,12 +59,12 @@ class Geoms {
   bool as_before(int geom) const {
     return same_[body_[geom]];
   }  // and where it was throughout the last one
-  const Box& box(int geom) const { return boxes_[geom]; }
+  const Aabb& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
   const Surface& surface(int geom) const { return surfaces_[geom]; }
   const LocalFrame& in_body(int geom) const { return in_body_[geom]; }
   const RigidMotion& motion(int geom) const { return motions_[body_[geom]]; }
-  SupportShape mover(int geom, const Vec& origin) const;
+  SupportShape mover(int geom, const Vec3& origin) const;
   std::int64_t moved() const { return moved_; }
 
  private:
@@ -81,7 +75,7 @@ class Geoms {
   std::vector<int> bodies_;           // those that have geoms
   std::vector<RigidMotion> motions_;  // by body, as the rest
   std::vector<char> still_, same_, seen_;
-  std::vector<Box> boxes_;
+  std::vector<Aabb> boxes_;
   std::vector<double> last_;  // 24 a body: both poses of the last step
   std::int64_t moved_ = 0;
 };

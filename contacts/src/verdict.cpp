@@ -19,7 +19,7 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
   const double radii = a.radius() + b.radius();
   const double needed = radii + share * (a.reach() + b.reach() + radii) +
                         roundoffs * unit_roundoff * (a.magnitude() + b.magnitude());
-  const Distance d = distance_of(a, b, Vec{}, needed);
+  const Distance d = distance_of(a, b, Vec3{}, needed);
   return !d.overlap && d.lower > needed;
 }
 
@@ -69,11 +69,6 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
   return hit->level == 0 && separate(0, 1);  // touched and parted again, or only came close
 }
 
-void include(Box* box, const double* p) {
-  for (int k = 0; k < 3; ++k)
-    box->lo[k] = std::min(box->lo[k], p[k]), box->hi[k] = std::max(box->hi[k], p[k]);
-}
-
 }  // namespace
 
 int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
@@ -104,13 +99,13 @@ void Verdict::add_flex_pair(std::vector<std::int32_t> a, std::vector<double> rad
                          std::move(skip), std::move(known)});
 }
 
-SupportShape Verdict::mover(int entry, const Vec& origin) const {
+SupportShape Verdict::mover(int entry, const Vec3& origin) const {
   const Entry& e = entries_[entry];
   return SupportShape(e.shape, e.in_body, motions_[e.body], origin);
 }
 
 // The largest displacement of a point of the shape relative to a point that moves by `drift`.
-double Verdict::travel(int entry, const Vec& drift) const {
+double Verdict::travel(int entry, const Vec3& drift) const {
   const Entry& e = entries_[entry];
   const RigidMotion& motion = motions_[e.body];
   if (motion.speed == 0) return norm(motion.linear - drift);
@@ -132,22 +127,22 @@ void Verdict::update(const Poses& p) {
   }
   for (std::size_t e = 0; e < entries_.size(); ++e)
     if (whole_[e] && fresh_[entries_[e].body])
-      boxes_[e] = swept(mover(static_cast<int>(e), Vec{}), motions_[entries_[e].body]);
+      boxes_[e] = swept(mover(static_cast<int>(e), Vec3{}), motions_[entries_[e].body]);
 }
 
 void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
   Pair& pair = pairs_[number];
   const Entry &a = entries_[pair.a[0]], &b = entries_[pair.b[0]];
   if (still_[a.body] && still_[b.body]) return;
-  if (!boxes_[pair.a[0]].meets(boxes_[pair.b[0]])) return void(pair.known = apart);
+  if (!boxes_[pair.a[0]].overlaps(boxes_[pair.b[0]])) return void(pair.known = apart);
   const bool plane = a.shape.core == Core::half_space;
-  const Vec origin = motions_[plane ? b.body : a.body].x0;
+  const Vec3 origin = motions_[plane ? b.body : a.body].x0;
   Hit hit{static_cast<std::int32_t>(number), -1, 0, 0, 0, 0};
   if (!judged([&](int level) { return mover(pair.a[level], origin); },
               [&](int level) { return mover(pair.b[level], origin); },
               static_cast<int>(pair.a.size()), &pair.known, &hit))
     return;
-  const Vec drift = plane ? Vec{} : motions_[a.body].linear;
+  const Vec3 drift = plane ? Vec3{} : motions_[a.body].linear;
   hit.way = travel(pair.b[0], drift);
   if (!plane && motions_[a.body].speed != 0) hit.way += travel(pair.a[0], drift);
   hits->push_back(hit);
@@ -155,30 +150,30 @@ void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
 
 void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1,
                          std::vector<Hit>* hits) {
-  constexpr std::size_t block = 32;  // simplices that fraction a box
+  constexpr std::size_t block = 32;  // simplices that share a box
   FlexPair& pair = flex_pairs_[number];
   const std::size_t count = pair.skip.size();
-  const Box& near = boxes_[pair.a[0]];
+  const Aabb& near = boxes_[pair.a[0]];
   const double radius = pair.radii[0] * (1 + 4 * unit_roundoff);
   const auto box_of = [&](std::size_t begin, std::size_t end) {
-    Box box{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    Aabb box;
     for (std::size_t i = pair.corners * begin; i < pair.corners * end; ++i)
-      include(&box, x_t0 + 3 * pair.elements[i]), include(&box, x_t1 + 3 * pair.elements[i]);
-    for (int k = 0; k < 3; ++k) box.lo[k] -= radius, box.hi[k] += radius;
+      box.add(x_t0 + 3 * pair.elements[i]), box.add(x_t1 + 3 * pair.elements[i]);
+    box.widen(radius);
     return box;
   };
-  const Vec& drift = motions_[entries_[pair.a[0]].body].linear;
+  const Vec3& drift = motions_[entries_[pair.a[0]].body].linear;
   for (std::size_t begin = 0; begin < count; begin += block) {
     const std::size_t end = std::min(count, begin + block);
-    if (!near.meets(box_of(begin, end))) continue;
+    if (!near.overlaps(box_of(begin, end))) continue;
     for (std::size_t e = begin; e < end; ++e) {
-      if (pair.skip[e] || !near.meets(box_of(e, e + 1))) continue;
+      if (pair.skip[e] || !near.overlaps(box_of(e, e + 1))) continue;
       const double *start[4], *stop[4];
       for (int i = 0; i < pair.corners; ++i) {
         start[i] = x_t0 + 3 * pair.elements[pair.corners * e + i];
         stop[i] = x_t1 + 3 * pair.elements[pair.corners * e + i];
       }
-      const Vec origin = {start[0][0], start[0][1], start[0][2]};
+      const Vec3 origin = geometry::load(start[0]);
       Hit hit{static_cast<std::int32_t>(pairs_.size() + number),
               static_cast<std::int32_t>(e),
               0,
@@ -192,9 +187,8 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
                   static_cast<int>(pair.a.size()), &pair.known[e], &hit))
         continue;
       for (int i = 0; i < pair.corners; ++i) {
-        Vec d{};
-        for (int k = 0; k < 3; ++k) d[k] = stop[i][k] - start[i][k] - drift[k];
-        hit.way = std::max(hit.way, norm(d));
+        const Vec3 moved = geometry::load(stop[i]) - geometry::load(start[i]) - drift;
+        hit.way = std::max(hit.way, norm(moved));
       }
       const RigidMotion& motion = motions_[entries_[pair.a[0]].body];
       if (motion.speed != 0) hit.way += travel(pair.a[0], drift);

@@ -68,8 +68,8 @@ class Verdict {
   };
 
   void update(const Poses& poses);
-  SupportShape mover(int entry, const Vec& origin) const;
-  double travel(int entry, const Vec& drift) const;
+  SupportShape mover(int entry, const Vec3& origin) const;
+  double travel(int entry, const Vec3& drift) const;
   void judge_rigid(std::size_t pair, std::vector<Hit>* hits);
   void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
@@ -77,7 +77,7 @@ class Verdict {
   std::vector<Pair> pairs_;
   std::vector<FlexPair> flex_pairs_;
   std::vector<char> whole_;           // by entry: a shape of level 0
-  std::vector<Box> boxes_;            // by entry, of those
+  std::vector<Aabb> boxes_;           // by entry, of those
   std::vector<int> bodies_;           // those that have shapes
   std::vector<RigidMotion> motions_;  // by body
   std::vector<char> still_, fresh_;   // by body: unmoved in this step; boxes are out of date

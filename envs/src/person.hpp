@@ -12,10 +12,7 @@
 
 namespace tauguard::envs {
 
-using geometry::cross;
-using geometry::dot;
 using geometry::load;
-using geometry::mix;
 using geometry::norm;
 using geometry::Vec3;
 

@@ -21,18 +21,18 @@ namespace tauguard::rigid {
 
 // A direction, its rate of turning, and a bound on |rate|.
 struct Turning {
-  Vec n, rate;
+  Vec3 n, rate;
   double turn;
 };
 
 // The largest tangent over the vertices of a body, and its slope.
 class VertexTangents {
  public:
-  VertexTangents(const MovingBody& body, const Vec& n, const Vec& rate, const Vec& centre,
-                 const Vec& drift)
+  VertexTangents(const MovingBody& body, const Vec3& n, const Vec3& rate, const Vec3& centre,
+                 const Vec3& drift)
       : lines_(body.now.size()) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
-      const Vec x = body.now[i] - centre;
+      const Vec3 x = body.now[i] - centre;
       lines_[i] = {dot(n, x), dot(rate, x) + dot(n, body.velocity[i] - drift)};
     }
   }
@@ -50,8 +50,8 @@ class VertexTangents {
 // The same of a shape: one call of its support function.
 class SupportTangent {
  public:
-  SupportTangent(const SupportShape& shape, const Vec& n, const Vec& rate, const Vec& centre,
-                 const Vec& drift)
+  SupportTangent(const SupportShape& shape, const Vec3& n, const Vec3& rate, const Vec3& centre,
+                 const Vec3& drift)
       : shape_(shape), n_(n), rate_(rate), centre_(centre), drift_(drift) {}
   double operator()(double h, double* slope) const {
     return shape_.tangent(n_, rate_, h, centre_, drift_, slope);
@@ -59,15 +59,15 @@ class SupportTangent {
 
  private:
   const SupportShape& shape_;
-  const Vec n_, rate_, centre_, drift_;
+  const Vec3 n_, rate_, centre_, drift_;
 };
 
-inline VertexTangents tangents(const MovingBody& body, const Vec& n, const Vec& rate,
-                               const Vec& centre, const Vec& drift) {
+inline VertexTangents tangents(const MovingBody& body, const Vec3& n, const Vec3& rate,
+                               const Vec3& centre, const Vec3& drift) {
   return VertexTangents(body, n, rate, centre, drift);
 }
-inline SupportTangent tangents(const SupportShape& shape, const Vec& n, const Vec& rate,
-                               const Vec& centre, const Vec& drift) {
+inline SupportTangent tangents(const SupportShape& shape, const Vec3& n, const Vec3& rate,
+                               const Vec3& centre, const Vec3& drift) {
   return SupportTangent(shape, n, rate, centre, drift);
 }
 

@@ -1,6 +1,7 @@
 #include "comparison_volumes.hpp"
 
 #include "symmetric.hpp"
+#include "tauguard/geometry/k_dop.hpp"
 
 namespace tauguard::rigid {
 namespace {
@@ -18,25 +19,26 @@ void each_corner(const Cluster& c, Visit visit) {
     }
 }
 
-// Directions k = 0..8 of a k-DOP as (first axis, second axis, sign); the first three have one axis.
+// The places of `p` along the axes, in their order.
 void project(const double* p, double* out) {
   out[0] = p[0], out[1] = p[1], out[2] = p[2];
-  out[3] = p[0] + p[1], out[4] = p[0] - p[1];
-  out[5] = p[0] + p[2], out[6] = p[0] - p[2];
-  out[7] = p[1] + p[2], out[8] = p[1] - p[2];
+  for (int i = 0; i < 2; ++i)
+    for (int j = i + 1; j < 3; ++j) {
+      out[geometry::edge_axis(i, j, false)] = p[i] + p[j];
+      out[geometry::edge_axis(i, j, true)] = p[i] - p[j];
+    }
 }
 
-constexpr double direction[KDop::directions][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},
-                                                   {1, 1, 0},  {1, -1, 0}, {1, 0, 1},
-                                                   {1, 0, -1}, {0, 1, 1},  {0, 1, -1}};
+double along(const std::int8_t* axis, const double* p) {
+  return axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2];
+}
 
-// The index of the normal sx e_x + sy e_y (x != y) and whether that or its opposite is the stored
+// The axis of the normal sx e_x + sy e_y (x != y), and whether that or its opposite is the stored
 // one.
 int pair_index(int x, int y, double sx, double sy, double* flip) {
   if (x > y) std::swap(x, y), std::swap(sx, sy);
   *flip = sx;
-  const int base = x == 0 ? (y == 1 ? 3 : 5) : 7;
-  return base + (sx * sy < 0);
+  return geometry::edge_axis(x, y, sx * sy < 0);
 }
 
 // [lo, hi] of `k` along the direction that `cone` spells.
@@ -191,15 +193,16 @@ KDop::Cone KDop::Cone::around(const double* d) {
 KDop::Relation::Relation(const Tree& a, const Tree& b, const Pose& pose) : at(a, b, pose) {
   at.pad *= 4;  // directions of length sqrt 2, weights that sum to at most sqrt 3
   for (int k = 0; k < directions; ++k) {
+    const auto* axis = geometry::k_dop_axes[k];
     double in_b[3], in_a[3];
     for (int i = 0; i < 3; ++i) {
-      in_b[i] = at.r[0][i] * direction[k][0] + at.r[1][i] * direction[k][1] +
-                at.r[2][i] * direction[k][2];
-      in_a[i] = dot(at.r[i], direction[k]);
+      const double column[3] = {at.r[0][i], at.r[1][i], at.r[2][i]};
+      in_b[i] = along(axis, column);
+      in_a[i] = along(axis, at.r[i]);
     }
     a_from_b[k] = Cone::around(in_b);
     b_from_a[k] = Cone::around(in_a);
-    shift_a[k] = dot(direction[k], at.t);
+    shift_a[k] = along(axis, at.t);
     shift_b[k] = -dot(in_a, at.t);
   }
 }

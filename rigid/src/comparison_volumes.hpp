@@ -48,7 +48,7 @@ struct Obb {
   double volume() const { return 8 * extent[0] * extent[1] * extent[2]; }
 };
 
-// Bounds along x, y, z, x +- y, x +- z, y +- z (not normalised).
+// An 18-DOP: bounds along the first nine axes of geometry/k_dop.hpp.
 struct KDop {
   static constexpr int directions = 9;
   double lo[directions], hi[directions], centre[3];

@@ -15,18 +15,14 @@ class ContactFeature {
  public:
   using Point2 = std::array<double, 2>;
 
-  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane basis u,
-  // v.
-  ContactFeature(const Points<double>& body, const double* normal, double sign, double tolerance,
-                 const double* u, const double* v) {
-    const auto along = [](const double* n, const std::array<double, 3>& p) {
-      return n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
-    };
-    double top = sign * along(normal, body[0]);
-    for (const auto& p : body) top = std::max(top, sign * along(normal, p));
+  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane of u, v.
+  ContactFeature(const Points<double>& body, const Vec3& normal, double sign, double tolerance,
+                 const Vec3& u, const Vec3& v) {
+    double top = sign * dot(normal, body[0]);
+    for (const auto& p : body) top = std::max(top, sign * dot(normal, p));
     std::vector<Point2> points;
     for (const auto& p : body)
-      if (sign * along(normal, p) >= top - tolerance) points.push_back({along(u, p), along(v, p)});
+      if (sign * dot(normal, p) >= top - tolerance) points.push_back({dot(u, p), dot(v, p)});
     level = sign * top;
     polygon = hull(points);
   }
@@ -99,25 +95,18 @@ class ContactFeature {
   }
 };
 
-// `a` and `b` touch along the unit `normal` (from a to b). Writes a common point to `point`.
-inline void contact_point(const Points<double>& a, const Points<double>& b, const double* normal,
-                          double tolerance, double* point) {
-  const int least = std::fabs(normal[0]) < std::fabs(normal[1])
-                        ? (std::fabs(normal[0]) < std::fabs(normal[2]) ? 0 : 2)
-                        : (std::fabs(normal[1]) < std::fabs(normal[2]) ? 1 : 2);
-  double u[3], v[3];
-  double length = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    u[k] = (k == least ? 1.0 : 0.0) - normal[least] * normal[k];
-    length += u[k] * u[k];
-  }
-  for (double& x : u) x /= std::sqrt(length);
-  for (int k = 0; k < 3; ++k)
-    v[k] = normal[(k + 1) % 3] * u[(k + 2) % 3] - normal[(k + 2) % 3] * u[(k + 1) % 3];
+// A common point of `a` and `b`, which touch along the unit `normal` (from a to b).
+inline Vec3 contact_point(const Points<double>& a, const Points<double>& b, const Vec3& normal,
+                          double tolerance) {
+  const int least = geometry::smallest_axis(normal);
+  Vec3 u = -normal[least] * normal;
+  u[least] += 1;
+  const double length = norm(u);
+  for (double& x : u) x /= length;
+  const Vec3 v = cross(normal, u);
   const ContactFeature fa(a, normal, 1.0, tolerance, u, v), fb(b, normal, -1.0, tolerance, u, v);
   const auto at = ContactFeature::meet(fa, fb, tolerance);
-  const double level = 0.5 * (fa.level + fb.level);
-  for (int k = 0; k < 3; ++k) point[k] = at[0] * u[k] + at[1] * v[k] + level * normal[k];
+  return at[0] * u + at[1] * v + 0.5 * (fa.level + fb.level) * normal;
 }
 
 }  // namespace tauguard::rigid

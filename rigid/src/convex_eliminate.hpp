@@ -26,9 +26,7 @@ namespace tauguard::rigid {
 template <int D>
 class HullElimination {
  public:
-  using Point = std::array<double, 3>;  // two-dimensional points have z = 0
-
-  // Points from a common origin, at most `reach` in 1-norm.
+  // Points from a common origin, at most `reach` in 1-norm; two-dimensional ones have z = 0.
   HullElimination(const Points<double>& a, const Points<double>& b, double reach)
       : a_(a), b_(b), reach_(reach) {}
 
@@ -65,42 +63,33 @@ class HullElimination {
     return std::all_of(r.entry.begin(), r.entry.end(), [&](double x) { return x > error_; });
   }
 
-  static Point minus(const Point& x, const Point& y) {
-    return {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
-  }
-
   // Normal of F through the points o, p (and q): F(x) = n . (x - o).
-  static Point normal_of(const Point& o, const Point& p, const Point& q) {
-    const Point u = minus(p, o);
+  static Vec3 normal_of(const Vec3& o, const Vec3& p, const Vec3& q) {
+    const Vec3 u = p - o;
     if (D == 2) return {-u[1], u[0], 0.0};
-    const Point v = minus(q, o);
-    Point n;
-    cross(u.data(), v.data(), n.data());
-    return n;
+    return cross(u, q - o);
   }
 
   // Far vertices of A, one after the other the farthest from the span of those before.
   bool choose_simplex() {
     chosen_[0] = 0;
-    Point along{}, across{};
+    Vec3 along{}, across{};
     for (int i = 1; i <= D; ++i) {
       double best = -1.0;
       for (std::size_t k = 0; k < a_.size(); ++k) {
-        const Point x = minus(a_[k], a_[0]);
+        const Vec3 x = a_[k] - a_[0];
         double size;
         if (i == 1)
-          size = dot(x.data(), x.data());
-        else if (i == 2) {
-          Point c;
-          cross(along.data(), x.data(), c.data());
-          size = dot(c.data(), c.data());
-        } else
-          size = std::fabs(dot(across.data(), x.data()));
+          size = dot(x, x);
+        else if (i == 2)
+          size = dot(cross(along, x), cross(along, x));
+        else
+          size = std::fabs(dot(across, x));
         if (size > best) best = size, chosen_[static_cast<std::size_t>(i)] = k;
       }
-      const Point x = minus(a_[chosen_[static_cast<std::size_t>(i)]], a_[0]);
+      const Vec3 x = a_[chosen_[static_cast<std::size_t>(i)]] - a_[0];
       if (i == 1) along = x;
-      if (i == 2) cross(along.data(), x.data(), across.data());
+      if (i == 2) across = cross(along, x);
     }
     for (std::size_t i = 0; i <= D; ++i) {
       const auto vertex = [&](std::size_t step) { return a_[chosen_[(i + step) % (D + 1)]]; };
@@ -108,7 +97,7 @@ class HullElimination {
       normal_[i] = normal_of(base_[i], vertex(2), D == 3 ? vertex(3) : vertex(2));
       double own = value(i, vertex(0));
       if (own < 0) {
-        for (double& x : normal_[i]) x = -x;
+        normal_[i] = -normal_[i];
         own = -own;
       }
       // As for a tetrahedron's facets (convex_abfme.hpp), with all lengths bounded by `reach`.
@@ -118,15 +107,12 @@ class HullElimination {
     return true;
   }
 
-  double value(std::size_t i, const Point& x) const {
-    const Point p = minus(x, base_[i]);
-    return dot(normal_[i].data(), p.data());
-  }
+  double value(std::size_t i, const Vec3& x) const { return dot(normal_[i], x - base_[i]); }
 
   std::vector<Row> initial_rows() const {
     std::vector<Row> rows;
     std::size_t name = D + 1;  // names 0 .. D stand for p_i >= 0
-    const auto push = [&](const Point& x, double sign) {
+    const auto push = [&](const Vec3& x, double sign) {
       Row r{};
       for (std::size_t i = 0; i <= D; ++i) r.entry[i] = sign * value(i, x);
       add(r.support, name++);
@@ -191,7 +177,7 @@ class HullElimination {
       }
       p[k] = std::isinf(high) ? 2 * low + 1 : 0.5 * (low + high);
     }
-    Point n{};
+    Vec3 n{};
     for (std::size_t i = 0; i <= D; ++i)
       for (std::size_t c = 0; c < 3; ++c) n[c] -= p[i] * normal_[i][c];
     double high = -HUGE_VAL, low = HUGE_VAL;
@@ -204,7 +190,7 @@ class HullElimination {
   const Points<double>& b_;
   double reach_, error_ = 0.0;
   std::array<std::size_t, D + 1> chosen_{};
-  std::array<Point, D + 1> base_{}, normal_{};
+  std::array<Vec3, D + 1> base_{}, normal_{};
 };
 
 }  // namespace tauguard::rigid

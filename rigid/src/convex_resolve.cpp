@@ -19,7 +19,7 @@ double quotient(const Dyadic& numerator, const Dyadic& denominator) {
   return std::ldexp(q, static_cast<int>(std::clamp<std::int64_t>(n - d, -5000, 5000)));
 }
 
-Dyadic projection(const double* n, const std::array<Dyadic, 3>& p) {
+Dyadic projection(const double* n, const Vector3<Dyadic>& p) {
   return Dyadic(n[0]) * p[0] + Dyadic(n[1]) * p[1] + Dyadic(n[2]) * p[2];
 }
 
@@ -38,7 +38,7 @@ std::array<Dyadic, 2> extent(const Points<Dyadic>& a, const Points<Dyadic>& b,
   return {high, low};
 }
 
-std::array<Dyadic, 3> shifted(const std::array<Dyadic, 3>& p, const double* d, double time) {
+Vector3<Dyadic> shifted(const Vector3<Dyadic>& p, const double* d, double time) {
   const Dyadic t(time);
   return {p[0] + Dyadic(d[0]) * t, p[1] + Dyadic(d[1]) * t, p[2] + Dyadic(d[2]) * t};
 }
@@ -70,12 +70,12 @@ void write_point(const HullSimplex<Dyadic>& lp, const Points<Dyadic>& a, double*
 using Lp = HullSimplex<double>;
 
 // Coordinates from the first vertex of a; returns the largest 1-norm.
-double localize(Points<double>& a, Points<double>& b, std::array<double, 3>& base) {
+double localize(Points<double>& a, Points<double>& b, Vec3& base) {
   base = a[0];
   double reach = 0.0;
   for (auto* points : {&a, &b})
     for (auto& p : *points) {
-      for (int k = 0; k < 3; ++k) p[k] -= base[k];
+      p = p - base;
       reach = std::max(reach, norm1(p.data()));
     }
   return reach;
@@ -95,7 +95,7 @@ double certain_gap(const Points<double>& a, const Points<double>& b, const doubl
 bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                           Verdict known, double* out) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
-  std::array<double, 3> base;
+  Vec3 base;
   const double reach = localize(a, b, base);
   if (!in_range(reach)) return false;
   Lp lp(a, b);
@@ -138,7 +138,7 @@ bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::s
 // size^3.
 Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
-  std::array<double, 3> base;
+  Vec3 base;
   const double reach = localize(a, b, base);
   const auto given = [](Kind kind) { return is_cloud(kind) || kind == Kind::tetrahedra; };
   const double size =
@@ -158,7 +158,7 @@ Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_
 
 Verdict eliminate_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
-  std::array<double, 3> base;
+  Vec3 base;
   const double reach = localize(a, b, base);
   if (!in_range(reach)) return undecided;
   if (bodies_a.kind == Kind::polygons) return HullElimination<2>(a, b, reach).decide();

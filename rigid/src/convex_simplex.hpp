@@ -58,9 +58,7 @@ class HullSimplex {
   std::array<std::size_t, 2> basis_pair(int k) const {
     return {(basis_[k] - 3) / b_.size(), (basis_[k] - 3) % b_.size()};
   }
-  std::array<Number, 3> column(std::size_t i, std::size_t j) const {
-    return {a_[i][0] - b_[j][0], a_[i][1] - b_[j][1], a_[i][2] - b_[j][2]};
-  }
+  Vector3<Number> column(std::size_t i, std::size_t j) const { return a_[i] - b_[j]; }
 
  private:
   void set_column(int k, std::size_t variable) {
@@ -125,7 +123,7 @@ class HullSimplex {
     }
   }
 
-  Number project(const std::array<Number, 3>& p) const {
+  Number project(const Vector3<Number>& p) const {
     return y_[0] * p[0] + y_[1] * p[1] + y_[2] * p[2];
   }
 

@@ -84,7 +84,8 @@ __attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double t
       size = std::max(size, std::fabs(p[k]));
     }
   for (const auto& p : pa) size = std::max(size, norm1(p.data()));
-  contact_point(pa, pb, out + 4, 1e-11 * size, out + 1);
+  const Vec3 point = contact_point(pa, pb, geometry::load(out + 4), 1e-11 * size);
+  std::copy(point.begin(), point.end(), out + 1);
 }
 
 // A hit that exact arithmetic found, and every hit of bodies without edge lists.

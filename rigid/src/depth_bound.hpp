@@ -37,7 +37,7 @@ double least_depth(const Polytope& polytope) {
   for (const auto& face : polytope.faces()) {
     double low = INFINITY;
     for (const int corner : face.corner)
-      low = std::min(low, inner(face.normal, polytope.point(corner)));
+      low = std::min(low, dot(face.normal, polytope.point(corner)));
     least = std::min(least, low / std::sqrt(face.square));
   }
   return least;

@@ -7,11 +7,11 @@ namespace {
 
 using Rows = std::array<std::size_t, 2>;
 struct SourcePoints {
-  Vec a, b;
+  Vec3 a, b;
 };
 
 // The first row that is furthest along n.
-std::size_t extreme(const PointList& points, const Vec& n) {
+std::size_t extreme(const PointList& points, const Vec3& n) {
   std::size_t best = 0;
   double most = dot(n, points[0]);
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -24,15 +24,15 @@ std::size_t extreme(const PointList& points, const Vec& n) {
 // Ends where no difference is nearer, to rounding.
 struct ToRounding {
   void visit(const Simplex<Rows>&) {}
-  bool enough(const Vec& v, const Vec& next) const {
+  bool enough(const Vec3& v, const Vec3& next) const {
     return dot(v, v) - dot(v, next) <= 1e-14 * dot(v, v);
   }
-  void stuck(const Simplex<Rows>&, const Vec&) {}
+  void stuck(const Simplex<Rows>&, const Vec3&) {}
 };
 
 template <class Watch>
 Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch) {
-  const auto support = [&](const Vec& v) {
+  const auto support = [&](const Vec3& v) {
     const std::size_t i = extreme(a, v), j = extreme(b, -1.0 * v);
     return Corner<Rows>{b[j] - a[i], {i, j}, 0};
   };
@@ -43,16 +43,16 @@ Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch
 // triangles are tried as well, and the best one is used.
 struct Separating : ToRounding {
   const PointList &a, &b;
-  Vec* n;
+  Vec3* n;
   double* separation;
 
-  Separating(const PointList& a, const PointList& b, Vec* n, double* separation)
+  Separating(const PointList& a, const PointList& b, Vec3* n, double* separation)
       : a(a), b(b), n(n), separation(separation) {}
-  void attempt(const Vec& d) {
+  void attempt(const Vec3& d) {
     const double length = norm(d);
     if (!(length > 0)) return;
     for (const double sign : {1.0, -1.0}) {
-      const Vec u = (sign / length) * d;
+      const Vec3 u = (sign / length) * d;
       const double s = dot(u, b[extreme(b, -1.0 * u)]) - dot(u, a[extreme(a, u)]);
       if (s > *separation) *separation = s, *n = u;
     }
@@ -61,9 +61,9 @@ struct Separating : ToRounding {
     attempt(s.nearest());
     if (s.size() == 3) attempt(cross(s.w(1) - s.w(0), s.w(2) - s.w(0)));
   }
-  void stuck(const Simplex<Rows>& s, const Vec& next) {
+  void stuck(const Simplex<Rows>& s, const Vec3& next) {
     const int size = s.size() + 1;
-    const Vec all[4] = {s.w(0), size > 2 ? s.w(1) : next, size > 3 ? s.w(2) : next, next};
+    const Vec3 all[4] = {s.w(0), size > 2 ? s.w(1) : next, size > 3 ? s.w(2) : next, next};
     for (int skip = 0; size == 4 && skip < 4; ++skip)
       attempt(cross(all[(skip + 1) % 4] - all[skip], all[(skip + 2) % 4] - all[skip]));
     if (size == 3) attempt(cross(all[1] - all[0], all[2] - all[0]));
@@ -75,20 +75,20 @@ struct Bounded {
   Distance& out;
   double needed;
 
-  void attempt(const Vec& direction, const Vec& w) {
+  void attempt(const Vec3& direction, const Vec3& w) {
     const double length = norm(direction);
     if (!(length > 0)) return;
     const double lower = dot(direction, w) / length;
     if (lower > out.lower) out.lower = lower, out.n = (1 / length) * direction;
   }
   void visit(const Simplex<SourcePoints>&) {}
-  bool enough(const Vec& v, const Vec& next) {
+  bool enough(const Vec3& v, const Vec3& next) {
     attempt(v, next);
     const double length = norm(v);
     return length - out.lower <= 1e-10 * length ||
            (out.lower > needed && length - out.lower < 0.1 * (out.lower - needed));
   }
-  void stuck(const Simplex<SourcePoints>&, const Vec&) {}
+  void stuck(const Simplex<SourcePoints>&, const Vec3&) {}
 };
 
 Distance of_half_space(const SupportShape& a, const SupportShape& b) {
@@ -104,14 +104,14 @@ Distance of_half_space(const SupportShape& a, const SupportShape& b) {
 
 }  // namespace
 
-bool separating_direction(const PointList& a, const PointList& b, Vec* n, double* separation) {
+bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation) {
   *separation = -INFINITY;
   Separating watch(a, b, n, separation);
   descend_hulls(a, b, watch);
   return *separation > 0;
 }
 
-Vec middle_point(const PointList& a, const PointList& b) {
+Vec3 middle_point(const PointList& a, const PointList& b) {
   const Nearest near = nearest(a, b);
   return 0.5 * (near.a + near.b);
 }
@@ -129,15 +129,15 @@ Nearest nearest(const PointList& a, const PointList& b) {
   return out;
 }
 
-Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& guess,
+Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
                      double needed) {
   if (a.half_space()) return of_half_space(a, b);
   Distance out;
-  const auto support = [&](const Vec& v) {
-    const Vec p = a.support(v), q = b.support(-1.0 * v);
+  const auto support = [&](const Vec3& v) {
+    const Vec3 p = a.support(v), q = b.support(-1.0 * v);
     return Corner<SourcePoints>{q - p, {p, q}, 0};
   };
-  Vec start = guess;
+  Vec3 start = guess;
   if (!(dot(start, start) > 0)) start = b.middle() - a.middle();
   if (!(dot(start, start) > 0)) start = {0, 0, 1};
   Corner<SourcePoints> first = support(start);
@@ -152,7 +152,7 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& gu
   // Close to contact cancellation destroys the nearest point: the face of the last simplex has a
   // better normal.
   if (!out.overlap && s.size() == 3) {
-    Vec n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));
+    Vec3 n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));
     if (dot(n, s.w(0)) < 0) n = -1.0 * n;
     if (dot(n, n) > 0) watch.attempt(n, support(n).w);
   }

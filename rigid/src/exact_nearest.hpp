@@ -18,11 +18,10 @@ class ExactNearest {
     keep();
     while (!is_zero(numerator)) {
       geometry::poll_interrupt();
-      const Vector<Number> back = {-numerator[0], -numerator[1], -numerator[2]};
-      const Pair next = y_.farthest(back);
-      const Vector<Number> w = y_.at(next);
+      const Pair next = y_.farthest(-numerator);
+      const Vector3<Number> w = y_.at(next);
       // numerator . (w - numerator / denominator) >= 0: no difference is nearer.
-      if (!(inner(numerator, w) * denominator < inner(numerator, numerator))) return;
+      if (!(dot(numerator, w) * denominator < dot(numerator, numerator))) return;
       take(next);
       keep();
     }
@@ -30,7 +29,7 @@ class ExactNearest {
 
   std::vector<Pair> pairs;      // at most four
   std::vector<Number> weights;  // of `pairs`, over `denominator`
-  Vector<Number> numerator;
+  Vector3<Number> numerator;
   Number denominator;
 
  private:
@@ -46,7 +45,7 @@ class ExactNearest {
         if (mask >> k & 1) face.push_back(k);
       if (!weigh(face) || !is_nearest()) continue;
       std::vector<Pair> kept;
-      std::vector<Vector<Number>> points;
+      std::vector<Vector3<Number>> points;
       for (const int k : face) kept.push_back(pairs[k]), points.push_back(points_[k]);
       pairs = kept, points_ = points;
       return;
@@ -54,33 +53,33 @@ class ExactNearest {
   }
 
   bool is_nearest() const {
-    const Number square = inner(numerator, numerator);
+    const Number square = dot(numerator, numerator);
     for (const auto& p : points_)
-      if (inner(numerator, p) * denominator < square) return false;
+      if (dot(numerator, p) * denominator < square) return false;
     return true;
   }
 
   // Weights of the point of the face's affine hull nearest to the origin, by Cramer's rule.
   bool weigh(const std::vector<int>& face) {
-    const Vector<Number>& y0 = points_[face[0]];
-    Vector<Number> e[3];
-    for (std::size_t k = 1; k < face.size(); ++k) e[k - 1] = minus(points_[face[k]], y0);
+    const Vector3<Number>& y0 = points_[face[0]];
+    Vector3<Number> e[3];
+    for (std::size_t k = 1; k < face.size(); ++k) e[k - 1] = points_[face[k]] - y0;
     weights.assign(face.size(), Number());
     if (face.size() == 1) {
       denominator = Number(1.0);
     } else if (face.size() == 2) {
-      denominator = inner(e[0], e[0]);
-      weights[1] = -inner(e[0], y0);
+      denominator = dot(e[0], e[0]);
+      weights[1] = -dot(e[0], y0);
     } else if (face.size() == 3) {
-      const Number aa = inner(e[0], e[0]), ab = inner(e[0], e[1]), bb = inner(e[1], e[1]);
-      const Number x = -inner(e[0], y0), y = -inner(e[1], y0);
+      const Number aa = dot(e[0], e[0]), ab = dot(e[0], e[1]), bb = dot(e[1], e[1]);
+      const Number x = -dot(e[0], y0), y = -dot(e[1], y0);
       denominator = aa * bb - ab * ab;
       weights[1] = x * bb - y * ab, weights[2] = y * aa - x * ab;
     } else {
-      denominator = inner(e[0], outer(e[1], e[2]));
-      weights[1] = -inner(y0, outer(e[1], e[2]));
-      weights[2] = -inner(y0, outer(e[2], e[0]));
-      weights[3] = -inner(y0, outer(e[0], e[1]));
+      denominator = dot(e[0], cross(e[1], e[2]));
+      weights[1] = -dot(y0, cross(e[1], e[2]));
+      weights[2] = -dot(y0, cross(e[2], e[0]));
+      weights[3] = -dot(y0, cross(e[0], e[1]));
       if (!positive(denominator)) {
         denominator = -denominator;
         for (auto& w : weights) w = -w;
@@ -91,17 +90,14 @@ class ExactNearest {
     for (std::size_t k = 1; k < face.size(); ++k) weights[0] = weights[0] - weights[k];
     for (const auto& w : weights)
       if (!positive(w)) return false;
-    for (int c = 0; c < 3; ++c) {
-      numerator[c] = denominator * y0[c];
-      for (std::size_t k = 1; k < face.size(); ++k)
-        numerator[c] = numerator[c] + weights[k] * e[k - 1][c];
-    }
-    if (face.size() == 4) numerator = {Number(), Number(), Number()};
+    numerator = denominator * y0;
+    for (std::size_t k = 1; k < face.size(); ++k) numerator += weights[k] * e[k - 1];
+    if (face.size() == 4) numerator = {};
     return true;
   }
 
   const PointDifferences<Number> y_;
-  std::vector<Vector<Number>> points_;
+  std::vector<Vector3<Number>> points_;
 };
 
 }  // namespace tauguard::rigid

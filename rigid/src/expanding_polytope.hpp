@@ -19,27 +19,12 @@
 namespace tauguard::rigid {
 
 template <class Number>
-using Vector = std::array<Number, 3>;
-
-template <class Number>
-Vector<Number> minus(const Vector<Number>& x, const Vector<Number>& y) {
-  return {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
-}
-template <class Number>
-Number inner(const Vector<Number>& x, const Vector<Number>& y) {
-  return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
-}
-template <class Number>
-Vector<Number> outer(const Vector<Number>& x, const Vector<Number>& y) {
-  return {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
-}
-template <class Number>
 bool positive(const Number& x) {
   return Number() < x;
 }
 template <class Number>
-bool is_zero(const Vector<Number>& x) {
-  return x[0] == Number() && x[1] == Number() && x[2] == Number();
+bool is_zero(const Vector3<Number>& x) {
+  return x == Vector3<Number>();
 }
 
 // Is x, the square of a volume, only a rounding error compared with `scale`?
@@ -64,16 +49,16 @@ class PointDifferences {
   PointDifferences(const Points<Number>& a, const Points<Number>& b, double size = 0)
       : a_(a), b_(b), size_(size) {}
 
-  Vector<Number> at(const Source& p) const { return minus(b_[p[1]], a_[p[0]]); }
-  Source farthest(const Vector<Number>& n) const {
+  Vector3<Number> at(const Source& p) const { return b_[p[1]] - a_[p[0]]; }
+  Source farthest(const Vector3<Number>& n) const {
     Source best{0, 0};
-    Number low = inner(n, a_[0]), high = inner(n, b_[0]);
+    Number low = dot(n, a_[0]), high = dot(n, b_[0]);
     for (std::size_t i = 1; i < a_.size(); ++i) {
-      const Number x = inner(n, a_[i]);
+      const Number x = dot(n, a_[i]);
       if (x < low) low = x, best[0] = i;
     }
     for (std::size_t j = 1; j < b_.size(); ++j) {
-      const Number x = inner(n, b_[j]);
+      const Number x = dot(n, b_[j]);
       if (high < x) high = x, best[1] = j;
     }
     return best;
@@ -81,14 +66,14 @@ class PointDifferences {
 
   // Four differences that span space: the farthest from the first, from the line, from the plane.
   // False where there are none; `normal` is then one of what they span, zero for a point.
-  bool span(std::array<Vector<Number>, 4>* y, std::array<Source, 4>* from, Vector<Number>* normal,
+  bool span(std::array<Vector3<Number>, 4>* y, std::array<Source, 4>* from, Vector3<Number>* normal,
             bool* thin) const {
-    const Vector<Number> y0 = at({0, 0});
-    std::vector<Vector<Number>> e;
+    const Vector3<Number> y0 = at({0, 0});
+    std::vector<Vector3<Number>> e;
     std::vector<Source> sources;
     for (std::size_t i = 1; i < a_.size(); ++i) sources.push_back({i, 0});
     for (std::size_t j = 1; j < b_.size(); ++j) sources.push_back({0, j});
-    for (const Source& s : sources) e.push_back(minus(at(s), y0));
+    for (const Source& s : sources) e.push_back(at(s) - y0);
     Number most{};
     const auto best = [&](const auto& measure, int corner) {
       most = Number();
@@ -99,20 +84,20 @@ class PointDifferences {
       }
       if (!positive(most)) return false;
       (*from)[corner] = sources[kept];
-      for (int c = 0; c < 3; ++c) (*y)[corner][c] = y0[c] + e[kept][c];
+      (*y)[corner] = y0 + e[kept];
       return true;
     };
     const auto edge = [&](int corner) { return at((*from)[corner]); };
     (*y)[0] = y0, (*from)[0] = {0, 0};
-    if (!best([](const auto& x) { return inner(x, x); }, 1)) return false;
-    const Vector<Number> line = minus(edge(1), y0);
+    if (!best([](const auto& x) { return dot(x, x); }, 1)) return false;
+    const Vector3<Number> line = edge(1) - y0;
     *normal = across(line);
-    const auto area = [&](const auto& x) { return inner(outer(line, x), outer(line, x)); };
+    const auto area = [&](const auto& x) { return dot(cross(line, x), cross(line, x)); };
     if (!best(area, 2)) return false;
-    const Vector<Number> n = outer(line, minus(edge(2), y0));
+    const Vector3<Number> n = cross(line, edge(2) - y0);
     *normal = n;
-    if (!best([&](const auto& x) { return inner(n, x) * inner(n, x); }, 3)) return false;
-    *thin = negligible(most, inner(n, n) * inner(line, line));
+    if (!best([&](const auto& x) { return dot(n, x) * dot(n, x); }, 3)) return false;
+    *thin = negligible(most, dot(n, n) * dot(line, line));
     return true;
   }
 
@@ -123,18 +108,18 @@ class PointDifferences {
   }
   bool sees(const Number& excess, const Number&) const { return positive(excess); }
   // Whether `side`, four times a height above a triangle, may be rounding alone.
-  bool unsure(const Number& side, const Vector<Number>& normal, const Number& square,
-              const std::array<const Vector<Number>*, 3>& y) const {
+  bool unsure(const Number& side, const Vector3<Number>& normal, const Number& square,
+              const std::array<const Vector3<Number>*, 3>& y) const {
     if constexpr (std::is_same_v<Number, double>) {
-      const double x = inner(normal, *y[0]), spread = std::max(std::fabs(inner(normal, *y[1]) - x),
-                                                               std::fabs(inner(normal, *y[2]) - x));
+      const double x = dot(normal, *y[0]), spread = std::max(std::fabs(dot(normal, *y[1]) - x),
+                                                             std::fabs(dot(normal, *y[2]) - x));
       return side_is_rounding(side, spread, square, size_);
     }
     return false;
   }
 
  private:
-  static Vector<Number> across(const Vector<Number>& e) {
+  static Vector3<Number> across(const Vector3<Number>& e) {
     if (e[0] == Number() && e[1] == Number()) return {Number(1.0), Number(), Number()};
     return {-e[1], e[0], Number()};
   }
@@ -152,18 +137,18 @@ class ExpandingPolytope {
   enum class Answer { facet, flat, gave_up };
   struct Face {
     std::array<int, 3> corner;
-    Vector<Number> normal;  // outward; where `flat` any normal of what they span, zero for a point
-    Number offset, square;  // normal . y <= offset for every difference; normal . normal
+    Vector3<Number> normal;  // outward; where `flat` any normal of what they span, zero for a point
+    Number offset, square;   // normal . y <= offset for every difference; normal . normal
   };
 
   explicit ExpandingPolytope(Differences differences) : differences_(std::move(differences)) {}
 
   Answer solve(int most_faces) {
-    std::array<Vector<Number>, 4> y;
+    std::array<Vector3<Number>, 4> y;
     std::array<Source, 4> from;
     if (!differences_.span(&y, &from, &nearest.normal, &broken_)) return Answer::flat;
     points_.assign(y.begin(), y.end()), sources_.assign(from.begin(), from.end());
-    for (int c = 0; c < 3; ++c) inside4_[c] = y[0][c] + y[1][c] + y[2][c] + y[3][c];
+    inside4_ = y[0] + y[1] + y[2] + y[3];
     add(0, 1, 2), add(0, 1, 3), add(0, 2, 3), add(1, 2, 3);
     while (static_cast<int>(faces_.size()) < most_faces) {
       geometry::poll_interrupt();
@@ -173,8 +158,8 @@ class ExpandingPolytope {
         if (nearer(faces_[f], faces_[best])) best = f;
       nearest = faces_[best];
       const Source next = differences_.farthest(nearest.normal);
-      const Vector<Number> w = differences_.at(next);
-      if (differences_.is_final(inner(nearest.normal, w) - nearest.offset, nearest.square, next))
+      const Vector3<Number> w = differences_.at(next);
+      if (differences_.is_final(dot(nearest.normal, w) - nearest.offset, nearest.square, next))
         return Answer::facet;
       sources_.push_back(next);
       if (!grow(w, best)) return Answer::gave_up;
@@ -184,24 +169,21 @@ class ExpandingPolytope {
 
   Face nearest{};  // to the origin, as far as the polytope grew
   const std::vector<Face>& faces() const { return faces_; }
-  const Vector<Number>& point(int corner) const { return points_[corner]; }
+  const Vector3<Number>& point(int corner) const { return points_[corner]; }
   const Source& source(int corner) const { return sources_[corner]; }
 
  private:
   void add(int i, int j, int k) {
-    Face f{{i, j, k},
-           outer(minus(points_[j], points_[i]), minus(points_[k], points_[i])),
-           Number(),
-           Number()};
-    f.offset = inner(f.normal, points_[i]);
-    f.square = inner(f.normal, f.normal);
+    Face f{{i, j, k}, cross(points_[j] - points_[i], points_[k] - points_[i]), Number(), Number()};
+    f.offset = dot(f.normal, points_[i]);
+    f.square = dot(f.normal, f.normal);
     if (!positive(f.square)) broken_ = true;
-    const Number side = inner(f.normal, inside4_) - Number(4.0) * f.offset;
-    if (negligible(side * side, f.square * inner(inside4_, inside4_))) broken_ = true;
+    const Number side = dot(f.normal, inside4_) - Number(4.0) * f.offset;
+    if (negligible(side * side, f.square * dot(inside4_, inside4_))) broken_ = true;
     if (differences_.unsure(side, f.normal, f.square, {&points_[i], &points_[j], &points_[k]}))
       broken_ = true;
     if (positive(side)) {
-      for (int c = 0; c < 3; ++c) f.normal[c] = -f.normal[c];
+      f.normal = -f.normal;
       f.offset = -f.offset;
     }
     faces_.push_back(f);
@@ -216,12 +198,12 @@ class ExpandingPolytope {
   }
 
   // Replaces the faces that see w by the cone from w over their rim.
-  bool grow(const Vector<Number>& w, std::size_t seen) {
+  bool grow(const Vector3<Number>& w, std::size_t seen) {
     std::vector<std::pair<int, int>> edges;
     std::vector<Face> rest;
     for (std::size_t f = 0; f < faces_.size(); ++f) {
       const Face& face = faces_[f];
-      if (f != seen && !differences_.sees(inner(face.normal, w) - face.offset, face.square)) {
+      if (f != seen && !differences_.sees(dot(face.normal, w) - face.offset, face.square)) {
         rest.push_back(face);
         continue;
       }
@@ -247,10 +229,10 @@ class ExpandingPolytope {
   }
 
   Differences differences_;
-  std::vector<Vector<Number>> points_;
+  std::vector<Vector3<Number>> points_;
   std::vector<Source> sources_;
   std::vector<Face> faces_;
-  Vector<Number> inside4_{};
+  Vector3<Number> inside4_{};
   bool broken_ = false;
 };
 

@@ -12,7 +12,7 @@ namespace tauguard::rigid {
 // Edge directions, each off by at most 4 roundings of itself, and which pairs of them span faces,
 // of parallelepipeds and of hulls of at most four points.
 struct BodyEdges {
-  Vec edge[6];
+  Vec3 edge[6];
   int edges = 0, faces = 0;
   int face[4][2];
   bool parallel = false;  // opposite faces are parallel
@@ -67,18 +67,18 @@ class FacetDepth {
   }
 
   double way = INFINITY;
-  Vec normal{};  // unit, from a to b: b moved by `way` along it only touches
+  Vec3 normal{};  // unit, from a to b: b moved by `way` along it only touches
   bool apart = false;
 
  private:
   // Edges of two parallelepipeds that are parallel to 2^-49 span no facet after a change of that
   // share of an edge; the edges of one body add up to 3 of the size.
-  bool consider(const Vec& x, const Vec& y, bool may_skip) {
-    const Vec c = cross(x, y);
+  bool consider(const Vec3& x, const Vec3& y, bool may_skip) {
+    const Vec3 c = cross(x, y);
     const double length = norm(c), both = norm(x) * norm(y);
     if (!(length > 0x1p-49 * both)) return may_skip;
     const double slack = 0x1p-46 * (both / length) * size_;
-    const Vec n = (1 / length) * c;
+    const Vec3 n = (1 / length) * c;
     const Range ra = range(a_, n), rb = range(b_, n);
     return bound(n, ra.high - rb.low, slack) && bound(-1.0 * n, rb.high - ra.low, slack);
   }
@@ -86,16 +86,16 @@ class FacetDepth {
   struct Range {
     double low = INFINITY, high = -INFINITY;
   };
-  static Range range(const Points<double>& points, const Vec& n) {
+  static Range range(const Points<double>& points, const Vec3& n) {
     Range r;
-    for (const Vec& p : points) {
+    for (const Vec3& p : points) {
       const double x = dot(n, p);
       r.low = std::min(r.low, x), r.high = std::max(r.high, x);
     }
     return r;
   }
 
-  bool bound(const Vec& n, double top, double slack) {
+  bool bound(const Vec3& n, double top, double slack) {
     if (top < way) way = top, normal = n;
     if (!(top > slack)) {
       apart = top < -slack;
@@ -107,10 +107,10 @@ class FacetDepth {
   }
 
   // The height below the top of the vertices that are within `slack` of it.
-  static double spread(const Points<double>& points, const Vec& n, double slack) {
+  static double spread(const Points<double>& points, const Vec3& n, double slack) {
     const double top = range(points, n).high;
     double most = 0;
-    for (const Vec& p : points) {
+    for (const Vec3& p : points) {
       const double below = top - dot(n, p);
       if (below <= slack) most = std::max(most, below);
     }

@@ -21,37 +21,37 @@ constexpr int most_steps = 20000, steps_a_radian = 64;
 constexpr double little_turn = 4;
 
 struct Axis {
-  Vec n{}, rate{};
+  Vec3 n{}, rate{};
   double separation = -INFINITY;
 };
 
-double least(const std::vector<Vec>& points, const Vec& n) {
+double least(const std::vector<Vec3>& points, const Vec3& n) {
   double m = INFINITY;
-  for (const Vec& p : points) m = std::min(m, dot(n, p));
+  for (const Vec3& p : points) m = std::min(m, dot(n, p));
   return m;
 }
 
-double most(const std::vector<Vec>& points, const Vec& n) {
+double most(const std::vector<Vec3>& points, const Vec3& n) {
   double m = -INFINITY;
-  for (const Vec& p : points) m = std::max(m, dot(n, p));
+  for (const Vec3& p : points) m = std::max(m, dot(n, p));
   return m;
 }
 
 double rounding(const MovingBody& a, const MovingBody& b) { return a.rounding + b.rounding; }
 
 // Of the surfaces along n, from a to b.
-double separation_along(const MovingBody& a, const MovingBody& b, const Vec& n) {
+double separation_along(const MovingBody& a, const MovingBody& b, const Vec3& n) {
   return least(b.now, n) - most(a.now, n) - rounding(a, b);
 }
 
 // Tries n and -n, n of length 1; true where one of them is the best so far.
-bool consider(const MovingBody& a, const MovingBody& b, const Vec& n, Axis* best) {
+bool consider(const MovingBody& a, const MovingBody& b, const Vec3& n, Axis* best) {
   double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY;
-  for (const Vec& p : a.now) {
+  for (const Vec3& p : a.now) {
     const double x = dot(n, p);
     a_lo = std::min(a_lo, x), a_hi = std::max(a_hi, x);
   }
-  for (const Vec& p : b.now) {
+  for (const Vec3& p : b.now) {
     const double x = dot(n, p);
     b_lo = std::min(b_lo, x), b_hi = std::max(b_hi, x);
   }
@@ -62,35 +62,35 @@ bool consider(const MovingBody& a, const MovingBody& b, const Vec& n, Axis* best
 }
 
 // The rate at which the way v between the nearest points of both hulls turns with what they lie on.
-Vec feature_rate(const MovingBody& a, const MovingBody& b, const Nearest& near, const Vec& v) {
-  Vec w[3], u[3];
+Vec3 feature_rate(const MovingBody& a, const MovingBody& b, const Nearest& near, const Vec3& v) {
+  Vec3 w[3], u[3];
   for (int i = 0; i < near.size; ++i) {
     const auto [p, q] = near.corner[i];
     w[i] = b.now[q] - a.now[p], u[i] = b.velocity[q] - a.velocity[p];
   }
   const double square = dot(v, v);
-  const auto across = [&](const Vec& x) { return x - (dot(x, v) / square) * v; };
+  const auto across = [&](const Vec3& x) { return x - (dot(x, v) / square) * v; };
   const double length = std::sqrt(square);
   if (near.size == 1) return (1 / length) * across(u[0]);
-  const Vec e = w[1] - w[0], f = u[1] - u[0];
+  const Vec3 e = w[1] - w[0], f = u[1] - u[0];
   if (near.size == 2) {  // v stays across the edge e
     const double ee = dot(e, e), share = -dot(w[0], e) / ee;
-    const Vec moved = u[0] + share * f;
+    const Vec3 moved = u[0] + share * f;
     return (1 / length) * across(moved - ((dot(moved, e) + dot(v, f)) / ee) * e);
   }
-  const Vec g = w[2] - w[0], h = u[2] - u[0], c = cross(e, g);
-  const Vec turned = across(cross(f, g) + cross(e, h));
+  const Vec3 g = w[2] - w[0], h = u[2] - u[0], c = cross(e, g);
+  const Vec3 turned = across(cross(f, g) + cross(e, h));
   return (dot(c, v) < 0 ? -1 : 1) / norm(c) * turned;
 }
 
 Axis nearest_axis(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
-  const Vec v = near.b - near.a;
+  const Vec3 v = near.b - near.a;
   const double length = norm(v);
   if (near.size == 4 || !(length > 0)) return {};
-  const Vec n = (1 / length) * v;
-  const Vec rate = feature_rate(a, b, near, v);
-  return {n, norm(rate) < HUGE_VAL ? rate : Vec{}, separation_along(a, b, n)};
+  const Vec3 n = (1 / length) * v;
+  const Vec3 rate = feature_rate(a, b, near, v);
+  return {n, norm(rate) < HUGE_VAL ? rate : Vec3{}, separation_along(a, b, n)};
 }
 
 Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
@@ -100,14 +100,14 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
     if (best.separation > enough) return best;
   }
   int chosen = -1;  // 0: turns with a, 1: with b, 2: crossed edges x, y
-  Vec x{}, y{};
-  for (const Vec& n : a.normal)
+  Vec3 x{}, y{};
+  for (const Vec3& n : a.normal)
     if (consider(a, b, n, &best)) chosen = 0;
-  for (const Vec& n : b.normal)
+  for (const Vec3& n : b.normal)
     if (consider(a, b, n, &best)) chosen = 1;
-  for (const Vec& ea : a.edge)
-    for (const Vec& eb : b.edge) {
-      const Vec n = cross(ea, eb);
+  for (const Vec3& ea : a.edge)
+    for (const Vec3& eb : b.edge) {
+      const Vec3 n = cross(ea, eb);
       const double square = dot(n, n);
       if (square > 1e-24 && consider(a, b, (1 / std::sqrt(square)) * n, &best))
         chosen = 2, x = ea, y = eb;
@@ -124,8 +124,8 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   if (chosen == 0) best.rate = cross(a.angular(), best.n);
   if (chosen == 1) best.rate = cross(b.angular(), best.n);
   if (chosen == 2) {
-    const Vec c = cross(x, y),
-              turned = cross(cross(a.angular(), x), y) + cross(x, cross(b.angular(), y));
+    const Vec3 c = cross(x, y),
+               turned = cross(cross(a.angular(), x), y) + cross(x, cross(b.angular(), y));
     best.rate = (dot(c, best.n) < 0 ? -1 : 1) / norm(c) * (turned - dot(turned, best.n) * best.n);
   }
   return best;
@@ -145,22 +145,22 @@ double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis
 // `axis` becomes that direction. For bodies that turn fast and pass by each other a few such steps
 // are enough, while their true surfaces need a step for each radian.
 double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
-  const Vec between = b.centre() - a.centre(), drift = b.linear() - a.linear();
-  const auto across = [](const Vec& v, const Vec& n) { return v - dot(v, n) * n; };
-  const Vec tried[] = {axis->n,
-                       between,
-                       a.axis(),
-                       b.axis(),
-                       across(between, a.axis()),
-                       across(between, b.axis()),
-                       across(axis->n, a.axis()),
-                       across(axis->n, b.axis())};
+  const Vec3 between = b.centre() - a.centre(), drift = b.linear() - a.linear();
+  const auto across = [](const Vec3& v, const Vec3& n) { return v - dot(v, n) * n; };
+  const Vec3 tried[] = {axis->n,
+                        between,
+                        a.axis(),
+                        b.axis(),
+                        across(between, a.axis()),
+                        across(between, b.axis()),
+                        across(axis->n, a.axis()),
+                        across(axis->n, b.axis())};
   double longest = 0;
-  for (const Vec& v : tried) {
+  for (const Vec3& v : tried) {
     const double length = norm(v);
     if (!(length > 0)) continue;
     for (const double sign : {1.0, -1.0}) {
-      const Vec n = (sign / length) * v;
+      const Vec3 n = (sign / length) * v;
       const double gap =
           dot(n, between) + b.spun(n)[0] - a.spun(n)[1] - rounding(a, b) - 2 * margin;
       if (!(gap > 0)) continue;
@@ -175,14 +175,14 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
 // The direction of contact: the best axis now, or the last certain one turned by `h` if that
 // separates the bodies as well. It does so to second order in h. Flat bodies in one plane leave no
 // other choice, because a normal of that plane separates them by zero, too.
-Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
-                   const Axis& now) {
+Vec3 contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
+                    const Axis& now) {
   if (last.separation > -INFINITY) {
-    const Vec turned = last.n + h * last.rate, n = (1 / norm(turned)) * turned;
+    const Vec3 turned = last.n + h * last.rate, n = (1 / norm(turned)) * turned;
     const double slack = contact_tolerance(a, b), separation = separation_along(a, b, n);
     if (separation >= -slack && separation >= now.separation - slack) return n;
   }
-  return now.separation > -INFINITY ? now.n : Vec{};
+  return now.separation > -INFINITY ? now.n : Vec3{};
 }
 
 }  // namespace

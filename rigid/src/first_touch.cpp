@@ -13,9 +13,9 @@ namespace {
 constexpr double small_radii = 1e-6;
 
 // A common point of overlapping grown bodies: on the segment between their cores' nearest points.
-Vec common_point(const MovingBody& a, const MovingBody& b) {
+Vec3 common_point(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
-  const Vec way = near.b - near.a;
+  const Vec3 way = near.b - near.a;
   const double length = norm(way);
   if (!(length > 0) || near.size == 4) return 0.5 * (near.a + near.b);
   const double from = std::max(0.0, length - b.rounding), to = std::min(length, a.rounding);
@@ -24,21 +24,21 @@ Vec common_point(const MovingBody& a, const MovingBody& b) {
 
 }  // namespace
 
-FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin) {
+FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec3& origin) {
   if (!impact.hit) return no_touch;
   FirstTouch out = no_touch;
   out.toi = impact.t;
   a.move_to(impact.t), b.move_to(impact.t);
   double top = -INFINITY, bottom = INFINITY;
-  for (const Vec& p : a.now) top = std::max(top, dot(impact.normal, p));
-  for (const Vec& p : b.now) bottom = std::min(bottom, dot(impact.normal, p));
+  for (const Vec3& p : a.now) top = std::max(top, dot(impact.normal, p));
+  for (const Vec3& p : b.now) bottom = std::min(bottom, dot(impact.normal, p));
   const double tolerance = contact_tolerance(a, b), rounding = a.rounding + b.rounding;
   const bool along = norm(impact.normal) > 0 && bottom - top - rounding >= -tolerance;
-  Vec point;
+  Vec3 point;
   if (!along || (rounding > 0 && rounding < small_radii * (a.radius() + b.radius()))) {
     point = common_point(a, b);  // the features that touch cannot be told
   } else {
-    contact_point(a.now, b.now, impact.normal.data(), tolerance, point.data());
+    point = contact_point(a.now, b.now, impact.normal, tolerance);
     if (rounding > 0) point = point + 0.5 * (a.rounding - b.rounding) * impact.normal;
   }
   for (int k = 0; k < 3; ++k) {
@@ -54,7 +54,7 @@ FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, doub
   // Positions relative to a's first vertex at the start, so that a far-away scene costs no digits
   // twice.
   const double* p = a.row(row);
-  const Vec origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
+  const Vec3 origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
   MovingBody x = moving_body(a, row, motion_a, origin), y = moving_body(b, row, motion_b, origin);
   x.rounding = rounding_a, y.rounding = rounding_b;
   return first_touch(first_contact(x, y, 0, 1), x, y, origin);

@@ -13,7 +13,7 @@ inline constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NA
 
 // Point and normal of an impact. The normal is undefined if the bodies overlap from the start. The
 // point comes from the features that touch along the normal, or from the nearest points.
-FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin);
+FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec3& origin);
 
 // Of row `row`, each body grown by a ball of the given radius.
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,

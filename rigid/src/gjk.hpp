@@ -12,19 +12,19 @@ namespace tauguard::rigid {
 // A corner of the simplex, and its weight in the nearest point.
 template <class Source>
 struct Corner {
-  Vec w;  // b - a
+  Vec3 w;  // b - a
   Source from;
   double weight;
 };
 
-// The weights of the point nearest to the origin in the affine hull of c[0..m); false where the
+// The weights of the point nearest to the origin in the affine hull of *c[0..m); false where the
 // corners are dependent or the point lies outside.
 template <class Source>
-bool weigh(const Corner<Source>* c, int m, double* l) {
+bool weigh(const Corner<Source>* const* c, int m, double* l) {
   l[0] = 1;
   if (m == 1) return true;
-  const Vec& w = c[0].w;
-  const Vec e[3] = {c[1].w - w, m > 2 ? c[2].w - w : Vec{}, m > 3 ? c[3].w - w : Vec{}};
+  const Vec3& w = c[0]->w;
+  const Vec3 e[3] = {c[1]->w - w, m > 2 ? c[2]->w - w : Vec3{}, m > 3 ? c[3]->w - w : Vec3{}};
   if (m == 2) {
     const double ee = dot(e[0], e[0]);
     if (!(ee > 0)) return false;
@@ -37,7 +37,7 @@ bool weigh(const Corner<Source>* c, int m, double* l) {
   } else {
     const double det = dot(e[0], cross(e[1], e[2]));
     if (!(std::fabs(det) > 1e-14 * norm(e[0]) * norm(e[1]) * norm(e[2]))) return false;
-    const Vec o = -1.0 * w;
+    const Vec3 o = -1.0 * w;
     l[1] = dot(o, cross(e[1], e[2])) / det;
     l[2] = dot(e[0], cross(o, e[2])) / det;
     l[3] = dot(e[0], cross(e[1], o)) / det;
@@ -53,9 +53,9 @@ class Simplex {
 
   int size() const { return m_; }
   const Corner<Source>& corner(int i) const { return c_[i]; }
-  const Vec& w(int i) const { return c_[i].w; }
-  const Vec& nearest() const { return nearest_; }
-  bool holds(const Vec& w) const {
+  const Vec3& w(int i) const { return c_[i].w; }
+  const Vec3& nearest() const { return nearest_; }
+  bool holds(const Vec3& w) const {
     return std::any_of(c_, c_ + m_, [&](const Corner<Source>& c) { return c.w == w; });
   }
   // Adds a corner and keeps the face nearest to the origin among those that have it. Where that is
@@ -65,14 +65,14 @@ class Simplex {
     double best = dot(nearest_, nearest_), weight[4] = {};
     int kept = 0;
     for (int mask = 1 << m_; mask < 2 << m_; ++mask) {
-      Corner<Source> face[4];
+      const Corner<Source>* face[4];
       double l[4];
       int size = 0;
       for (int i = 0; i <= m_; ++i)
-        if (mask >> i & 1) face[size++] = c_[i];
+        if (mask >> i & 1) face[size++] = &c_[i];
       if (!weigh(face, size, l)) continue;
-      Vec p = face[0].w;  // as an offset: a sum of weighted corners would cancel
-      for (int i = 1; i < size; ++i) p = p + l[i] * (face[i].w - face[0].w);
+      Vec3 p = face[0]->w;  // as an offset: a sum of weighted corners would cancel
+      for (int i = 1; i < size; ++i) p += l[i] * (face[i]->w - face[0]->w);
       if (dot(p, p) < best)
         best = dot(p, p), kept = mask, nearest_ = p, std::copy(l, l + size, weight);
     }
@@ -87,7 +87,7 @@ class Simplex {
  private:
   Corner<Source> c_[5];
   int m_;
-  Vec nearest_;
+  Vec3 nearest_;
 };
 
 // Descends from a first corner until the nearest point is found or rounding stops it. `support(v)`
@@ -99,7 +99,7 @@ Simplex<Source> descend(const Corner<Source>& first, const Support& support, Wat
                         double square_of_zero) {
   Simplex<Source> s(first);
   for (int iteration = 0; iteration < 100; ++iteration) {
-    const Vec v = s.nearest();
+    const Vec3 v = s.nearest();
     watch.visit(s);
     if (s.size() == 4 || !(dot(v, v) > square_of_zero)) break;
     const Corner<Source> next = support(v);

@@ -11,13 +11,13 @@ Bodies row_of(const Bodies& b, std::size_t row, std::int64_t* offsets) {
 }
 
 // Unit, across the unit u (and v): any such vector where x leaves no direction.
-Vec across(const Vec& x, const Vec& u) {
-  const Vec y = x - dot(x, u) * u;
+Vec3 across(const Vec3& x, const Vec3& u) {
+  const Vec3 y = x - dot(x, u) * u;
   if (norm(y) > 1e-6 * norm(x)) return (1 / norm(y)) * y;
   const int k = std::fabs(u[0]) < 0.6 ? 0 : 1;
-  Vec e{};
+  Vec3 e{};
   e[k] = 1;
-  const Vec z = e - u[k] * u;
+  const Vec3 z = e - u[k] * u;
   return (1 / norm(z)) * z;
 }
 
@@ -25,20 +25,20 @@ Vec across(const Vec& x, const Vec& u) {
 
 // The edges' directions for a box; else towards the farthest vertex, and the one farthest from that
 // line.
-std::array<Vec, 3> RoundedBody::axes() const {
+std::array<Vec3, 3> RoundedBody::axes() const {
   const bool block = bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds;
-  Vec far{}, wide{};
+  Vec3 far{}, wide{};
   for (std::size_t i = 1; i < points.size(); ++i) {
-    const Vec x = points[i] - points[0];
+    const Vec3 x = points[i] - points[0];
     if ((!block || i == 1 || i == 2 || i == 4) && dot(x, x) > dot(far, far)) far = x;
   }
-  const Vec u = dot(far, far) > 0 ? (1 / norm(far)) * far : Vec{1, 0, 0};
+  const Vec3 u = dot(far, far) > 0 ? (1 / norm(far)) * far : Vec3{1, 0, 0};
   double most = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
-    const Vec x = points[i] - points[0], y = x - dot(x, u) * u;
+    const Vec3 x = points[i] - points[0], y = x - dot(x, u) * u;
     if ((!block || i == 1 || i == 2 || i == 4) && dot(y, y) > most) most = dot(y, y), wide = x;
   }
-  const Vec v = across(wide, u);
+  const Vec3 v = across(wide, u);
   return {u, v, cross(u, v)};
 }
 
@@ -47,14 +47,14 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
       rounding(r),
       points(vertices_of<double>(batch, row)),
       extent{} {
-  const std::array<Vec, 3> axis = axes();
+  const std::array<Vec3, 3> axis = axes();
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) box.axis[i][k] = static_cast<float>(axis[i][k]);
-  Vec half{};
+  Vec3 half{};
   for (int i = 0; i < 3; ++i) {
-    const Vec n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
+    const Vec3 n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
     double low = INFINITY, high = -INFINITY;
-    for (const Vec& p : points) {
+    for (const Vec3& p : points) {
       const double x = dot(n, p - points[0]);
       low = std::min(low, x), high = std::max(high, x);
     }
@@ -62,12 +62,12 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
     half[i] = 0.5 * (high - low);
   }
   extent.centre = points[0] + extent.centre;
-  for (const Vec& p : points) {
+  for (const Vec3& p : points) {
     for (const double x : p) extent.magnitude = std::max(extent.magnitude, std::fabs(x) + rounding);
     extent.radius = std::max(extent.radius, norm(p - extent.centre) + rounding);
     // The axes are orthonormal to the rounding of a float, and the centre is where it is.
     for (int i = 0; i < 3; ++i) {
-      const Vec n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
+      const Vec3 n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
       half[i] = std::max(half[i], std::fabs(dot(n, p - extent.centre)));
     }
   }
@@ -127,15 +127,15 @@ constexpr std::int64_t triangle_offsets[2] = {0, 3};
 Bodies as_body(const Triangle& t) { return {Kind::hulls, t.v[0], triangle_offsets, 1}; }
 
 // Is the triangle certainly more than `margin` from the body along n, or along -n?
-bool beyond(const Triangle& t, const RoundedBody& body, const Vec& n, double margin) {
-  const Vec& from = body.points[0];
+bool beyond(const Triangle& t, const RoundedBody& body, const Vec3& n, double margin) {
+  const Vec3& from = body.points[0];
   double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY, size = 0;
   for (const auto& v : t.v) {
-    const Vec p = Vec{v[0], v[1], v[2]} - from;
+    const Vec3 p = Vec3{v[0], v[1], v[2]} - from;
     const double x = dot(n, p);
     a_lo = std::min(a_lo, x), a_hi = std::max(a_hi, x), size = std::max(size, norm(p));
   }
-  for (const Vec& q : body.points) {
+  for (const Vec3& q : body.points) {
     const double x = dot(n, q - from);
     b_lo = std::min(b_lo, x), b_hi = std::max(b_hi, x), size = std::max(size, norm(q - from));
   }
@@ -143,9 +143,9 @@ bool beyond(const Triangle& t, const RoundedBody& body, const Vec& n, double mar
   return separation > (margin + body.rounding) * norm(n) * (1 + 0x1p-46);
 }
 
-Vec normal_of(const Triangle& t) {
-  const Vec x = {t.v[0][0], t.v[0][1], t.v[0][2]}, y = {t.v[1][0], t.v[1][1], t.v[1][2]},
-            z = {t.v[2][0], t.v[2][1], t.v[2][2]};
+Vec3 normal_of(const Triangle& t) {
+  const Vec3 x = {t.v[0][0], t.v[0][1], t.v[0][2]}, y = {t.v[1][0], t.v[1][1], t.v[1][2]},
+             z = {t.v[2][0], t.v[2][1], t.v[2][2]};
   return cross(y - x, z - x);
 }
 
@@ -196,7 +196,7 @@ class MeshBodyImpact {
 
   Impact found() const { return {until_, face_ >= 0, normal_}; }
   std::int32_t leaf() const { return face_; }  // in leaf order, -1: none
-  const Vec& origin() const { return pieces_.origin(); }
+  const Vec3& origin() const { return pieces_.origin(); }
   MovingBody triangle(int i) const {
     return moving_triangle(mesh_.tree.triangles[i].v, pieces_.motion_a(), origin());
   }
@@ -257,7 +257,7 @@ class MeshBodyImpact {
   Pieces pieces_;
   double until_ = 1;
   std::int32_t face_ = -1;
-  Vec normal_{};
+  Vec3 normal_{};
 };
 
 }  // namespace

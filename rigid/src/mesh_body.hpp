@@ -22,7 +22,7 @@ class RoundedBody {
   FloatObb box;
 
  private:
-  std::array<Vec, 3> axes() const;
+  std::array<Vec3, 3> axes() const;
   std::int64_t offsets_[2];
 };
 

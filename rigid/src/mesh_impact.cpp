@@ -11,7 +11,7 @@ namespace {
 struct Found {
   double t = 1;
   std::int32_t a = -1, b = -1;  // triangles in leaf order
-  Vec normal{};
+  Vec3 normal{};
 };
 
 class MeshImpact {
@@ -28,7 +28,7 @@ class MeshImpact {
     return found_;
   }
 
-  const Vec& origin() const { return pieces_.origin(); }
+  const Vec3& origin() const { return pieces_.origin(); }
   MovingBody triangle_a(int i) const {
     return moving_triangle(a_.triangles[i].v, pieces_.motion_a(), origin());
   }
@@ -37,7 +37,7 @@ class MeshImpact {
   }
 
  private:
-  static Vec centre(const Tree& t) { return {t.centre[0], t.centre[1], t.centre[2]}; }
+  static Vec3 centre(const Tree& t) { return {t.centre[0], t.centre[1], t.centre[2]}; }
 
   struct Open {
     SlotPair slots;
@@ -81,17 +81,17 @@ class MeshImpact {
   void touch_triangles(Child ca, Child cb) {
     for (int j = leaf_first(cb); j < leaf_first(cb) + leaf_count(cb); ++j) {
       const Chord& in_a = pieces_.in_a();
-      Vec b0[3], b1[3];
+      Vec3 b0[3], b1[3];
       for (int c = 0; c < 3; ++c) {
         const double* v = b_.triangles[j].v[c];
-        const Vec y = Vec{v[0], v[1], v[2]} - centre(b_);
+        const Vec3 y = Vec3{v[0], v[1], v[2]} - centre(b_);
         b0[c] = in_a.start(y), b1[c] = in_a.end(y);
       }
       for (int i = leaf_first(ca); i < leaf_first(ca) + leaf_count(ca); ++i) {
-        Vec a[3];
+        Vec3 a[3];
         for (int c = 0; c < 3; ++c) {
           const double* v = a_.triangles[i].v[c];
-          a[c] = Vec{v[0], v[1], v[2]} - centre(a_);
+          a[c] = Vec3{v[0], v[1], v[2]} - centre(a_);
         }
         const double until = certainly_apart(a, b0, b1, in_a.sagitta + in_a.rounding);
         if (until <= 1)

@@ -11,7 +11,7 @@ namespace tauguard::rigid {
 
 // A ball in a body's own frame that holds it, rounded up, and its largest |coordinate|.
 struct Extent {
-  Vec centre;
+  Vec3 centre;
   double radius, magnitude;
 };
 
@@ -56,7 +56,7 @@ class Pieces {
   }
 
   // A point near both, from which positions are measured.
-  const Vec& origin() const { return origin_; }
+  const Vec3& origin() const { return origin_; }
   const RigidMotion& motion_a() const { return ma_; }
   const RigidMotion& motion_b() const { return mb_; }
 
@@ -106,7 +106,7 @@ class Pieces {
     const Place b[3] = {place_at(mb_, begin), place_at(mb_, begin + 0.5 * length),
                         place_at(mb_, begin + length)};
     const double reach = both + apart(begin) + speed_ * length;
-    const Vec from_a = mb_.x0 - ma_.x0 + begin * (mb_.linear - ma_.linear);
+    const Vec3 from_a = mb_.x0 - ma_.x0 + begin * (mb_.linear - ma_.linear);
     const double far = norm(from_a) + length * drift_;
     fill(in_a_, a, b, a_.centre, b_.centre, mb_.speed, ma_.speed, norm(b_.centre) + b_.radius, far,
          reach);
@@ -118,11 +118,11 @@ class Pieces {
   // x from its origin that itself turns at v about an origin that drifts is accelerated by at most
   // v^2 arm + 2 w (drift + v arm) + w^2 |x|; over a time h its path leaves its chord by an eighth
   // of that h^2.
-  void fill(Chord& chord, const Place* at, const Place* moved, const Vec& centre,
-            const Vec& moved_centre, double v, double w, double arm, double far, double reach) {
+  void fill(Chord& chord, const Place* at, const Place* moved, const Vec3& centre,
+            const Vec3& moved_centre, double v, double w, double arm, double far, double reach) {
     Place* out[3] = {&chord.start, &chord.middle, &chord.end};
     for (int k = 0; k < 3; ++k) {
-      Vec column[3];
+      Vec3 column[3];
       for (int j = 0; j < 3; ++j)
         column[j] = at[k].turn_back({moved[k].r[0][j], moved[k].r[1][j], moved[k].r[2][j]});
       for (int i = 0; i < 3; ++i) out[k]->r[i] = {column[0][i], column[1][i], column[2][i]};
@@ -137,7 +137,7 @@ class Pieces {
 
   const Extent a_, b_;
   const RigidMotion &ma_, &mb_;
-  const Vec origin_;
+  const Vec3 origin_;
   double drift_, speed_;           // of the origins and of any two points past each other, at most
   double coarse_, fine_, shift_;   // rounding: shares of a length, and a length
   double begin_ = 0, length_ = 1;  // the piece that is open

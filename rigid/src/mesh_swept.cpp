@@ -6,9 +6,9 @@ namespace tauguard::rigid {
 
 Place place_at(const RigidMotion& m, double t) {
   const double c = std::cos(m.speed * t), s = std::sin(m.speed * t);
-  Vec column[3];
+  Vec3 column[3];
   for (int k = 0; k < 3; ++k)
-    column[k] = Swing(m, Vec{m.r0[0][k], m.r0[1][k], m.r0[2][k]}).at(c, s);
+    column[k] = Swing(m, Vec3{m.r0[0][k], m.r0[1][k], m.r0[2][k]}).at(c, s);
   Place out;
   for (int i = 0; i < 3; ++i) out.r[i] = {column[0][i], column[1][i], column[2][i]};
   out.t = m.x0 + t * m.linear;
@@ -18,12 +18,12 @@ Place place_at(const RigidMotion& m, double t) {
 // The box turns about its centre by at most `turn` either way from the middle of the piece.
 MovingObb moving(const FloatObb& box, const Chord& chord) {
   MovingObb out;
-  const Vec c = {box.centre[0], box.centre[1], box.centre[2]};
-  const Vec from = chord.start(c), to = chord.end(c);
+  const Vec3 c = {box.centre[0], box.centre[1], box.centre[2]};
+  const Vec3 from = chord.start(c), to = chord.end(c);
   double square = 0;
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 3; ++i) {
-      const Vec axis = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
+      const Vec3 axis = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
       out.box.axis[i][k] = static_cast<float>(dot(chord.middle.r[k], axis));
     }
     out.box.centre[k] = static_cast<float>(from[k]);
@@ -92,7 +92,7 @@ namespace {
 
 // The share of the chord up to which the axis separates b's corners from a's: every corner's height
 // above a is linear in the share, so the lowest is reached first at one of the three roots.
-double separated_until(const Vec& n, const Vec* a, const Vec* b0, const Vec* b1, double pad) {
+double separated_until(const Vec3& n, const Vec3* a, const Vec3* b0, const Vec3* b1, double pad) {
   const double slack = pad * norm(n) * (1 + 0x1p-40);
   double lo = INFINITY, hi = -INFINITY, p[3], q[3], p_lo = INFINITY, p_hi = -INFINITY;
   for (int i = 0; i < 3; ++i) {
@@ -114,8 +114,8 @@ double separated_until(const Vec& n, const Vec* a, const Vec* b0, const Vec* b1,
 
 }  // namespace
 
-double certainly_apart(const Vec* a, const Vec* b0, const Vec* b1, double pad) {
-  Vec ea[3], eb[3];
+double certainly_apart(const Vec3* a, const Vec3* b0, const Vec3* b1, double pad) {
+  Vec3 ea[3], eb[3];
   for (int i = 0; i < 3; ++i) ea[i] = a[(i + 1) % 3] - a[i], eb[i] = b0[(i + 1) % 3] - b0[i];
   double until = std::max(separated_until(cross(ea[0], ea[1]), a, b0, b1, pad),
                           separated_until(cross(eb[0], eb[1]), a, b0, b1, pad));

@@ -10,9 +10,11 @@ namespace tauguard::rigid {
 
 // x -> r x + t
 struct Place {
-  Vec r[3], t;
-  Vec operator()(const Vec& x) const { return Vec{dot(r[0], x), dot(r[1], x), dot(r[2], x)} + t; }
-  Vec turn_back(const Vec& x) const { return x[0] * r[0] + (x[1] * r[1] + x[2] * r[2]); }
+  Vec3 r[3], t;
+  Vec3 operator()(const Vec3& x) const {
+    return Vec3{dot(r[0], x), dot(r[1], x), dot(r[2], x)} + t;
+  }
+  Vec3 turn_back(const Vec3& x) const { return x[0] * r[0] + (x[1] * r[1] + x[2] * r[2]); }
 };
 Place place_at(const RigidMotion& m, double t);
 
@@ -38,7 +40,7 @@ unsigned swept_mask(const ObbNode& node, const MovingObb& moving, float leave, f
 
 // The share of the chord up to which two triangles are certainly apart, inf for all of it. `b0`,
 // `b1`: the other triangle at the chord's ends, in the frame of `a`.
-double certainly_apart(const Vec* a, const Vec* b0, const Vec* b1, double pad);
+double certainly_apart(const Vec3* a, const Vec3* b0, const Vec3* b1, double pad);
 
 // The children of a node as oriented boxes, whatever the mesh bounds them by; `scratch` may hold
 // the answer.

@@ -12,42 +12,41 @@ constexpr double resolution = 1e-7;
 class ShapeDifferences {
  public:
   struct Source {
-    Vec a, b;
+    Vec3 a, b;
   };
 
   ShapeDifferences(const SupportShape& a, const SupportShape& b)
       : a_(a), b_(b), size_(a.reach() + b.reach()) {}
 
-  Vec at(const Source& s) const { return s.b - s.a; }
-  Source farthest(const Vec& n) const { return {a_.support(-1.0 * n), b_.support(n)}; }
+  Vec3 at(const Source& s) const { return s.b - s.a; }
+  Source farthest(const Vec3& n) const { return {a_.support(-1.0 * n), b_.support(n)}; }
 
-  bool span(std::array<Vec, 4>* y, std::array<Source, 4>* from, Vec* normal, bool*) const {
+  bool span(std::array<Vec3, 4>* y, std::array<Source, 4>* from, Vec3* normal, bool*) const {
     const double small = 1e-9 * size_;
-    const auto take = [&](int k, const Vec& d) { (*y)[k] = at((*from)[k] = farthest(-1.0 * d)); };
+    const auto take = [&](int k, const Vec3& d) { (*y)[k] = at((*from)[k] = farthest(-1.0 * d)); };
     const auto edge = [&](int k) { return (*y)[k] - (*y)[0]; };
     for (int axis = 0; axis < 3 && (axis == 0 || !(norm(edge(1)) > small)); ++axis) {
-      Vec d{};
+      Vec3 d{};
       d[axis] = 1;
       take(0, d), take(1, -1.0 * d);
     }
-    const auto add_off = [&](int k, const Vec& d, const auto& off) {
+    const auto add_off = [&](int k, const Vec3& d, const auto& off) {
       for (const double sign : {1.0, -1.0}) {
         take(k, sign * d);
         if (off(edge(k))) return true;
       }
       return false;
     };
-    const Vec e = edge(1);
-    Vec side{};
-    side[std::fabs(e[0]) < std::fabs(e[1]) ? (std::fabs(e[0]) < std::fabs(e[2]) ? 0 : 2)
-                                           : (std::fabs(e[1]) < std::fabs(e[2]) ? 1 : 2)] = 1;
-    const Vec u = cross(e, side), w = cross(e, u);
+    const Vec3 e = edge(1);
+    Vec3 side{};
+    side[geometry::smallest_axis(e)] = 1;
+    const Vec3 u = cross(e, side), w = cross(e, u);
     *normal = u;
-    const auto off_line = [&](const Vec& x) { return norm(cross(e, x)) > small * norm(e); };
+    const auto off_line = [&](const Vec3& x) { return norm(cross(e, x)) > small * norm(e); };
     if (!add_off(2, u, off_line) && !add_off(2, w, off_line)) return false;
-    const Vec n = cross(e, edge(2));
+    const Vec3 n = cross(e, edge(2));
     *normal = n;
-    return add_off(3, n, [&](const Vec& x) { return std::fabs(dot(n, x)) > small * norm(n); });
+    return add_off(3, n, [&](const Vec3& x) { return std::fabs(dot(n, x)) > small * norm(n); });
   }
 
   bool is_final(double excess, double square, const Source&) const {
@@ -57,7 +56,9 @@ class ShapeDifferences {
     return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
   }
   // The answer is to rounding.
-  bool unsure(double, const Vec&, double, const std::array<const Vec*, 3>&) const { return false; }
+  bool unsure(double, const Vec3&, double, const std::array<const Vec3*, 3>&) const {
+    return false;
+  }
 
  private:
   const SupportShape &a_, &b_;
@@ -78,10 +79,10 @@ struct Barycentric {
   }
 };
 
-Barycentric weights(const Polytope& polytope, const Polytope::Face& face, const Vec& x) {
-  const Vec &p = polytope.point(face.corner[0]), e = polytope.point(face.corner[1]) - p,
-            g = polytope.point(face.corner[2]) - p;
-  const Vec n = cross(e, g), o = x - p;
+Barycentric weights(const Polytope& polytope, const Polytope::Face& face, const Vec3& x) {
+  const Vec3 &p = polytope.point(face.corner[0]), e = polytope.point(face.corner[1]) - p,
+             g = polytope.point(face.corner[2]) - p;
+  const Vec3 n = cross(e, g), o = x - p;
   const double nn = dot(n, n), s = nn > 0 ? dot(cross(o, g), n) / nn : 0,
                t = nn > 0 ? dot(cross(e, o), n) / nn : 0;
   return {face.corner, {1 - s - t, s, t}, std::min({1 - s - t, s, t})};
@@ -92,10 +93,10 @@ Barycentric weights(const Polytope& polytope, const Polytope::Face& face, const 
 void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
   Polytope polytope(ShapeDifferences(a, b));
   const bool flat = polytope.solve(most_faces) == Polytope::Answer::flat;
-  const Vec& normal = polytope.nearest.normal;
+  const Vec3& normal = polytope.nearest.normal;
   const double length = norm(normal);
   if (flat) {
-    d->n = length > 0 ? (1 / length) * normal : Vec{0, 0, 1};
+    d->n = length > 0 ? (1 / length) * normal : Vec3{0, 0, 1};
     if (dot(d->n, b.middle() - a.middle()) < 0) d->n = -1.0 * d->n;
     d->lower = 0;
     return;
@@ -103,7 +104,7 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
   // b - a moved against the outward normal by the face's distance no longer holds the origin.
   d->n = (-1 / length) * normal;
   d->lower = -std::max(0.0, polytope.nearest.offset / length);
-  const Vec foot = d->lower * d->n;
+  const Vec3 foot = d->lower * d->n;
   Barycentric best = weights(polytope, polytope.nearest, foot);
   // Triangles of one plane are equally near: the one that contains the foot gives the points.
   for (const auto& face : polytope.faces()) {
@@ -113,7 +114,7 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
     if (other.least > best.least) best = other;
   }
   best.clamp();
-  Vec on_a{}, on_b{};
+  Vec3 on_a{}, on_b{};
   for (int k = 0; k < 3; ++k) {
     const auto& source = polytope.source(best.corner[k]);
     on_a = on_a + best.weight[k] * source.a, on_b = on_b + best.weight[k] * source.b;

@@ -22,7 +22,7 @@ constexpr double certain = 0x1p-46, near = 1e-10;
 constexpr double least_size = 1e-40, most_size = 1e40;
 
 // Vertices relative to `origin`; a difference of two doubles is off by one rounding of itself.
-Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec& origin) {
+Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec3& origin) {
   const double* p = bodies.row(row);
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
     const Zonotope z = zonotope_of(bodies.kind, p);
@@ -49,26 +49,25 @@ double size_of(const Points<double>& a, const Points<double>& b) {
   return size;
 }
 
-double top(const Points<double>& points, const Vec& n) {
+double top(const Points<double>& points, const Vec3& n) {
   double m = -INFINITY;
   for (const auto& p : points) m = std::max(m, dot(n, p));
   return m;
 }
-double bottom(const Points<double>& points, const Vec& n) { return -top(points, -1.0 * n); }
+double bottom(const Points<double>& points, const Vec3& n) { return -top(points, -1.0 * n); }
 
-SignedDistance apart(const Vec& point_a, const Vec& point_b) {
-  const Vec between = point_b - point_a;
+SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
+  const Vec3 between = point_b - point_a;
   const double distance = norm(between);
   return {distance, point_a, point_b, (1 / distance) * between};
 }
 
 // Where overlapping bodies touch after they were separated by `depth` along n.
-SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec& n,
+SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
                         double depth, double size) {
   Points<double> moved = b;
   for (auto& p : moved) p = p + depth * n;
-  Vec point;
-  contact_point(a, moved, n.data(), 1e-11 * size, point.data());
+  const Vec3 point = contact_point(a, moved, n, 1e-11 * size);
   return {-depth, point, point - depth * n, n};
 }
 
@@ -77,14 +76,14 @@ SignedDistance together(const Points<double>& a, const Points<double>& b, const 
 // differences.
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
                    double size, SignedDistance* out) {
-  Vec w[3], at_a{}, at_b{};
+  Vec3 w[3], at_a{}, at_b{};
   double all = 0;
   for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
-  const Vec c = cross(w[1] - w[0], w[2] - w[0]);
+  const Vec3 c = cross(w[1] - w[0], w[2] - w[0]);
   const double length = norm(c);
-  const Vec n = ((dot(c, w[0]) < 0 ? -1 : 1) / length) * c, foot = dot(n, w[0]) * n;
+  const Vec3 n = ((dot(c, w[0]) < 0 ? -1 : 1) / length) * c, foot = dot(n, w[0]) * n;
   for (int i = 0; i < 3; ++i) {
-    const Vec part = cross(w[(i + 1) % 3] - foot, w[(i + 2) % 3] - foot);
+    const Vec3 part = cross(w[(i + 1) % 3] - foot, w[(i + 2) % 3] - foot);
     const double weight = dot(part, c) / (length * length);
     if (!(weight >= 0)) return false;
     all += weight;
@@ -110,7 +109,7 @@ bool certified_apart(const Points<double>& a, const Points<double>& b, double si
 }
 
 bool certified_depth(const Points<double>& a, const Points<double>& b, const Bodies& bodies_a,
-                     const Bodies& bodies_b, std::size_t row, double size, double* way, Vec* n) {
+                     const Bodies& bodies_b, std::size_t row, double size, double* way, Vec3* n) {
   BodyEdges ea, eb;
   if (edges_of(bodies_a, row, &ea) && edges_of(bodies_b, row, &eb)) {
     FacetDepth facets(a, b, size);
@@ -130,13 +129,13 @@ bool certified_depth(const Points<double>& a, const Points<double>& b, const Bod
 }
 
 // The largest binary exponent among the components; 0 for a zero vector.
-std::int64_t exponent(const Vector<Dyadic>& x) {
+std::int64_t exponent(const Vector3<Dyadic>& x) {
   std::int64_t e = std::numeric_limits<std::int64_t>::min();
   for (const Dyadic& c : x)
     if (!c.is_zero()) e = std::max(e, c.floor_log2());
   return e;
 }
-Vec scaled(const Vector<Dyadic>& x, std::int64_t e) {
+Vec3 scaled(const Vector3<Dyadic>& x, std::int64_t e) {
   return {x[0].scaled(-e).to_double(), x[1].scaled(-e).to_double(), x[2].scaled(-e).to_double()};
 }
 double power(double x, std::int64_t e) {
@@ -151,17 +150,17 @@ struct ExactDistance {
 ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
                           const Dyadic& radii) {
   const std::int64_t e = exponent(nearest.numerator), d = nearest.denominator.floor_log2();
-  const Vec v = scaled(nearest.numerator, e);
+  const Vec3 v = scaled(nearest.numerator, e);
   const double length = norm(v), denominator = nearest.denominator.scaled(-d).to_double();
-  Vec point{};
+  Vec3 point{};
   for (std::size_t k = 0; k < nearest.pairs.size(); ++k)
     point =
         point + (nearest.weights[k].scaled(-d).to_double() / denominator) * a[nearest.pairs[k][0]];
-  const Vec n = (1 / length) * v;
+  const Vec3 n = (1 / length) * v;
   const double distance = power(length / denominator, e - d);
   const Dyadic reach = radii * nearest.denominator;
   return {{distance, point, point + distance * n, n},
-          (inner(nearest.numerator, nearest.numerator) - reach * reach).sign()};
+          (dot(nearest.numerator, nearest.numerator) - reach * reach).sign()};
 }
 
 ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
@@ -170,15 +169,15 @@ ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
   using Polytope = ExpandingPolytope<Dyadic, PointDifferences<Dyadic>>;
   Polytope polytope(PointDifferences<Dyadic>(x, y));
   const auto answer = polytope.solve(1 << 30);
-  Vector<Dyadic> facet = polytope.nearest.normal;
+  Vector3<Dyadic> facet = polytope.nearest.normal;
   const int sign = radii.is_zero() ? 0 : -1;
   if (is_zero(facet)) facet = {Dyadic(), Dyadic(), Dyadic(1.0)};
   const std::int64_t e = exponent(facet);
-  const Vec normal = scaled(facet, e);
+  const Vec3 normal = scaled(facet, e);
   const double length = norm(normal);
-  const Vec n = (-1 / length) * normal;
+  const Vec3 n = (-1 / length) * normal;
   if (answer == Polytope::Answer::flat) {
-    const Vec point = middle_point(a, b);
+    const Vec3 point = middle_point(a, b);
     return {{0.0, point, point, n}, sign};
   }
   if (polytope.nearest.offset.is_zero()) return {together(a, b, n, 0.0, size), sign};
@@ -212,7 +211,7 @@ SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sig
 SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                                double radius_a, double radius_b) {
   const double* p = bodies_a.row(row);
-  const Vec origin = {p[0], p[1], p[2]};
+  const Vec3 origin = {p[0], p[1], p[2]};
   const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
   const double size = size_of(a, b), radii = radius_a + radius_b;
   SignedDistance g;
@@ -222,7 +221,7 @@ SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, s
   if (size > least_size && size < most_size) {
     quick = certified_apart(a, b, size, &g);
     double way;
-    Vec n;
+    Vec3 n;
     if (!quick && certified_depth(a, b, bodies_a, bodies_b, row, size, &way, &n))
       quick = true, g = together(a, b, n, way, size);
   }
@@ -240,27 +239,27 @@ SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, s
 bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
           double radius_b) {
   const double* p = bodies_a.row(row);
-  const Vec origin = {p[0], p[1], p[2]};
+  const Vec3 origin = {p[0], p[1], p[2]};
   const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
   const double size = size_of(a, b), radii = radius_a + radius_b;
   if (size > least_size && size < most_size) {
     const Nearest ends = nearest(a, b);
-    const Vec way = ends.b - ends.a;
+    const Vec3 way = ends.b - ends.a;
     const double slack = near * (size + radii), length = norm(way);
     if (length < radii - slack) return true;
     if (length > radii + slack) {
-      const Vec n = (1 / length) * way;
+      const Vec3 n = (1 / length) * way;
       if (bottom(b, n) - top(a, n) > radii + slack) return false;
     }
     double depth;
-    Vec n;
+    Vec3 n;
     if (!(length > slack) && certified_depth(a, b, bodies_a, bodies_b, row, size, &depth, &n))
       return true;
   }
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
   const ExactNearest<Dyadic> exact(x, y);
   const Dyadic reach = (Dyadic(radius_a) + Dyadic(radius_b)) * exact.denominator;
-  return (inner(exact.numerator, exact.numerator) - reach * reach).sign() <= 0;
+  return (dot(exact.numerator, exact.numerator) - reach * reach).sign() <= 0;
 }
 
 }  // namespace tauguard::rigid

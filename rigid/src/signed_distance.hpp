@@ -10,7 +10,7 @@ namespace tauguard::rigid {
 // that separates them, along the normal (unit, from a to b).
 struct SignedDistance {
   double distance;
-  Vec point_a, point_b, normal;
+  Vec3 point_a, point_b, normal;
 };
 
 // Of row `row`, each body grown by a ball of the given radius. The sign is exact for the given

@@ -14,7 +14,7 @@ constexpr int most_steps = 500;
 
 double longest_step(const SupportShape& a, const SupportShape& b, const Distance& d, double offset,
                     double limit) {
-  const Vec rates[3] = {cross(a.angular(), d.n), cross(b.angular(), d.n), Vec{}};
+  const Vec3 rates[3] = {cross(a.angular(), d.n), cross(b.angular(), d.n), Vec3{}};
   double best = 0;
   for (int i = 0; i < (a.half_space() ? 1 : 3); ++i) {
     const double turn = norm(rates[i]);
@@ -30,7 +30,7 @@ double longest_step(const SupportShape& a, const SupportShape& b, const Distance
 
 }  // namespace
 
-Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec& n,
+Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec3& n,
                double t) {
   const double radii = a.radius() + b.radius();
   const double size = a.reach() + b.reach() + radii;
@@ -57,7 +57,7 @@ Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double s
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
   const double close = offset + 2 * margin + touching * (a.reach() + b.reach() + radii);
   double t, seen = -1;  // `d` is of time `seen`
-  Vec n{};
+  Vec3 n{};
   Distance d;
   // For curved cores the lower bound may be smaller than the true distance. Close to contact such a
   // pair gets no certified step although it does not touch yet. It is then reported as a contact,

@@ -4,7 +4,7 @@
 
 namespace tauguard::rigid {
 
-Vec Shape::support(const Vec& d) const {
+Vec3 Shape::support(const Vec3& d) const {
   switch (core) {
     case Core::half_space:
     case Core::point:
@@ -15,7 +15,7 @@ Vec Shape::support(const Vec& d) const {
       return {d[0] >= 0 ? size[0] : -size[0], d[1] >= 0 ? size[1] : -size[1],
               d[2] >= 0 ? size[2] : -size[2]};
     case Core::ellipsoid: {
-      const Vec e = {size[0] * d[0], size[1] * d[1], size[2] * d[2]};
+      const Vec3 e = {size[0] * d[0], size[1] * d[1], size[2] * d[2]};
       const double length = norm(e);
       if (!(length > 0)) return {size[0], 0, 0};
       return {size[0] * e[0] / length, size[1] * e[1] / length, size[2] * e[2] / length};
@@ -47,14 +47,15 @@ double Shape::extent() const {
     case Core::segment:
       return size[1];
     case Core::box:
-      return norm(Vec{size[0], size[1], size[2]});
+      return norm(Vec3{size[0], size[1], size[2]});
     case Core::ellipsoid:
       return std::max({size[0], size[1], size[2]});
     case Core::disc_prism:
       return std::hypot(size[0], size[1]);
     case Core::hull: {
       double most = 0;
-      for (std::size_t i = 0; i < x.size(); ++i) most = std::max(most, norm(Vec{x[i], y[i], z[i]}));
+      for (std::size_t i = 0; i < x.size(); ++i)
+        most = std::max(most, norm(Vec3{x[i], y[i], z[i]}));
       return most;
     }
   }
@@ -65,10 +66,10 @@ namespace {
 
 // Adds whole turns to a rotation vector so that it comes nearest to another one.
 void add_turns(const double* turn, double* angular) {
-  const Vec to = {turn[0], turn[1], turn[2]}, from = {angular[0], angular[1], angular[2]};
+  const Vec3 to = {turn[0], turn[1], turn[2]}, from = {angular[0], angular[1], angular[2]};
   const double angle = norm(from), far = norm(to);
   if (!(far > 0)) return;
-  const Vec axis = angle > 1e-9 ? (1 / angle) * from : (1 / far) * to;
+  const Vec3 axis = angle > 1e-9 ? (1 / angle) * from : (1 / far) * to;
   const double whole = 2 * M_PI * std::round((dot(to, axis) - angle) / (2 * M_PI));
   for (int i = 0; i < 3; ++i) angular[i] += whole * axis[i];
 }
@@ -107,7 +108,7 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
       q[0] = (r[l][j] - r[j][l]) / s;
       q[1 + k] = s / 4, q[1 + j] = (r[j][k] + r[k][j]) / s, q[1 + l] = (r[l][k] + r[k][l]) / s;
     }
-    const Vec axis = {q[1], q[2], q[3]};
+    const Vec3 axis = {q[1], q[2], q[3]};
     const double sine = norm(axis), sign = q[0] < 0 ? -1 : 1;
     if (sine > 0) {
       const double scale = sign * 2 * std::atan2(sine, std::fabs(q[0])) / sine;
@@ -119,7 +120,7 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
 }
 
 SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const RigidMotion& motion,
-                           const Vec& origin)
+                           const Vec3& origin)
     : shape_(&shape),
       in_body_(in_body),
       motion_(&motion),
@@ -131,7 +132,7 @@ SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const 
 }
 
 SupportShape::SupportShape(const double* const* x_t0, const double* const* x_t1, int count,
-                           double radius, const Vec& origin)
+                           double radius, const Vec3& origin)
     : count_(count), radius_(radius) {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -153,10 +154,10 @@ void SupportShape::move_to(double t) {
   if (motion_->speed != 0) {
     const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle),
                  half = std::sin(0.5 * angle);
-    const Vec& u = motion_->axis;
+    const Vec3& u = motion_->axis;
     for (int j = 0; j < 3; ++j) {  // column by column: the rotated axes
-      const Vec w = {motion_->r0[0][j], motion_->r0[1][j], motion_->r0[2][j]};
-      const Vec turned = c * w + s * cross(u, w) + (2 * half * half * dot(u, w)) * u;
+      const Vec3 w = {motion_->r0[0][j], motion_->r0[1][j], motion_->r0[2][j]};
+      const Vec3 turned = c * w + s * cross(u, w) + (2 * half * half * dot(u, w)) * u;
       for (int i = 0; i < 3; ++i) body.row[i][j] = turned[i];
     }
   }
@@ -167,7 +168,7 @@ void SupportShape::move_to(double t) {
                          body.row[i][2] * in_body_.row[2][j];
 }
 
-Vec SupportShape::support(const Vec& d) const {
+Vec3 SupportShape::support(const Vec3& d) const {
   if (turning_) return frame_.out(shape_->support(frame_.back(d)));
   int best = 0;
   double most = dot(d, now_[0]);
@@ -178,41 +179,41 @@ Vec SupportShape::support(const Vec& d) const {
   return now_[best];
 }
 
-double SupportShape::tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift,
-                             double* slope) const {
+double SupportShape::tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c,
+                             const Vec3& drift, double* slope) const {
   if (turning_) {
     // x = centre + y and x' = linear + w x y, and n.(w x y) = y.(n x w).
-    const Vec rate = r + cross(n, angular()), m = n + h * rate;
-    const Vec y = support(m) - centre_, from = centre_ - c;
+    const Vec3 rate = r + cross(n, angular()), m = n + h * rate;
+    const Vec3 y = support(m) - centre_, from = centre_ - c;
     const double straight = dot(r, from) + dot(n, motion_->linear - drift);
     *slope = straight + dot(rate, y);
     return dot(n, from) + h * straight + dot(m, y);
   }
   double most = -INFINITY;
   for (int i = 0; i < count_; ++i) {
-    const Vec x = now_[i] - c;
+    const Vec3 x = now_[i] - c;
     const double v = dot(r, x) + dot(n, velocity_[i] - drift), p = dot(n, x) + h * v;
     if (p > most) most = p, *slope = v;
   }
   return most;
 }
 
-double SupportShape::speed_about(const Vec& drift) const {
+double SupportShape::speed_about(const Vec3& drift) const {
   if (turning_) return norm(motion_->linear - drift) + motion_->speed * reach_;
   double most = 0;
   for (int i = 0; i < count_; ++i) most = std::max(most, norm(velocity_[i] - drift));
   return most;
 }
 
-double SupportShape::acceleration(const Vec& n, double drift) const {
+double SupportShape::acceleration(const Vec3& n, double drift) const {
   if (!turning_ || motion_->speed == 0) return 0;
-  const Vec across = n - dot(n, motion_->axis) * motion_->axis;
+  const Vec3 across = n - dot(n, motion_->axis) * motion_->axis;
   return motion_->speed * motion_->speed * reach_ * (norm(across) + drift + 0x1p-40);
 }
 
-Vec SupportShape::middle() const {
+Vec3 SupportShape::middle() const {
   if (turning_) return frame_.at;
-  Vec sum{};
+  Vec3 sum{};
   for (int i = 0; i < count_; ++i) sum = sum + now_[i];
   return (1.0 / count_) * sum;
 }

@@ -169,11 +169,11 @@ double balls(const Way& w, double r) {
 
 // Whether the cores share a point at a sampled time before `t`.
 bool touch_before(Geoms& geoms, double t) {
-  SupportShape a = geoms.mover(0, Vec{}), b = geoms.mover(1, Vec{});
+  SupportShape a = geoms.mover(0, Vec3{}), b = geoms.mover(1, Vec3{});
   const double radii = a.radius() + b.radius();
   for (int k = 0; k < (t > 0 ? 24 : 0); ++k) {
     a.move_to(t * k / 24), b.move_to(t * k / 24);
-    const Distance d = distance_of(a, b, Vec{}, INFINITY);
+    const Distance d = distance_of(a, b, Vec3{}, INFINITY);
     if (d.upper < radii - 1e-6 || (d.overlap && d.upper <= 0 && d.lower < -1e-6)) return true;
   }
   return false;

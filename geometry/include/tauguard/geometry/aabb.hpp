@@ -1,5 +1,4 @@
-// Axis-aligned bounding box. Bounds are exact minima and maxima of doubles: no rounding, no
-// padding.
+// Axis-aligned bounding box: minima and maxima of doubles, so that nothing is rounded.
 #pragma once
 
 #include <algorithm>
@@ -26,6 +25,10 @@ struct Aabb {
       lo[k] = std::min(lo[k], o.lo[k]);
       hi[k] = std::max(hi[k], o.hi[k]);
     }
+  }
+
+  void widen(double by) {
+    for (int k = 0; k < 3; ++k) lo[k] -= by, hi[k] += by;
   }
 
   // Touching counts.

@@ -6,8 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-// A function of a kernel must be inlined into the one that carries the target attribute.
-#define TAUGUARD_INLINE inline __attribute__((always_inline))
+#include "tauguard/geometry/vec3.hpp"
 
 #if defined(__x86_64__)
 #define TAUGUARD_AVX2 __attribute__((target("avx2")))
@@ -82,23 +81,7 @@ TAUGUARD_INLINE unsigned count_of(unsigned x) {
   return (((x + (x >> 4)) & 0x0f0f) * 0x0101) >> 8 & 0x1f;
 }
 
-// 3-vectors side by side.
-template <class Lanes>
-struct Vec3s {
-  Lanes x, y, z;
-  friend TAUGUARD_INLINE Vec3s operator+(Vec3s a, Vec3s b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-  }
-  friend TAUGUARD_INLINE Vec3s operator-(Vec3s a, Vec3s b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-  }
-  friend TAUGUARD_INLINE Vec3s operator*(Lanes s, Vec3s a) { return {s * a.x, s * a.y, s * a.z}; }
-  friend TAUGUARD_INLINE Lanes dot(Vec3s a, Vec3s b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  friend TAUGUARD_INLINE Vec3s cross(Vec3s a, Vec3s b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  }
-  friend TAUGUARD_INLINE Lanes largest(Vec3s a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); }
-};
-using Vec3x4 = Vec3s<Double4>;
+using Vec3x4 = Vector3<Double4>;
+TAUGUARD_INLINE Double4 largest(const Vec3x4& a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); }
 
 }  // namespace tauguard::geometry

@@ -1,16 +1,18 @@
 // Batches of convex bodies as the kernels read them, and their exact vertices.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "tauguard/geometry/dyadic.hpp"
+#include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::rigid {
 
 using geometry::Dyadic;
+using geometry::Vec3;
+using geometry::Vector3;
 
 enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3, polygons = 4 };
 
@@ -43,7 +45,7 @@ struct Bodies {
 };
 
 template <class Number>
-using Points = std::vector<std::array<Number, 3>>;
+using Points = std::vector<Vector3<Number>>;
 
 // The vertices of the body in `Number` arithmetic: exact with Dyadic, rounded with double.
 template <class Number>

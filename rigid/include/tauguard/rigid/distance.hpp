@@ -7,36 +7,37 @@
 namespace tauguard::rigid {
 
 // Points whose convex hull is meant.
-using PointList = std::vector<Vec>;
+using PointList = std::vector<Vec3>;
 
 // The nearest points of two hulls, or a common point if they meet, and the features on which these
 // lie: rows of a and of b. Four pairs mean that the hulls meet.
 struct Nearest {
-  Vec a, b;
+  Vec3 a, b;
   int size;
   std::array<std::array<std::size_t, 2>, 4> corner;
 };
 Nearest nearest(const PointList& a, const PointList& b);
 
 // A point of both hulls where they meet, otherwise the middle of their nearest points.
-Vec middle_point(const PointList& a, const PointList& b);
+Vec3 middle_point(const PointList& a, const PointList& b);
 
 // The unit direction from a to b along which the hulls are furthest apart; false where they meet.
-bool separating_direction(const PointList& a, const PointList& b, Vec* n, double* separation);
+bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation);
 
 struct Distance {
   double lower = -INFINITY;  // certified: the cores are this far apart along n (negative: they may
                              // overlap)
   double upper = INFINITY;   // the length of a segment between both cores
-  Vec n{};                   // unit, from a to b
-  Vec on_a{}, on_b{};        // the ends of that segment
+  Vec3 n{};                  // unit, from a to b
+  Vec3 on_a{}, on_b{};       // the ends of that segment
   bool overlap = false;      // the cores share a point, to rounding
 };
 
 // Distance of the cores at the present time of both shapes. `guess` is the first direction. The
 // search ends early if `lower` exceeds `needed` and is within a tenth of the true distance above
 // it.
-Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& guess, double needed);
+Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
+                     double needed);
 
 // Replaces the fields of an overlapping `d`: `lower` is minus the penetration depth of the cores,
 // `n` the direction in which b leaves a by the shortest path, and both points are the middle of the

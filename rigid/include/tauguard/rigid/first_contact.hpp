@@ -6,9 +6,9 @@
 namespace tauguard::rigid {
 
 struct Impact {
-  double t;    // the bodies are certainly apart on [start, t)
-  bool hit;    // false: apart on all of [start, end]
-  Vec normal;  // unit, from a to b; zero if the bodies meet at `start` and no axis is known
+  double t;     // the bodies are certainly apart on [start, t)
+  bool hit;     // false: apart on all of [start, end]
+  Vec3 normal;  // unit, from a to b; zero if the bodies meet at `start` and no axis is known
 };
 
 // Advances from `start` while the distance of the bodies exceeds rounding errors. It stops at the
@@ -23,9 +23,9 @@ inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {
 // Where and when two support shapes touch.
 struct Touch {
   bool hit = false;
-  double t = INFINITY;    // the shapes are further apart than the threshold on [start, t)
-  double distance = NAN;  // signed, between both surfaces at t: negative is penetration
-  Vec point{}, normal{};  // relative to the shapes' origin; the normal from a to b
+  double t = INFINITY;     // the shapes are further apart than the threshold on [start, t)
+  double distance = NAN;   // signed, between both surfaces at t: negative is penetration
+  Vec3 point{}, normal{};  // relative to the shapes' origin; the normal from a to b
 };
 
 // Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Shapes
@@ -36,7 +36,7 @@ Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double s
 
 // The contact at the present time t of both shapes; `n` is the last direction in which they were
 // apart, or zero.
-Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec& n,
+Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec3& n,
                double t);
 
 }  // namespace tauguard::rigid

@@ -12,20 +12,9 @@
 
 namespace tauguard::rigid {
 
-using Vec = std::array<double, 3>;
-
-inline double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec cross(const Vec& a, const Vec& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-inline Vec operator-(const Vec& a, const Vec& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Vec operator*(double s, const Vec& a) { return {s * a[0], s * a[1], s * a[2]}; }
-inline double norm(const Vec& a) { return std::sqrt(dot(a, a)); }
-
 struct RigidMotion {
-  Vec r0[3];  // rows of the rotation at t = 0
-  Vec x0, linear, axis;
+  Vec3 r0[3];  // rows of the rotation at t = 0
+  Vec3 x0, linear, axis;
   double speed;  // rad over the step
 
   // pose: 16 doubles, homogeneous, by rows.
@@ -36,35 +25,35 @@ struct RigidMotion {
       linear[i] = lin[i];
       axis[i] = angular[i];
     }
-    const double largest = std::max({std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])});
-    speed = largest == 0 ? 0 : largest * norm((1 / largest) * axis);
-    axis = speed == 0 ? Vec{} : (1 / speed) * axis;
+    const double most = largest(axis);
+    speed = most == 0 ? 0 : most * norm((1 / most) * axis);
+    axis = speed == 0 ? Vec3{} : (1 / speed) * axis;
   }
-  Vec turn(const Vec& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
+  Vec3 turn(const Vec3& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
 };
 
 // A vector that turns with a body.
 struct Swing {
-  Vec along, swing, side;
-  Swing(const RigidMotion& m, const Vec& w)
+  Vec3 along, swing, side;
+  Swing(const RigidMotion& m, const Vec3& w)
       : along(dot(m.axis, w) * m.axis), swing(w - along), side(cross(m.axis, w)) {}
-  Vec at(double c, double s) const { return along + (c * swing + s * side); }
+  Vec3 at(double c, double s) const { return along + (c * swing + s * side); }
 };
 
 class MovingBody {
  public:
   // `origin` is subtracted from every position: the caller picks one near both bodies.
-  MovingBody(const RigidMotion& motion, const Vec& origin)
+  MovingBody(const RigidMotion& motion, const Vec3& origin)
       : motion_(motion), shift_(motion.x0 - origin) {}
 
-  void add_vertex(const Vec& y) {
-    const Vec w = motion_.turn(y);
+  void add_vertex(const Vec3& y) {
+    const Vec3 w = motion_.turn(y);
     vertices_.emplace_back(motion_, w);
     radius_ = std::max(radius_, norm(w));
     sweep_ = std::max(sweep_, norm(vertices_.back().swing));
   }
-  void add_normal(const Vec& n) { add_direction(normals_, n); }
-  void add_edge(const Vec& e) { add_direction(edges_, e); }
+  void add_normal(const Vec3& n) { add_direction(normals_, n); }
+  void add_edge(const Vec3& e) { add_direction(edges_, e); }
 
   // Sets `now`, `velocity`, `centre()`, `normal` and `edge` for time t.
   void move_to(double t) {
@@ -83,13 +72,13 @@ class MovingBody {
 
   // Bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit
   // one.
-  double acceleration(const Vec& n, double drift) const {
-    const Vec across = n - dot(n, motion_.axis) * motion_.axis;
+  double acceleration(const Vec3& n, double drift) const {
+    const Vec3 across = n - dot(n, motion_.axis) * motion_.axis;
     return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) *
            (1 + 0x1p-40);
   }
   // Least and largest projection on the unit n, from the centre, over a full turn of the body.
-  std::array<double, 2> spun(const Vec& n) const {
+  std::array<double, 2> spun(const Vec3& n) const {
     const double across = norm(n - dot(n, motion_.axis) * motion_.axis) + 0x1p-40;
     double low = INFINITY, high = -INFINITY;
     for (const Swing& v : vertices_) {
@@ -101,41 +90,41 @@ class MovingBody {
   // Bound on the speed of any vertex about the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
   // Bound on the speed of any vertex relative to a point that moves by `drift`.
-  double speed_about(const Vec& drift) const {
+  double speed_about(const Vec3& drift) const {
     return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
   }
-  Vec angular() const { return motion_.speed * motion_.axis; }
-  const Vec& axis() const { return motion_.axis; }  // unit, zero where nothing turns
+  Vec3 angular() const { return motion_.speed * motion_.axis; }
+  const Vec3& axis() const { return motion_.axis; }  // unit, zero where nothing turns
   double angular_speed() const { return motion_.speed; }
   // Largest magnitude that enters a position. The angle is part of it, because its rounding rotates
   // the body.
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }
-  const Vec& centre() const { return centre_; }  // of the rotation
+  const Vec3& centre() const { return centre_; }  // of the rotation
   double radius() const { return radius_; }
-  const Vec& linear() const { return motion_.linear; }
+  const Vec3& linear() const { return motion_.linear; }
 
-  std::vector<Vec> now, velocity, normal, edge;
+  std::vector<Vec3> now, velocity, normal, edge;
   double rounding = 0;   // the body is the hull of its vertices grown by a ball of this radius
   bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
 
  private:
-  void add_direction(std::vector<Swing>& list, const Vec& d) {
-    const Vec w = motion_.turn(d);
+  void add_direction(std::vector<Swing>& list, const Vec3& d) {
+    const Vec3 w = motion_.turn(d);
     const double length = norm(w);
     if (length > 0) list.emplace_back(motion_, (1 / length) * w);
   }
 
   const RigidMotion& motion_;
-  Vec shift_, centre_{};
+  Vec3 shift_, centre_{};
   std::vector<Swing> vertices_, normals_, edges_;
   double radius_ = 0, sweep_ = 0;
 };
 
 // Row `r` of a batch, placed by `motion`.
 MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion,
-                       const Vec& origin);
-MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec& origin);
+                       const Vec3& origin);
+MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec3& origin);
 
 }  // namespace tauguard::rigid

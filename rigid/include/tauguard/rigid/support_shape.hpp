@@ -19,20 +19,22 @@ struct Shape {
   Core core;
   double size[3];
   double radius;
-  std::vector<double> x, y, z;      // the vertices of a hull, by coordinate
-  std::vector<Vec> normals, edges;  // of a polytope, where they are few
+  std::vector<double> x, y, z;       // the vertices of a hull, by coordinate
+  std::vector<Vec3> normals, edges;  // of a polytope, where they are few
 
-  Vec support(const Vec& d) const;  // a point of the core that is furthest along d
-  double extent() const;            // no point of the core is further from the frame's origin
+  Vec3 support(const Vec3& d) const;  // a point of the core that is furthest along d
+  double extent() const;              // no point of the core is further from the frame's origin
   bool polytope() const { return core == Core::box || core == Core::hull; }
 };
 
 struct LocalFrame {
-  Vec row[3];  // of the rotation
-  Vec at;
-  Vec out(const Vec& y) const { return Vec{dot(row[0], y), dot(row[1], y), dot(row[2], y)} + at; }
-  Vec turn(const Vec& y) const { return {dot(row[0], y), dot(row[1], y), dot(row[2], y)}; }
-  Vec back(const Vec& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
+  Vec3 row[3];  // of the rotation
+  Vec3 at;
+  Vec3 out(const Vec3& y) const {
+    return Vec3{dot(row[0], y), dot(row[1], y), dot(row[2], y)} + at;
+  }
+  Vec3 turn(const Vec3& y) const { return {dot(row[0], y), dot(row[1], y), dot(row[2], y)}; }
+  Vec3 back(const Vec3& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
 };
 
 // The motion of a body between two poses. Its origin moves linearly. Its frame turns at a constant
@@ -45,24 +47,24 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
 class SupportShape {
  public:
   SupportShape(const Shape& shape, const LocalFrame& in_body, const RigidMotion& motion,
-               const Vec& origin);
+               const Vec3& origin);
   SupportShape(const double* const* x_t0, const double* const* x_t1, int count, double radius,
-               const Vec& origin);
+               const Vec3& origin);
 
   void move_to(double t);
-  Vec support(const Vec& d) const;
+  Vec3 support(const Vec3& d) const;
   // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection
   // on n + h r, and its slope.
-  double tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift,
+  double tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c, const Vec3& drift,
                  double* slope) const;
-  double speed_about(const Vec& drift) const;  // no point moves faster than this against drift
-  double acceleration(const Vec& n,
+  double speed_about(const Vec3& drift) const;  // no point moves faster than this against drift
+  double acceleration(const Vec3& n,
                       double drift) const;  // bound on |n.x''| for n within drift of the given one
-  Vec angular() const { return turning_ ? motion_->speed * motion_->axis : Vec{}; }
-  Vec linear() const { return turning_ ? motion_->linear : velocity_[0]; }
-  Vec centre() const { return turning_ ? centre_ : now_[0]; }
-  Vec middle() const;
-  Vec plane_normal() const { return {frame_.row[0][2], frame_.row[1][2], frame_.row[2][2]}; }
+  Vec3 angular() const { return turning_ ? motion_->speed * motion_->axis : Vec3{}; }
+  Vec3 linear() const { return turning_ ? motion_->linear : velocity_[0]; }
+  Vec3 centre() const { return turning_ ? centre_ : now_[0]; }
+  Vec3 middle() const;
+  Vec3 plane_normal() const { return {frame_.row[0][2], frame_.row[1][2], frame_.row[2][2]}; }
   bool half_space() const { return shape_ != nullptr && shape_->core == Core::half_space; }
   double radius() const { return radius_; }
   double reach() const { return reach_; }
@@ -74,7 +76,7 @@ class SupportShape {
   const RigidMotion* motion_ = nullptr;
   bool turning_ = false;
   int count_ = 0;
-  Vec start_[4], velocity_[4], now_[4], shift_{}, centre_{};
+  Vec3 start_[4], velocity_[4], now_[4], shift_{}, centre_{};
   double radius_ = 0, reach_ = 0, magnitude_ = 0;
 };
 
