@@ -13,9 +13,11 @@ class ExactNearest {
  public:
   using Pair = typename PointDifferences<Number>::Source;
 
-  ExactNearest(const Points<Number>& a, const Points<Number>& b) : y_(a, b) {
-    take({0, 0});
-    keep();
+  // `start`: the corners from which the search starts.
+  ExactNearest(const Points<Number>& a, const Points<Number>& b, const std::vector<Pair>& start)
+      : y_(a, b) {
+    for (const Pair& pair : start) take(pair);
+    keep(0);
     while (!is_zero(numerator)) {
       geometry::poll_interrupt();
       const Pair next = y_.farthest(-numerator);
@@ -23,7 +25,7 @@ class ExactNearest {
       // numerator . (w - numerator / denominator) >= 0: no difference is nearer.
       if (!(dot(numerator, w) * denominator < dot(numerator, numerator))) return;
       take(next);
-      keep();
+      keep(1u << (pairs.size() - 1));
     }
   }
 
@@ -35,11 +37,13 @@ class ExactNearest {
  private:
   void take(const Pair& p) { pairs.push_back(p), points_.push_back(y_.at(p)); }
 
-  // The face of the simplex that holds its point nearest to the origin: the one whose point has
-  // weights above zero and no other corner before it.
-  void keep() {
+  // The face of the simplex that holds its point nearest to the origin: all its weights are above
+  // zero and no other corner is before it. It has the corners of `with`, and is most often the
+  // whole simplex.
+  void keep(unsigned with) {
     const int m = static_cast<int>(points_.size());
-    for (int mask = 1; mask < 1 << m; ++mask) {
+    for (unsigned mask = (1u << m) - 1; mask > 0; --mask) {
+      if ((mask & with) != with) continue;
       std::vector<int> face;
       for (int k = 0; k < m; ++k)
         if (mask >> k & 1) face.push_back(k);

@@ -13,6 +13,7 @@ namespace tauguard::rigid {
 // of parallelepipeds and of hulls of at most four points.
 struct BodyEdges {
   Vec3 edge[6];
+  int ends[6][2];  // the vertices between which it runs
   int edges = 0, faces = 0;
   int face[4][2];
   bool parallel = false;  // opposite faces are parallel
@@ -23,7 +24,8 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
     const Zonotope z = zonotope_of(bodies.kind, p);
     for (int i = 0; i < 3; ++i) {
-      out->edge[i] = {z.g[i][0], z.g[i][1], z.g[i][2]};
+      out->edge[i] = geometry::load(z.g[i]);
+      out->ends[i][0] = 0, out->ends[i][1] = 1 << i;
       out->face[i][0] = i, out->face[i][1] = (i + 1) % 3;
     }
     out->edges = out->faces = 3, out->parallel = true;
@@ -33,8 +35,10 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
   if (bodies.kind == Kind::polygons || n > 4) return false;
   // Of 01, 02, 12, 03, 13, 23 those that there are; faces 012, 013, 023, 123.
   for (int j = 1; j < n; ++j)
-    for (int i = 0; i < j; ++i, ++out->edges)
-      for (int k = 0; k < 3; ++k) out->edge[out->edges][k] = p[3 * j + k] - p[3 * i + k];
+    for (int i = 0; i < j; ++i, ++out->edges) {
+      out->edge[out->edges] = geometry::load(p + 3 * j) - geometry::load(p + 3 * i);
+      out->ends[out->edges][0] = i, out->ends[out->edges][1] = j;
+    }
   constexpr int pairs[4][2] = {{0, 1}, {0, 3}, {1, 3}, {2, 4}};
   out->faces = n == 4 ? 4 : n == 3 ? 1 : 0;
   for (int f = 0; f < out->faces; ++f) std::copy_n(pairs[f], 2, out->face[f]);

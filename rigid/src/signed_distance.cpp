@@ -4,6 +4,7 @@
 
 #include "convex_contact.hpp"
 #include "depth_bound.hpp"
+#include "exact_facets.hpp"
 #include "exact_nearest.hpp"
 #include "facet_depth.hpp"
 #include "tauguard/rigid/distance.hpp"
@@ -19,7 +20,7 @@ namespace {
 // that it leaves out, or 39 for least_depth.
 constexpr double certain = 0x1p-46, near = 1e-10;
 // Beyond these sizes products of four lengths leave the range of a double.
-constexpr double least_size = 1e-40, most_size = 1e40;
+bool in_range(double size) { return size > 1e-40 && size < 1e40; }
 
 // Vertices relative to `origin`; a difference of two doubles is off by one rounding of itself.
 Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec3& origin) {
@@ -163,34 +164,50 @@ ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<doub
           (dot(nearest.numerator, nearest.numerator) - reach * reach).sign()};
 }
 
+// Of bodies that b leaves by `height` / |facet|^2 along `facet`.
+ExactDistance exact_depth(const Vector3<Dyadic>& facet, const Dyadic& height,
+                          const Points<double>& a, const Points<double>& b, const Dyadic& radii,
+                          double size) {
+  const std::int64_t e = exponent(facet);
+  const Vec3 normal = scaled(facet, e);
+  const double length = norm(normal);
+  const Vec3 n = (1 / length) * normal;
+  if (height.is_zero()) return {together(a, b, n, 0.0, size), radii.is_zero() ? 0 : -1};
+  const std::int64_t o = height.floor_log2();
+  return {together(a, b, n, power(height.scaled(-o).to_double() / length, o - e), size), -1};
+}
+
 ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
                              const Points<double>& a, const Points<double>& b, const Dyadic& radii,
                              double size) {
   using Polytope = ExpandingPolytope<Dyadic, PointDifferences<Dyadic>>;
   Polytope polytope(PointDifferences<Dyadic>(x, y));
   const auto answer = polytope.solve(1 << 30);
-  Vector3<Dyadic> facet = polytope.nearest.normal;
-  const int sign = radii.is_zero() ? 0 : -1;
-  if (is_zero(facet)) facet = {Dyadic(), Dyadic(), Dyadic(1.0)};
-  const std::int64_t e = exponent(facet);
-  const Vec3 normal = scaled(facet, e);
-  const double length = norm(normal);
-  const Vec3 n = (-1 / length) * normal;
-  if (answer == Polytope::Answer::flat) {
-    const Vec3 point = middle_point(a, b);
-    return {{0.0, point, point, n}, sign};
-  }
-  if (polytope.nearest.offset.is_zero()) return {together(a, b, n, 0.0, size), sign};
-  const std::int64_t o = polytope.nearest.offset.floor_log2();
-  const double depth = power(polytope.nearest.offset.scaled(-o).to_double() / length, o - e);
-  return {together(a, b, n, depth, size), -1};
+  Vector3<Dyadic> facet = -polytope.nearest.normal;
+  if (is_zero(facet)) facet = {Dyadic(), Dyadic(), Dyadic(-1.0)};
+  if (answer != Polytope::Answer::flat)
+    return exact_depth(facet, polytope.nearest.offset, a, b, radii, size);
+  const Vec3 normal = scaled(facet, exponent(facet)), point = middle_point(a, b);
+  return {{0.0, point, point, (1 / norm(normal)) * normal}, radii.is_zero() ? 0 : -1};
+}
+
+// The nearest points, from those that doubles find.
+ExactNearest<Dyadic> exact_nearest(const Points<Dyadic>& x, const Points<Dyadic>& y,
+                                   const Points<double>& a, const Points<double>& b) {
+  const Nearest ends = nearest(a, b);
+  return {x, y, {ends.corner.begin(), ends.corner.begin() + ends.size}};
 }
 
 ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                              const Points<double>& a, const Points<double>& b, const Dyadic& radii,
                              double size) {
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
-  const ExactNearest<Dyadic> nearest(x, y);
+  BodyEdges ea, eb;
+  ExactFacets facets;
+  if (in_range(size) && edges_of(bodies_a, row, &ea) && edges_of(bodies_b, row, &eb) &&
+      facets.solve(ea, eb, x, y, a, b, size) == ExactFacets::Answer::together)
+    return exact_depth(facets.normal, facets.height, a, b, radii, size);
+  const ExactNearest<Dyadic> nearest = exact_nearest(x, y, a, b);
   if (!is_zero(nearest.numerator)) return exact_apart(nearest, a, radii);
   return exact_together(x, y, a, b, radii, size);
 }
@@ -218,7 +235,7 @@ SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, s
   bool known = false;
   int sign = 0;
   bool quick = false;
-  if (size > least_size && size < most_size) {
+  if (in_range(size)) {
     quick = certified_apart(a, b, size, &g);
     double way;
     Vec3 n;
@@ -242,7 +259,7 @@ bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doubl
   const Vec3 origin = {p[0], p[1], p[2]};
   const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
   const double size = size_of(a, b), radii = radius_a + radius_b;
-  if (size > least_size && size < most_size) {
+  if (in_range(size)) {
     const Nearest ends = nearest(a, b);
     const Vec3 way = ends.b - ends.a;
     const double slack = near * (size + radii), length = norm(way);
@@ -257,7 +274,7 @@ bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doubl
       return true;
   }
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
-  const ExactNearest<Dyadic> exact(x, y);
+  const ExactNearest<Dyadic> exact = exact_nearest(x, y, a, b);
   const Dyadic reach = (Dyadic(radius_a) + Dyadic(radius_b)) * exact.denominator;
   return (dot(exact.numerator, exact.numerator) - reach * reach).sign() <= 0;
 }

@@ -124,7 +124,6 @@ SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const 
     : shape_(&shape),
       in_body_(in_body),
       motion_(&motion),
-      turning_(true),
       shift_(motion.x0 - origin),
       radius_(shape.radius) {
   reach_ = norm(in_body.at) + shape.extent();
@@ -133,20 +132,21 @@ SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const 
 
 SupportShape::SupportShape(const double* const* x_t0, const double* const* x_t1, int count,
                            double radius, const Vec3& origin)
-    : count_(count), radius_(radius) {
+    : corners_(Corners{count, {}, {}, {}}), radius_(radius) {
+  Vec3 *start = corners_->start, *velocity = corners_->velocity;
   for (int i = 0; i < count; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      start_[i][k] = x_t0[i][k] - origin[k];
-      velocity_[i][k] = x_t1[i][k] - x_t0[i][k];
-    }
-    magnitude_ = std::max(magnitude_, norm(start_[i]) + norm(velocity_[i]) + radius);
-    reach_ = std::max(reach_, norm(start_[i] - start_[0]));
+    const Vec3 from = geometry::load(x_t0[i]);
+    start[i] = from - origin;
+    velocity[i] = geometry::load(x_t1[i]) - from;
+    magnitude_ = std::max(magnitude_, norm(start[i]) + norm(velocity[i]) + radius);
+    reach_ = std::max(reach_, norm(start[i] - start[0]));
   }
 }
 
 void SupportShape::move_to(double t) {
-  if (!turning_) {
-    for (int i = 0; i < count_; ++i) now_[i] = start_[i] + t * velocity_[i];
+  if (corners_) {
+    Corners& c = *corners_;
+    for (int i = 0; i < c.count; ++i) c.now[i] = c.start[i] + t * c.velocity[i];
     return;
   }
   centre_ = shift_ + t * motion_->linear;
@@ -169,19 +169,20 @@ void SupportShape::move_to(double t) {
 }
 
 Vec3 SupportShape::support(const Vec3& d) const {
-  if (turning_) return frame_.out(shape_->support(frame_.back(d)));
+  if (!corners_) return frame_.out(shape_->support(frame_.back(d)));
+  const Vec3* now = corners_->now;
   int best = 0;
-  double most = dot(d, now_[0]);
-  for (int i = 1; i < count_; ++i) {
-    const double p = dot(d, now_[i]);
+  double most = dot(d, now[0]);
+  for (int i = 1; i < corners_->count; ++i) {
+    const double p = dot(d, now[i]);
     if (p > most) most = p, best = i;
   }
-  return now_[best];
+  return now[best];
 }
 
 double SupportShape::tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c,
                              const Vec3& drift, double* slope) const {
-  if (turning_) {
+  if (!corners_) {
     // x = centre + y and x' = linear + w x y, and n.(w x y) = y.(n x w).
     const Vec3 rate = r + cross(n, angular()), m = n + h * rate;
     const Vec3 y = support(m) - centre_, from = centre_ - c;
@@ -190,32 +191,33 @@ double SupportShape::tangent(const Vec3& n, const Vec3& r, double h, const Vec3&
     return dot(n, from) + h * straight + dot(m, y);
   }
   double most = -INFINITY;
-  for (int i = 0; i < count_; ++i) {
-    const Vec3 x = now_[i] - c;
-    const double v = dot(r, x) + dot(n, velocity_[i] - drift), p = dot(n, x) + h * v;
+  for (int i = 0; i < corners_->count; ++i) {
+    const Vec3 x = corners_->now[i] - c;
+    const double v = dot(r, x) + dot(n, corners_->velocity[i] - drift), p = dot(n, x) + h * v;
     if (p > most) most = p, *slope = v;
   }
   return most;
 }
 
 double SupportShape::speed_about(const Vec3& drift) const {
-  if (turning_) return norm(motion_->linear - drift) + motion_->speed * reach_;
+  if (!corners_) return norm(motion_->linear - drift) + motion_->speed * reach_;
   double most = 0;
-  for (int i = 0; i < count_; ++i) most = std::max(most, norm(velocity_[i] - drift));
+  for (int i = 0; i < corners_->count; ++i)
+    most = std::max(most, norm(corners_->velocity[i] - drift));
   return most;
 }
 
 double SupportShape::acceleration(const Vec3& n, double drift) const {
-  if (!turning_ || motion_->speed == 0) return 0;
+  if (corners_ || motion_->speed == 0) return 0;
   const Vec3 across = n - dot(n, motion_->axis) * motion_->axis;
   return motion_->speed * motion_->speed * reach_ * (norm(across) + drift + 0x1p-40);
 }
 
 Vec3 SupportShape::middle() const {
-  if (turning_) return frame_.at;
+  if (!corners_) return frame_.at;
   Vec3 sum{};
-  for (int i = 0; i < count_; ++i) sum = sum + now_[i];
-  return (1.0 / count_) * sum;
+  for (int i = 0; i < corners_->count; ++i) sum += corners_->now[i];
+  return (1.0 / corners_->count) * sum;
 }
 
 }  // namespace tauguard::rigid

@@ -25,7 +25,7 @@ class Dyadic {
     const auto mantissa = static_cast<std::uint64_t>(std::ldexp(fraction, 53));
     sign_ = x < 0 ? -1 : 1;
     exponent_ = exponent - 53;
-    limbs_ = {static_cast<std::uint32_t>(mantissa), static_cast<std::uint32_t>(mantissa >> 32)};
+    limbs_ = {mantissa};
     normalize();
   }
 
@@ -35,7 +35,7 @@ class Dyadic {
     const std::uint64_t m =
         x < 0 ? ~static_cast<std::uint64_t>(x) + 1 : static_cast<std::uint64_t>(x);
     r.sign_ = x < 0 ? -1 : 1;
-    r.limbs_ = {static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(m >> 32)};
+    r.limbs_ = {m};
     r.normalize();
     return r;
   }
@@ -80,12 +80,11 @@ class Dyadic {
     for (std::size_t i = 0; i < a.limbs_.size(); ++i) {
       std::uint64_t carry = 0;
       for (std::size_t j = 0; j < b.limbs_.size(); ++j) {
-        const std::uint64_t t =
-            static_cast<std::uint64_t>(a.limbs_[i]) * b.limbs_[j] + r.limbs_[i + j] + carry;
-        r.limbs_[i + j] = static_cast<std::uint32_t>(t);
-        carry = t >> 32;
+        const Wide t = Wide{a.limbs_[i]} * b.limbs_[j] + r.limbs_[i + j] + carry;
+        r.limbs_[i + j] = static_cast<std::uint64_t>(t);
+        carry = static_cast<std::uint64_t>(t >> 64);
       }
-      r.limbs_[i + b.limbs_.size()] = static_cast<std::uint32_t>(carry);
+      r.limbs_[i + b.limbs_.size()] = carry;
     }
     r.normalize();
     return r;
@@ -109,36 +108,20 @@ class Dyadic {
 
   // The e with 2^e <= |x| < 2^(e + 1); x must not be zero.
   std::int64_t floor_log2() const {
-    int bits = 31;
-    while (!(limbs_.back() >> bits)) --bits;
-    return exponent_ + 32 * static_cast<std::int64_t>(limbs_.size() - 1) + bits;
+    return exponent_ + 64 * static_cast<std::int64_t>(limbs_.size()) - 1 -
+           __builtin_clzll(limbs_.back());
   }
 
   // Truncation towards zero to about 53 bits; +-inf or 0 if the value is outside the range of
   // double.
   double to_double() const {
     if (is_zero()) return 0.0;
-    // The three leading limbs hold at least 65 significant bits: keep the upper 53.
     const std::size_t n = limbs_.size();
-    std::uint64_t head = 0;
-    std::int64_t shift = exponent_;
-    if (n == 1) {
-      head = limbs_[0];
-    } else {
-      head = (static_cast<std::uint64_t>(limbs_[n - 1]) << 32) | limbs_[n - 2];
-      shift += 32 * static_cast<std::int64_t>(n - 2);
-      int lead = 0;
-      while (!((head << lead) >> 63)) ++lead;
-      if (lead > 0) {
-        head <<= lead;
-        if (n >= 3) head |= limbs_[n - 3] >> (32 - lead);
-        shift -= lead;
-      }
-    }
-    int drop = 0;
-    while ((head >> drop) >> 53) ++drop;
-    head >>= drop;
-    shift += drop;
+    const int lead = __builtin_clzll(limbs_.back());
+    std::uint64_t head = limbs_.back() << lead;
+    if (lead && n > 1) head |= limbs_[n - 2] >> (64 - lead);
+    head >>= 11;
+    const std::int64_t shift = exponent_ + 64 * static_cast<std::int64_t>(n - 1) + 11 - lead;
     const std::int64_t bounded = std::clamp<std::int64_t>(shift, -5000, 5000);
     return sign_ * std::ldexp(static_cast<double>(head), static_cast<int>(bounded));
   }
@@ -155,7 +138,7 @@ class Dyadic {
     while (limbs_[zeros] == 0) ++zeros;
     if (zeros) {
       limbs_.drop_front(zeros);
-      exponent_ += 32 * static_cast<std::int64_t>(zeros);
+      exponent_ += 64 * static_cast<std::int64_t>(zeros);
     }
   }
 
@@ -165,19 +148,19 @@ class Dyadic {
     Shifted(const Dyadic& a, std::int64_t exponent)
         : limbs_(a.limbs_.data()),
           count_(a.limbs_.size()),
-          zeros_(static_cast<std::size_t>((a.exponent_ - exponent) / 32)),
-          bits_(static_cast<int>((a.exponent_ - exponent) % 32)) {}
+          zeros_(static_cast<std::size_t>((a.exponent_ - exponent) / 64)),
+          bits_(static_cast<int>((a.exponent_ - exponent) % 64)) {}
     std::size_t size() const { return zeros_ + count_ + (bits_ != 0); }
-    std::uint32_t operator[](std::size_t i) const {
+    std::uint64_t operator[](std::size_t i) const {
       if (i < zeros_) return 0;
       i -= zeros_;
       const std::uint64_t high = i < count_ ? limbs_[i] : 0,
                           low = i > 0 && i <= count_ ? limbs_[i - 1] : 0;
-      return static_cast<std::uint32_t>((high << 32 | low) << bits_ >> 32);
+      return bits_ ? high << bits_ | low >> (64 - bits_) : high;
     }
 
    private:
-    const std::uint32_t* limbs_;
+    const std::uint64_t* limbs_;
     std::size_t count_, zeros_;
     int bits_;
   };
@@ -185,12 +168,12 @@ class Dyadic {
   static void add(const Shifted& x, const Shifted& y, Limbs& r) {
     const std::size_t n = std::max(x.size(), y.size()) + 1;
     r.assign(n, 0);
-    std::uint32_t* out = r.data();
-    std::uint64_t carry = 0;
+    std::uint64_t* out = r.data();
+    Wide carry = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      carry += std::uint64_t{x[i]} + y[i];
-      out[i] = static_cast<std::uint32_t>(carry);
-      carry >>= 32;
+      carry += Wide{x[i]} + y[i];
+      out[i] = static_cast<std::uint64_t>(carry);
+      carry >>= 64;
     }
   }
 
@@ -198,12 +181,12 @@ class Dyadic {
   static void subtract(const Shifted& x, const Shifted& y, Limbs& r) {
     const std::size_t n = x.size();
     r.assign(n, 0);
-    std::uint32_t* out = r.data();
-    std::int64_t borrow = 0;
+    std::uint64_t* out = r.data();
+    bool borrow = false;
     for (std::size_t i = 0; i < n; ++i) {
-      const std::int64_t t = std::int64_t{x[i]} - y[i] + borrow;
-      out[i] = static_cast<std::uint32_t>(t);
-      borrow = t >> 32;  // 0 or -1
+      const std::uint64_t a = x[i], b = y[i], t = a - b - borrow;
+      borrow = a < b || (a == b && borrow);
+      out[i] = t;
     }
   }
 
@@ -212,6 +195,8 @@ class Dyadic {
       if (x[i] != y[i]) return x[i] > y[i] ? 1 : -1;
     return 0;
   }
+
+  using Wide = unsigned __int128;
 
   int sign_ = 0;
   std::int64_t exponent_ = 0;

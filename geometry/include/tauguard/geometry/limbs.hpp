@@ -1,4 +1,4 @@
-// The digits of a big number: a vector of 32-bit limbs. A short vector is stored inside the object,
+// The digits of a big number: a vector of 64-bit limbs. A short vector is stored inside the object,
 // because an allocation by std::vector costs more than arithmetic on a few limbs.
 #pragma once
 
@@ -14,11 +14,11 @@ namespace tauguard::geometry {
 class Limbs {
  public:
   Limbs() = default;
-  Limbs(std::initializer_list<std::uint32_t> values) {
+  Limbs(std::initializer_list<std::uint64_t> values) {
     reserve(values.size());
-    for (std::uint32_t v : values) data()[size_++] = v;
+    for (std::uint64_t v : values) data()[size_++] = v;
   }
-  Limbs(std::size_t n, std::uint32_t value) { assign(n, value); }
+  Limbs(std::size_t n, std::uint64_t value) { assign(n, value); }
   explicit Limbs(std::size_t n) { assign(n, 0); }
   Limbs(const Limbs& o) { *this = o; }
   Limbs(Limbs&& o) noexcept { *this = static_cast<Limbs&&>(o); }
@@ -26,7 +26,7 @@ class Limbs {
     if (this == &o) return *this;
     size_ = 0;
     reserve(o.size_);
-    std::memcpy(data(), o.data(), o.size_ * sizeof(std::uint32_t));
+    std::memcpy(data(), o.data(), o.size_ * sizeof(std::uint64_t));
     size_ = o.size_;
     return *this;
   }
@@ -37,7 +37,7 @@ class Limbs {
       capacity_ = o.capacity_;
       o.capacity_ = near_capacity;
     } else {  // fits whatever storage is here
-      std::memcpy(data(), o.near_, o.size_ * sizeof(std::uint32_t));
+      std::memcpy(data(), o.near_, o.size_ * sizeof(std::uint64_t));
     }
     size_ = o.size_;
     o.size_ = 0;
@@ -46,43 +46,43 @@ class Limbs {
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
-  std::uint32_t* data() { return far_ ? far_.get() : near_; }
-  const std::uint32_t* data() const { return far_ ? far_.get() : near_; }
-  std::uint32_t& operator[](std::size_t i) { return data()[i]; }
-  std::uint32_t operator[](std::size_t i) const { return data()[i]; }
-  std::uint32_t back() const { return data()[size_ - 1]; }
-  const std::uint32_t* begin() const { return data(); }
-  const std::uint32_t* end() const { return data() + size_; }
+  std::uint64_t* data() { return far_ ? far_.get() : near_; }
+  const std::uint64_t* data() const { return far_ ? far_.get() : near_; }
+  std::uint64_t& operator[](std::size_t i) { return data()[i]; }
+  std::uint64_t operator[](std::size_t i) const { return data()[i]; }
+  std::uint64_t back() const { return data()[size_ - 1]; }
+  const std::uint64_t* begin() const { return data(); }
+  const std::uint64_t* end() const { return data() + size_; }
 
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     const std::size_t capacity = std::max(n, 2 * capacity_);
-    std::unique_ptr<std::uint32_t[]> grown(new std::uint32_t[capacity]);
-    std::memcpy(grown.get(), data(), size_ * sizeof(std::uint32_t));
+    std::unique_ptr<std::uint64_t[]> grown(new std::uint64_t[capacity]);
+    std::memcpy(grown.get(), data(), size_ * sizeof(std::uint64_t));
     far_ = std::move(grown);
     capacity_ = capacity;
   }
-  void assign(std::size_t n, std::uint32_t value) {
+  void assign(std::size_t n, std::uint64_t value) {
     size_ = 0;
     reserve(n);
     std::fill(data(), data() + n, value);
     size_ = n;
   }
-  void push_back(std::uint32_t v) {
+  void push_back(std::uint64_t v) {
     reserve(size_ + 1);
     data()[size_++] = v;
   }
   void pop_back() { --size_; }
   void drop_front(std::size_t n) {
-    std::memmove(data(), data() + n, (size_ - n) * sizeof(std::uint32_t));
+    std::memmove(data(), data() + n, (size_ - n) * sizeof(std::uint64_t));
     size_ -= n;
   }
 
  private:
-  static constexpr std::size_t near_capacity = 20;  // 640 bits: a product of three near coordinates
+  static constexpr std::size_t near_capacity = 10;  // 640 bits: a product of three near coordinates
 
-  std::uint32_t near_[near_capacity];
-  std::unique_ptr<std::uint32_t[]> far_;
+  std::uint64_t near_[near_capacity];
+  std::unique_ptr<std::uint64_t[]> far_;
   std::size_t size_ = 0, capacity_ = near_capacity;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "tauguard/geometry/rounding.hpp"
@@ -60,9 +61,9 @@ class SupportShape {
   double speed_about(const Vec3& drift) const;  // no point moves faster than this against drift
   double acceleration(const Vec3& n,
                       double drift) const;  // bound on |n.x''| for n within drift of the given one
-  Vec3 angular() const { return turning_ ? motion_->speed * motion_->axis : Vec3{}; }
-  Vec3 linear() const { return turning_ ? motion_->linear : velocity_[0]; }
-  Vec3 centre() const { return turning_ ? centre_ : now_[0]; }
+  Vec3 angular() const { return corners_ ? Vec3{} : motion_->speed * motion_->axis; }
+  Vec3 linear() const { return corners_ ? corners_->velocity[0] : motion_->linear; }
+  Vec3 centre() const { return corners_ ? corners_->now[0] : centre_; }
   Vec3 middle() const;
   Vec3 plane_normal() const { return {frame_.row[0][2], frame_.row[1][2], frame_.row[2][2]}; }
   bool half_space() const { return shape_ != nullptr && shape_->core == Core::half_space; }
@@ -74,9 +75,12 @@ class SupportShape {
   const Shape* shape_ = nullptr;
   LocalFrame in_body_{}, frame_{};
   const RigidMotion* motion_ = nullptr;
-  bool turning_ = false;
-  int count_ = 0;
-  Vec3 start_[4], velocity_[4], now_[4], shift_{}, centre_{};
+  struct Corners {
+    int count;
+    Vec3 start[4], velocity[4], now[4];
+  };
+  std::optional<Corners> corners_;  // of a simplex; nothing for a shape, which turns
+  Vec3 shift_, centre_;
   double radius_ = 0, reach_ = 0, magnitude_ = 0;
 };
 
