@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.datasets.drives import REVERSAL, DriveNumbers, preset_drive
-from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.datasets.drives import preset_drive
+from tauguard.detectors import ArmModel, RobotNumbers
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.assessment import (
     OUTLYING,
@@ -165,63 +165,38 @@ def initial_arm(
     return ArmModel(numbers, begin), scale
 
 
-def arm_of_log(
+def known_arm(
     robot: Path,
+    numbers: RobotNumbers,
+    recordings: Sequence[Recording],
     columns: str | None,
     gains: tuple[float, ...],
-    viscous: tuple[float, ...],
-    coulomb: tuple[float, ...],
-    trace: Trace,
-    numbers: RobotNumbers,
 ) -> tuple[ArmModel, str]:
-    """The arm of a log without a trained model, and where its gains and friction come from.
+    """The arm that free motion begins with, and where its gains come from, in words.
 
-    They are those of a calibrated robot file, else those given, else 1 for a log of torques, else
-    those of the preset of the log's columns.
-
-    Args:
-        robot: URDF or MJCF file.
-        columns: preset or column map that was given.
-        gains: that were given [N m/A], one a joint; empty for none.
-        viscous: friction that was given [N m s/rad], one a joint; empty for none.
-        coulomb: friction that was given [N m], one a joint; empty for none.
-        trace: the log.
-        numbers: of the robot file, for the joints of the log.
+    They are those given, else those of a calibrated robot file, else as :func:`initial_arm` has
+    them.
 
     Raises:
-        ValueError: no gains, not one a joint, or some beside those of a calibrated robot file.
+        ValueError: as for :func:`initial_arm`; logs of torques for an arm calibrated on currents.
     """
-    calibrated = load_arm(robot)
-    if calibrated is not None:
-        if gains or viscous or coulomb:
-            raise ValueError(
-                f"{robot.name} is calibrated and brings its own gains and friction: leave out "
-                "--gains, --viscous and --coulomb, or give the robot's own file"
-            )
-        return calibrated, f"the calibration in {robot.name}"
-    source = "the flags"
+    arm = None if gains else load_arm(robot)
+    if arm is not None:
+        if is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
+            raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
+        return arm, f"those of the calibration in {robot.name}"
     if not gains:
-        check_named(robot, columns, [trace])
-        if is_torque(trace):
-            gains, source = (1.0,) * numbers.joints, "the log's torques"
-        elif (preset := preset_drive(columns, [trace])) is not None:
-            name, known = preset
-            gains, source = known.gain, f"the preset {name}"
-            viscous, coulomb = viscous or known.viscous, coulomb or known.coulomb
-        else:
-            raise ValueError(
-                f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere"
-            )
-    _check_count(gains, numbers)
-    drive = DriveNumbers(gains, viscous, coulomb)
-    coulomb, viscous = (x or (0.0,) * numbers.joints for x in (drive.coulomb, drive.viscous))
-    friction = FrictionModel.coulomb_viscous(coulomb, viscous, width=REVERSAL)
-    return ArmModel(numbers, np.array(drive.gain), friction), source
+        check_named(robot, columns, [r.trace for r in recordings])
+    arm, scale = initial_arm(numbers, recordings, columns, gains, "gains")
+    words = {"gains": "those given", "torques": "none, the log holds torques"}
+    return arm, words.get(scale, "those of the preset")
 
 
 def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
     if gains and len(gains) != numbers.joints:
         raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+    if gains and not (np.isfinite(gains).all() and np.all(gains)):
+        raise ValueError(f"--gains {gains}: every number must be finite and not 0")
 
 
 # -- what a calibration leaves unexplained --------------------------------------------------------

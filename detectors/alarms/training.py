@@ -19,6 +19,7 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.scores.detector import Detector, FittedDetector
+from tauguard.detectors.scores.free_motion import CONFIRMATION as FREE_CONFIRMATION
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
@@ -75,6 +76,17 @@ def train(
         ValueError: traces that do not fit or lack what the method needs, or ``folds`` below 1.
     """
     return train_and_score(detector, traces, arm, per_hour, folds)[0]
+
+
+def free_alarm(fitted: FittedFreeMotion, traces: Sequence[Trace]) -> CollisionAlarm:
+    """The alarm of a free-motion detector, whose threshold is 1.
+
+    Args:
+        fitted: the detector.
+        traces: the logs that it learned from; they show what usual samples look like.
+    """
+    usual = UsualInput.of(traces, fitted.arm)
+    return CollisionAlarm(fitted, 1.0, FREE_CONFIRMATION, inputs=usual)
 
 
 def train_and_score(

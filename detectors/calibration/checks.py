@@ -103,13 +103,19 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
         ValueError: an arm of another weight.
     """
     poses = np.concatenate([trace.q[:: max(1, len(trace.q) // 100)] for trace in traces])
-    need, has = (float(np.sqrt((gravity_torque(r, poses) ** 2).mean())) for r in (file, found))
+    needed, shown = gravity_torque(file, poses), gravity_torque(found, poses)
+    need, has = (float(np.sqrt((torque**2).mean())) for torque in (needed, shown))
+    if has >= 1e-6 and (needed * shown).sum() < 0:
+        raise ValueError(
+            "the logs show torques that pull with gravity instead of holding the arm: check the "
+            "signs of the currents or torques, and of the gains"
+        )
     if has < 1e-6 or LIGHTEST < has / max(need, 1e-9) < HEAVIEST:
         return
     raise ValueError(
         f"the logs show {has:.3g} N m against gravity (root mean square), the robot file's arm "
-        f"needs {need:.3g} N m: the file of another arm, gains that are wrong, or torques given as "
-        "currents (--torque)"
+        f"needs {need:.3g} N m: the file of another arm, gains that are wrong, the order of the "
+        "joints, or torques given as currents (--torque)"
     )
 
 

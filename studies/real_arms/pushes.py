@@ -27,9 +27,9 @@ from tqdm import tqdm
 from studies.real_arms.arms import ArmData, Push, available, nominal, pushes, recordings
 from tauguard.detectors import ArmModel, poisson_rate
 from tauguard.detectors.alarms.alarm import CollisionAlarm
-from tauguard.detectors.alarms.baseline_window import detect_after_baseline
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
+from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, confirmation_samples, confirmed, find_alarms
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
 from tauguard.report import Row, rate
@@ -42,8 +42,9 @@ Alarms = Callable[[Trace], NDArray[np.bool_]]
 EARLY = 0.15
 #: Random shifts of a log's alarms, for ``by chance``.
 SHIFTS = 200
-#: Seconds from which the plain observer learns.
-QUIET = 4.0
+#: Seconds from which the plain observer learns, threshold over the largest residual in them, and
+#: its confirmation [s].
+QUIET, FACTOR, PLAIN_CONFIRMATION = 4.0, 1.5, 0.05
 #: Confirmation of the fixed thresholds [s].
 FIXED_CONFIRMATION = 0.04
 NOTES = {
@@ -102,11 +103,11 @@ def detectors(fitted: FittedFreeMotion, start: ArmModel, recording: Recording) -
     alarm = CollisionAlarm(ours, 1.0, CONFIRMATION)
 
     def plain(trace: Trace) -> NDArray[np.bool_]:
-        tau = trace.current * start.drive_gain
-        try:
-            return detect_after_baseline(trace, start.robot, tau, QUIET).detection.alarm
-        except ValueError:  # the motion does not explain the torques, or the log is too short
-            return np.zeros(len(trace.t), dtype=np.bool_)
+        tau, time = trace.current * start.drive_gain, trace.t - trace.t[0]
+        size = np.abs(observe(start.robot, trace.t, trace.q, trace.qd, tau, LOG_GAIN))
+        learned = (time >= 3 / LOG_GAIN) & (time < QUIET)
+        above = (size > FACTOR * size[learned].max(axis=0)).any(axis=1) & (time >= QUIET)
+        return confirmed(above, confirmation_samples(PLAIN_CONFIRMATION, trace.dt))
 
     def fixed(threshold: Array) -> Alarms:
         def alarms(trace: Trace) -> NDArray[np.bool_]:

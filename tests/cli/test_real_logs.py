@@ -10,7 +10,7 @@ from tauguard.cli import main
 from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
-from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.calibration.recording import Load, cut
 from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
@@ -53,21 +53,31 @@ def calibrated(folder):
     return out
 
 
-def test_calibrated_file_brings_gains_and_friction(folder, calibrated, capsys):
-    log = written(folder, "fresh.csv", record(9))
-    plain = ["detect", log, *flags(folder, calibrated.name), "--joints", "1", "2", "3"]
-    main([*plain, "--json", str(folder / "own.json")])
-    assert "those of the calibration in calibrated.xml" in capsys.readouterr().out
-    raw = ["detect", log, *flags(folder), "--joints", "1", "2", "3", "--gains", *GAINS]
-    main([*raw, "--json", str(folder / "raw.json")])
-    assert "those of the flags" in capsys.readouterr().out
-    own, other = (
-        json.loads((folder / name).read_text())["thresholds_nm"]
-        for name in ("own.json", "raw.json")
-    )
-    # Friction of 6, 5 and 2 N m that the file knows no longer has to be allowed.
-    assert (np.array(own) < 0.5 * np.array(other)).all()
-    assert "leave out --gains" in fails(capsys, *plain, "--gains", *GAINS)
+def test_detect_without_a_model_is_free_motion_trained_on_the_logs_beginning(
+    folder, calibrated, capsys
+):
+    trace = record(9)
+    rows = int(0.7 * len(trace.t))
+    at = trace.t[0] + 0.85 * (trace.t[-1] - trace.t[0])
+    trace.current[(trace.t > at) & (trace.t < at + 0.4), 1] -= 25.0 / GAIN[1]
+    log = written(folder, "fresh.csv", trace)
+    head = written(folder, "head.csv", cut(trace, slice(0, rows)))
+    quiet = str(float(trace.t[rows] - trace.t[0]))
+    for robot, source in (
+        (flags(folder, calibrated.name), "those of the calibration in calibrated.xml"),
+        ([*flags(folder), "--gains", *GAINS], "those given"),
+    ):
+        main(["detect", log, *robot, "--quiet", quiet, "--json", str(folder / "own.json")])
+        out = capsys.readouterr().out
+        assert source in out
+        assert "1 alarm in" in out
+        model = str(folder / "head.skops")
+        main(["train", "--free", head, *robot, "--model", model])
+        main(["detect", log, *robot[:4], "--model", model, "--out", str(folder / "found")])
+        own = json.loads((folder / "own.json").read_text())
+        events = json.loads((folder / "found/events.json").read_text())
+        assert own["detector"] == events["detector"] == "free-motion"
+        assert own["events"] == events["events"]
 
 
 def test_held_out_residuals_have_the_joints_names(folder, capsys):
@@ -82,14 +92,18 @@ def test_held_out_residuals_have_the_joints_names(folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("scale", "order"), [(1000.0, (0, 1, 2)), (1.0, (2, 0, 1)), (-1.0, (0, 1, 2))]
+    ("scale", "order", "doubt"),
+    [
+        (1000.0, (0, 1, 2), "of the torque is not explained"),
+        (1.0, (2, 0, 1), "the order of the joints"),
+        (-1.0, (0, 1, 2), "the sign of the current"),
+    ],
 )
-def test_strange_currents_are_refused(folder, calibrated, capsys, scale, order):
+def test_strange_currents_are_refused(folder, calibrated, capsys, scale, order, doubt):
     trace = record(7)
     trace.current[:] = trace.current[:, order]
     log = written(folder, "strange.csv", trace, scale)
-    line = fails(capsys, "detect", log, *flags(folder, calibrated.name))
-    assert "of the torque is not explained" in line
+    assert doubt in fails(capsys, "detect", log, *flags(folder, calibrated.name))
 
 
 def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):

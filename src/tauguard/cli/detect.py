@@ -11,46 +11,16 @@ import tyro
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.detectors import Diagnosis
-    from tauguard.detectors.alarms.baseline_window import LogDetection
+    from tauguard.detectors import CollisionAlarm, Diagnosis
+    from tauguard.detectors.alarms.log_detection import LogDetection
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
     from tauguard.traces import Trace
 
 
 #: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
-
-
-@dataclasses.dataclass(frozen=True)
-class Plain:
-    """Without --model: the momentum observer, and thresholds from the log's own beginning.
-
-    The file of --robot brings gains and friction if `tauguard calibrate` wrote it.
-    """
-
-    quiet: float = 10.0
-    """seconds from the beginning that you vouch for; a collision in them raises the thresholds so
-    that others like it are missed later"""
-    joints: Annotated[tuple[int, ...], tyro.conf.arg(help_behavior_hint="")] = ()
-    """whose residuals are looked at, counted from 1; if none are named, the first four"""
-    gains: PerJoint = ()
-    """N m per ampere, one a joint (known for the preset ur10e)"""
-    viscous: PerJoint = ()
-    """friction in N m s/rad, one a joint"""
-    coulomb: PerJoint = ()
-    """friction in N m, one a joint"""
-    observer_gain: float = 20.0
-    """rate of the momentum observer in 1/s"""
-    confirmation: float = 0.05
-    """seconds above the threshold before an alarm"""
-    factor: float = 1.5
-    """threshold over the largest residual of the quiet seconds"""
-
-    def given(self) -> list[str]:
-        """Flags changed from their defaults."""
-        names = [field.name for field in dataclasses.fields(self)]
-        own = [name for name in names if getattr(self, name) != getattr(Plain(), name)]
-        return [f"--{name.replace('_', '-')}" for name in own]
+#: Seconds that a detector without a model learns from [s].
+QUIET = 20.0
 
 
 def command(
@@ -62,7 +32,8 @@ def command(
     payload: str | None = None,
     torque: bool = False,
     at_tool: bool = False,
-    plain: Annotated[Plain, tyro.conf.arg(name="")] = Plain(),
+    quiet: float | None = None,
+    gains: PerJoint = (),
     out: Path | None = None,
     json: Path | None = None,
 ) -> None:
@@ -70,8 +41,9 @@ def command(
 
     With --model a trained detector watches the log: free, collision, or fault where the samples
     themselves are wrong (frozen, missing, of another arm), as `tauguard listen` says it. Without
-    one, every joint's threshold is learned from the first --quiet seconds, in which nothing may
-    touch the arm, and the rest is watched.
+    one, the detector of `tauguard train --free` learns from the first --quiet seconds, in which
+    nothing may touch the arm, and watches the rest. More motion makes a better detector: `tauguard
+    train --free` learns from whole logs.
 
     Torques that the motion does not explain are refused: currents in a wrong unit or of the other
     sign. Currents of exchanged joints are noticed only as far as gravity loads those joints.
@@ -85,38 +57,38 @@ def command(
             "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
-            a model of `train --free`; 0 for nothing. Without it a load is found from the motion,
-            and until then only hard contacts are.
+            a model of `train --free` or no model; 0 for nothing. Without it a load is found from
+            the motion, and until then only hard contacts are.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
-        at_tool: all contacts are at the tool: with --model, the intervals of the forces are
-            narrower.
-        plain: what goes without a model.
+        at_tool: all contacts are at the tool: the intervals of the forces are narrower.
+        quiet: without --model, seconds from the log's beginning that you vouch for (default: 20); a
+            collision in them raises the bounds so that others like it are missed later.
+        gains: without --model, N m per ampere, one a joint (known for calibrated robot files and
+            for the preset ur10e; else the masses of the robot file set the scale).
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_one
+    from tauguard.detectors.alarms.log_detection import detect_in_log
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
-    if model is not None and plain.given():
-        raise ValueError(f"{', '.join(plain.given())}: not beside --model, which brings its own")
-    if model is None and at_tool:
-        raise ValueError("--at-tool goes with --model only")
-    if model is None and payload is not None:
-        raise ValueError("--payload goes with --model only")
-    causes: Sequence[dict[str, Any]] = ()
+    if model is not None and (quiet is not None or gains):
+        raise ValueError("--quiet, --gains: not beside --model, which brings its own")
     robot = bodies_file(robot)
     read = read_one(log, columns, torque)
     print_notes(read.notes)
     trace = read.trace
     if model is not None:
-        trace, detector, found = watched(model, trace, payload, robot)
-        causes, notes = explained(detector, trace, found, robot, at_tool)
+        trace, alarm = trained(model, trace, payload, robot)
     else:
-        trace, found, notes = plainly(log, trace, robot, columns, plain)
+        seconds = QUIET if quiet is None else quiet
+        trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
+    found = detect_in_log(alarm, trace)
+    causes, notes = explained(alarm.detector, trace, found, robot, at_tool)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
     report(result)
@@ -126,14 +98,13 @@ def command(
         leave(out, trace, found, result, robot)
 
 
-def watched(
+def trained(
     model: Path, trace: Trace, payload: str | None, robot: Path
-) -> tuple[Trace, Any, LogDetection]:
-    """The log in the joints of a trained detector, the detector, and what it saw."""
+) -> tuple[Trace, CollisionAlarm]:
+    """The log in the joints of a trained detector, and the detector."""
     from tauguard.datasets.arm_logs import matched, parse_load
     from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
-    from tauguard.detectors.alarms.baseline_window import detect_with
     from tauguard.detectors.alarms.training import carrying
 
     alarm = load_model(model)
@@ -144,39 +115,49 @@ def watched(
     trace = matched(trace, arm.robot.joint_names)
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")
-    return trace, alarm.detector, detect_with(alarm, trace)
+    return trace, alarm
 
 
-def plainly(
-    log: Path, trace: Trace, robot: Path, columns: str | None, plain: Plain
-) -> tuple[Trace, LogDetection, tuple[str, ...]]:
-    """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
+def learned(
+    log: Path,
+    trace: Trace,
+    robot: Path,
+    columns: str | None,
+    quiet: float,
+    gains: tuple[float, ...],
+    payload: str | None,
+) -> tuple[Trace, CollisionAlarm]:
+    """The log in the robot's joints, and a detector that learned from its beginning."""
+    import numpy as np
+
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import matched
-    from tauguard.datasets.real_arms import arm_of_log, robot_numbers
-    from tauguard.detectors.alarms.baseline_window import detect_after_baseline
-    from tauguard.detectors.calibration.checks import drive_torque
+    from tauguard.datasets.arm_logs import matched, parse_load
+    from tauguard.datasets.real_arms import known_arm, robot_numbers
+    from tauguard.detectors.alarms.training import free_alarm
+    from tauguard.detectors.calibration.checks import check_signs, check_weight
+    from tauguard.detectors.calibration.recording import Load, Recording, cut
+    from tauguard.detectors.scores.free_motion import FreeMotion
 
     numbers, held = robot_numbers(robot, trace.joint_names)
     print_notes(held)
     trace = matched(trace, numbers.joint_names)
-    arm, source = arm_of_log(
-        robot, columns, plain.gains, plain.viscous, plain.coulomb, trace, numbers
-    )
+    length = float(trace.t[-1] - trace.t[0])
+    if not 0 < quiet < length:
+        raise ValueError(f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s")
+    rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))
+    load = Load() if payload is None else parse_load(payload)
+    first = Recording(cut(trace, slice(0, rows)), load)
+    arm, source = known_arm(robot, numbers, [first], columns, gains)
     try:
-        found = detect_after_baseline(
-            trace,
-            arm.robot,
-            drive_torque(arm, trace),
-            plain.quiet,
-            gain=plain.observer_gain,
-            confirmation=plain.confirmation,
-            factor=plain.factor,
-            joints=plain.joints or range(1, min(4, arm.robot.joints) + 1),
-        )
+        check_signs(arm, log.name, first.trace)
+        detector = FreeMotion().fit([first], arm)
+        check_weight(arm.robot, detector.arm.robot, [first.trace])
     except ValueError as error:
-        raise ValueError(f"{log} (quiet: the first {plain.quiet:g} s): {error}") from None
-    return trace, found, (f"gains and friction are those of {source}",)
+        raise ValueError(f"{log}, its first {quiet:g} s (--quiet): {error}") from None
+    print_notes([f"learned from the first {quiet:g} s; gains: {source}"])
+    detector = dataclasses.replace(detector, settle=quiet)
+    detector = detector if payload is None else detector.carrying(load)
+    return trace, free_alarm(detector, [first.trace])
 
 
 def explained(
@@ -246,12 +227,11 @@ def summary(
     log: Path, trace: Trace, found: LogDetection, causes: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
     """The figures of a run, ready for JSON."""
-    import numpy as np
 
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.alarms.baseline_window import loudest_joint
+    from tauguard.detectors.alarms.log_detection import loudest_joint
 
-    whole = float(trace.t[-1] - found.quiet_until)
+    whole = float(trace.t[-1] - found.watched_from)
     watched = max(whole - found.fault_seconds, trace.dt)
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
@@ -270,11 +250,6 @@ def summary(
         "watched_seconds": watched,
         "detector": found.detection.detector,
         "score_threshold": found.detection.threshold,
-        # A trained detector has one threshold, of its score.
-        "thresholds_nm": [
-            v if np.isfinite(v) and found.detection.detector == "threshold" else None
-            for v in found.thresholds.tolist()
-        ],
         "faults": [{"start": f.start, "end": f.end, "reason": f.reason} for f in found.faults],
         "fault_seconds": found.fault_seconds,
         "alarms": len(events),
@@ -288,12 +263,7 @@ def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
     from tauguard.detectors.evaluation.card_page import printed_from, rate_text
 
-    pairs = zip(result["joints"], result["thresholds_nm"], strict=True)
-    used = [f"{name} {value:.1f} N m" for name, value in pairs if value is not None]
-    if result["detector"] == "threshold":
-        print("thresholds: " + ", ".join(used))
-    else:
-        print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
+    print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     since = printed_from(result["begin"])
     if since and (result["events"] or result["faults"]):
         print(f"times count from the log's first sample, at {since:.3f} s")

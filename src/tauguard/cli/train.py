@@ -203,28 +203,16 @@ def free_motion(
     """Train on logs in which nothing touched the arm, as far as that is known."""
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import never_moved, read_logs, with_loads
-    from tauguard.datasets.real_arms import (
-        calibration_notes,
-        check_named,
-        initial_arm,
-        is_torque,
-    )
-    from tauguard.detectors import CollisionAlarm, save_model
-    from tauguard.detectors.calibration.arm_file import load_arm
+    from tauguard.datasets.real_arms import calibration_notes, known_arm
+    from tauguard.detectors import save_model
+    from tauguard.detectors.alarms.training import free_alarm
     from tauguard.detectors.calibration.checks import check_signs, check_weight
-    from tauguard.detectors.faults.inputs import UsualInput
-    from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
+    from tauguard.detectors.scores.free_motion import FreeMotion
 
     read = read_logs(free, columns, robot, torque)
     print_notes(read.notes)
     traces, recordings = read.traces, with_loads(read.traces, payload)
-    arm = load_arm(robot)
-    if arm is None and not gains:
-        check_named(robot, columns, list(traces.values()))
-    if arm is None or gains:
-        arm, _ = initial_arm(read.numbers, recordings, columns, gains, "gains")
-    elif is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
-        raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
+    arm, _ = known_arm(robot, read.numbers, recordings, columns, gains)
     for name, trace in traces.items():
         check_signs(arm, name, trace)
     traces, recordings, sifted = sifted_logs(traces, recordings, arm, accept)
@@ -232,8 +220,7 @@ def free_motion(
     check_weight(arm.robot, detector.arm.robot, list(traces.values()))
     unmoved = never_moved(list(traces.values()))
     print_notes((*calibration_notes(detector.arm, traces, recordings, ()), *unmoved))
-    usual = UsualInput.of(list(traces.values()), detector.arm)
-    save_model(CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual), model)
+    save_model(free_alarm(detector, list(traces.values())), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), sifted, card)

@@ -1,0 +1,95 @@
+"""What a detector saw in a real arm's log: alarms, faults, and doubts about the log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.arrays import Array, Bools
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.monitor import Span, detect_with_faults
+from tauguard.detectors.calibration.checks import check_torques, drive_torque
+from tauguard.detectors.estimation.observer import LOG_GAIN, observe
+from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.traces.trace import Detection, Trace
+
+STRANGE = 0.2  # fraction of a log in alarm above which the log is taken for another arm's
+
+BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
+
+AROUND = 1.0  # [s] around an alarm in which a contact may change the torques
+
+
+@dataclass(frozen=True)
+class LogDetection:
+    """Alarms and faults of a log."""
+
+    detection: Detection
+    noise: Array  #: of each joint's residual [N m], to name the loudest joint, shape (n,)
+    watched_from: float  #: [s]; alarms are counted from here on
+    notes: tuple[str, ...]
+    faults: tuple[Span, ...] = ()  #: of the samples themselves; no alarm is looked for in them
+    fault_seconds: float = 0.0  #: in which collisions may be missed
+
+
+def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
+    """Find collisions in a log.
+
+    Raises:
+        ValueError: another number of joints or another sample rate than it was trained at, a log
+            that ends before the detector has settled, or torques that its motion does not explain.
+    """
+    settled = float(trace.t[0] + alarm.settle)
+    if not trace.t[-1] > settled:
+        raise ValueError(
+            f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
+            f"{alarm.settle:g} s on"
+        )
+    arm, rows = alarm.detector.arm, trace.t >= settled
+    tau = drive_torque(arm, trace)
+    residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, LOG_GAIN)
+    monitored = detect_with_faults(alarm, trace)
+    detection = replace(monitored.detection, residual=residual)
+    detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
+    strange = bool(detection.alarm[rows].mean() > STRANGE)
+    judged = rows if strange else rows & ~_near(detection)
+    doubts = check_torques(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange)
+    notes = [] if strange else list(doubts)
+    if strange:
+        notes.append(
+            "alarms fill much of this log; if it was not touched as often as that, tell what the "
+            "arm carried (--payload), and check that model, robot file and log are of one arm"
+        )
+    if isinstance(alarm.detector, FittedFreeMotion):
+        seconds, names = alarm.detector.unwatched(trace)
+        if names:
+            notes.append(
+                f"{', '.join(names)}: moves here, but in none of the training logs: nothing is "
+                f"watched in {seconds:.1f} s of this log"
+            )
+    return LogDetection(
+        detection,
+        np.asarray(arm.noise),
+        settled,
+        tuple(notes),
+        monitored.faults,
+        monitored.fault_seconds,
+    )
+
+
+def _near(detection: Detection) -> Bools:
+    """Rows within :data:`AROUND` of an alarm, shape (T,)."""
+    near = np.zeros(len(detection.t), dtype=np.bool_)
+    for alarm in detection.alarms:
+        near |= (detection.t > alarm.start - AROUND) & (detection.t < alarm.end + AROUND)
+    return near
+
+
+def loudest_joint(found: LogDetection, start: float, end: float) -> int:
+    """Index of the joint whose residual changes most in an alarm, in units of its noise."""
+    detection = found.detection
+    rows = (detection.t >= start - BEFORE) & (detection.t <= end)
+    change = detection.residual[rows] - detection.residual[rows][0]
+    return int(np.argmax((np.abs(change) / found.noise).max(axis=0)))
