@@ -28,7 +28,7 @@ class LogDetection:
 
     detection: Detection
     noise: Array  #: of each joint's residual [N m], to name the loudest joint, shape (n,)
-    watched_from: float  #: [s]; alarms are counted from here on
+    begin: float  #: [s]; alarms are counted from here on
     notes: tuple[str, ...]
     faults: tuple[Span, ...] = ()  #: of the samples themselves; no alarm is looked for in them
     fault_seconds: float = 0.0  #: in which collisions may be missed

@@ -231,7 +231,7 @@ def summary(
     from tauguard.detectors import poisson_rate
     from tauguard.detectors.alarms.log_detection import loudest_joint
 
-    whole = float(trace.t[-1] - found.watched_from)
+    whole = float(trace.t[-1] - found.begin)
     watched = max(whole - found.fault_seconds, trace.dt)
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
