@@ -186,7 +186,7 @@ SPLIT = {
     "individuals": Key(
         several(integer(-1, 2**31), distinct=True), "a list of different seeds, -1 for no mismatch"
     ),
-    "speeds": Key(several(number(0, 100, above=True)), "a list of percentages above 0 to 100"),
+    "speeds": Key(several(number(1, 100, above=True)), "a list of percentages above 1 to 100"),
     "payloads_g": Key(several(number(0, 20_000)), "a list of grams, 0 to 20,000", (0.0,)),
     "struck": Key(number(0, 1), "a fraction, 0 to 1", 0.5),
     "collisions": Key(

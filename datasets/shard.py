@@ -30,7 +30,6 @@ from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.detectors import RobotNumbers, observe
 from tauguard.envs import Simulation, SimulationDiverged
-from tauguard.envs.plant import untimed
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 
@@ -101,8 +100,7 @@ def make_shard(task: ShardTask) -> Done:
         episodes = [planned(configuration, split, n) for n in numbers]
         for arm in {one.arm for one in episodes}:
             check_unchanged(arm, configuration.robots)
-        with untimed():
-            _write(folder, task, configuration, episodes)
+        _write(folder, task, configuration, episodes)
     return Done(task.split, task.number, len(numbers), len(numbers) * split.seconds, kept)
 
 
@@ -212,6 +210,7 @@ def _simulated(
         outcome = "as planned"
         if happened != wanted:
             outcome = f"{happened} of {wanted} planned collisions happened"
+            outcome += "".join(f"; {why}" for why in trace.meta.get("missed", "").splitlines())
         rows = None if residual is None else rounded(RESIDUAL, residual[::every])
         yield one, stored(trace, every), rows, outcome
 

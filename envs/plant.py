@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import mujoco
@@ -13,7 +10,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.models import Drive, Scene, derive
-from tauguard.models.mujoco_library import function_address, library
+from tauguard.models.mujoco_library import function_address, variable_address
 
 
 @dataclass(frozen=True)
@@ -64,18 +61,8 @@ def _home_inertia(scene: Scene) -> Array:
     return np.asarray(np.diag(mass)[scene.dof_adr])
 
 
-@contextlib.contextmanager
-def untimed() -> Iterator[None]:
-    """In this block MuJoCo does not look at the clock in every step (for ``MjData.timer``).
-
-    That is a tenth of a small arm's step. It holds for the whole process.
-    """
-    timer = ctypes.c_void_p.in_dll(library(), "mjcb_time")
-    before, timer.value = timer.value, None
-    try:
-        yield
-    finally:
-        timer.value = before
+# Native code does not let MuJoCo read the clock while it steps.
+_plant.set_clock(variable_address("mjcb_time"))
 
 
 def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) -> _plant.Plant:

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from tauguard.envs.episodes.motions import check_percent
 from tauguard.models import Mismatch, SceneObject
 from tauguard.traces import KINDS
 
@@ -69,7 +70,7 @@ class Episode:
 
     seed: int
     seconds: float = 20.0  #: length [s]
-    speed: float = 30.0  #: percent of the joints' maximum speed
+    speed: float = 30.0  #: percent of the joints' largest speeds, above 1 (no fraction) to 100
     payload_g: float = 0.0  #: carried from the start, not told to the observer [g]
     collisions: tuple[CollisionPlan, ...] = ()
     picks: tuple[PayloadPick, ...] = ()
@@ -88,8 +89,7 @@ class Episode:
                 raise ValueError(f"{name} {value}: expected more than 0 and finite")
         if self.temperature is not None and not math.isfinite(self.temperature):
             raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
-        if not 0 < self.speed <= 100:
-            raise ValueError(f"speed {self.speed}: expected a percentage above 0 and at most 100")
+        check_percent(self.speed)
         loads = [self.payload_g, *(pick.payload_g for pick in self.picks)]
         if not all(0 <= load < math.inf for load in loads):
             raise ValueError("payload_g: expected 0 or more grams")

@@ -81,6 +81,16 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
     return float(max(by_speed.max(), by_acceleration.max(), 0.2))
 
 
+def check_percent(speed: float) -> None:
+    """Raise a ``ValueError`` unless ``speed`` is a percentage that cannot be a fraction."""
+    if not 1 < speed <= 100:
+        hint = f"; for {100 * speed:g} percent say {100 * speed:g}" if 0 < speed <= 1 else ""
+        raise ValueError(
+            f"speed {speed}: expected percent of the largest joint speeds, above 1 and at most 100"
+            f"{hint}"
+        )
+
+
 @dataclass(frozen=True)
 class Workspace:
     """The space in which random motions are drawn."""
@@ -108,16 +118,15 @@ def random_motion(
         rng: source of the waypoints.
         space: joint box, limits, and which poses are allowed.
         seconds: exact length of the motion [s].
-        speed: percent of ``space.max_speed``, above 0 to 100.
+        speed: percent of ``space.max_speed``, above 1 to 100.
         dt: sample interval [s].
         single_joint: fraction of the segments that move one joint only.
         dwell: shortest and longest pause [s].
 
     Raises:
-        ValueError: a speed outside (0, 100].
+        ValueError: a speed outside (1, 100].
     """
-    if not 0 < speed <= 100:
-        raise ValueError(f"speed {speed}: expected a percentage above 0 and at most 100")
+    check_percent(speed)
     points = [_free_point(rng, space)]
     spans: list[float] = []
     dwells = [float(rng.uniform(*dwell))]

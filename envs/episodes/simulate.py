@@ -162,6 +162,8 @@ class Simulation:
         self.striking = Striking(self.scene, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
+        #: Planned collisions that did not come about, and why; filled by :meth:`run`.
+        self.missed: list[str] = []
 
     def run(self) -> Trace:
         """Simulate the whole episode."""
@@ -175,7 +177,9 @@ class Simulation:
             start = max(row, self._row(job.time))
             if isinstance(job, CollisionPlan):
                 start, window = self.striking.carry_out(job, row, start, stop)
-                if window is not None:
+                if isinstance(window, str):
+                    self.missed.append(f"{job.kind} on link {job.link} at {job.time:g} s: {window}")
+                else:
                     injected.append((window.begin * self.episode.timestep, job.kind))
                     self._windows.append(window)
                     start = window.begin + len(window.rollout.q)
@@ -224,6 +228,8 @@ class Simulation:
             wrenches.point[rows] = window.wrenches.point
         tau_ext = labels.external_torque(Poses(scene), rollout.q, wrenches)
         truth = _truth(motion.t, scene, rollout, wrenches, tau_ext, payload, injected)
+        if (merged := len(injected) - len(truth.collisions)) > 0:
+            self.missed.append(f"{merged} within 0.5 s of another on the link: they count as one")
         sensors, rng = scene.drive.sensors, self._sensor_rng
         q, qd, current = rollout.q, rollout.qd, rollout.current
         if sensors is not None:
@@ -248,6 +254,7 @@ class Simulation:
                 "mujoco": mujoco.__version__,
                 **({} if episode.arm == "cura6" else {"arm": episode.arm}),
                 **({"without": ",".join(self._without)} if self._without else {}),
+                **({"missed": "\n".join(self.missed)} if self.missed else {}),
             },
             attachments={
                 "scene.xml": scene.xml,

@@ -12,6 +12,7 @@ from tauguard.envs.episodes.episode import CollisionPlan
 from tauguard.envs.episodes.injection import (
     CLAMP_HOLD,
     LEAD,
+    STRIDE,
     Aim,
     Target,
     clamp_centre,
@@ -78,21 +79,22 @@ class Striking:
 
     def carry_out(
         self, plan: CollisionPlan, row: int, start: int, stop: int
-    ) -> tuple[int, Window | None]:
+    ) -> tuple[int, Window | str]:
         """Run from ``row`` up to the collision's window and carry out the collision there.
 
         Returns:
-            The row before the window, and the window; none if no target fitted.
+            The row before the window, and the window, or why no target fitted.
         """
         lead = 0 if plan.kind == "pulse" else self._row(LEAD)
         tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
         late = replace(plan, time=max(plan.time, (row + lead) * self._dt))
-        at = row
+        at, tried = row, 0
         for attempt in range(TARGETS):
             late = self._relaxed(late, attempt)
             target = self._aim.find(late, self._rng, stop - tail)
             if target is None or target.row + tail > stop or target.row - lead < at:
                 continue
+            tried += 1
             begin = target.row - lead
             self._follow(at, begin)
             at = begin
@@ -102,7 +104,21 @@ class Striking:
                 return begin, window
             self._loop.restore(saved)
         self._follow(at, max(at, start))
-        return max(at, start), None
+        return max(at, start), self._why(
+            plan, tried, (stop - tail - self._row(late.time)) * self._dt
+        )
+
+    def _why(self, plan: CollisionPlan, tried: int, room: float) -> str:
+        """Why a plan did not come about, after ``tried`` targets in so many seconds."""
+        if room < STRIDE:
+            return "no time is left before the next collision or the end of the episode"
+        if not tried:
+            return f"no place on the link offers it within {room:.1f} s"
+        torque, force = plan.severity or (0.0, np.inf), plan.force or (0.0, FORCE_LIMIT)
+        return (
+            f"none of {tried} targets gave {torque[0]:g} to {torque[1]:g} N m at a force of "
+            f"{force[0]:g} to {force[1]:g} N"
+        )
 
     def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
         """The plan as asked, then weaker plans for motions that cannot offer it.

@@ -10,8 +10,8 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.batch import Batch, StepMetrics
-from tauguard.envs.gym.compiled import CompiledScene, compile_scene, region_pressure
+from tauguard.envs.gym.batch import TOUCHES, Batch, StepMetrics
+from tauguard.envs.gym.compiled import CompiledScene, compile_scene
 from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
@@ -106,12 +106,12 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
     ``success``, ``force`` (peak on a link [N]), ``cost`` (peak force on body regions beyond their
-    limits [N]), ``cost_sum`` (of the episode [N]), ``pressure`` (peak mean pressure [N/cm^2], where
-    the keyword ``contact_area`` says the area; else it is 0), ``limit_ratio`` (peak force over the
-    region's transient limit, or its quasi-static one after 0.5 s of contact or where the region
-    cannot move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`),
-    ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong
-    with its samples, "" for nothing), ``onset`` (a collision began in this
+    limits, and of two arms on one another [N]), ``cost_sum`` (of the episode [N]), ``pressure``
+    (peak mean pressure [N/cm^2], where the keyword ``contact_area`` says the area; else it is 0),
+    ``limit_ratio`` (peak force over the region's transient limit, or its quasi-static one after 0.5
+    s of contact or where the region cannot move), ``region`` (of that ratio, 1-based, 0 for none;
+    names in :attr:`regions`), ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the
+    detector (what is wrong with its samples, "" for nothing), ``onset`` (a collision began in this
     step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
     0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
     collision [s] (-1: no alarm, or none yet), ``reason``, why the episode was terminated or cut
@@ -121,7 +121,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     Of each of the k body regions in :attr:`regions`, at its peak: ``region_force`` [N],
     ``region_pressure`` [N/cm^2], ``region_point`` [m] and ``region_direction`` of the force on the
     person, shapes (k,), (k,), (k, 3), (k, 3), zero where nothing touched; without ``contact_area``
-    the pressure is an estimate, see :func:`tauguard.envs.gym.compiled.region_pressure`. With
+    the pressure is an estimate, :attr:`tauguard.envs.gym.compiled.RegionInfo.least_pressure`. With
     checkers, ``contacts`` has the pairs that each reported.
 
     The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
@@ -151,8 +151,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.action_space, self.observation_space = make_spaces(self.batch)
         self._shape, self._area = self.action_space.shape, self.compiled.settings.contact_area
         #: The only copy's rows, views.
-        self._seen, self._row = self.batch.observation[0], self.batch.metrics.view(np.float64)
-        self._tau_ext, self._residual = self.batch.tau_ext[0], self.batch.residual[0]
+        self._seen, self._row = self.batch.observation[0], self.batch.numbers[0]
+        self._arrays = {name: rows[0] for name, rows in shown_arrays(self.batch).items()}
+        self._reward_keys = {name: f"reward_{name}" for name in self.task.terms}
         self._picture: Picture | None = None
         self._no_reward = dict.fromkeys(self.task.terms, 0.0)
         self._begun = False
@@ -200,7 +201,6 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         super().reset(seed=seed)
         self.batch.draw(0, self.np_random, options or {})
         self.task.begin(0, self.np_random)
-        self.batch.cost_sum[0] = 0.0
         self._begun = True
         if self.render_mode == "human":
             self.render()
@@ -215,7 +215,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         if not self._begun:
             raise gymnasium.error.ResetNeeded("call reset before step")
         batch, task = self.batch, self.task
-        values = np.ascontiguousarray(action, dtype=np.float64)
+        values = np.array(action, np.float64)
         if values.shape != self._shape:
             raise ValueError(
                 f"action: shape {values.shape}, expected {self._shape}: "
@@ -284,25 +284,22 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "success": success,
             "force": step.force,
             "cost": step.cost,
-            "cost_sum": batch.cost_sum.item(0),
+            "cost_sum": step.cost_sum,
             "pressure": step.region_force / area if area else 0.0,
             "limit_ratio": step.limit_ratio,
             "region": int(step.region),
-            "tau_ext": self._tau_ext.copy(),
-            "residual": self._residual.copy(),
             "alarm": batch.alarm.item(0),
-            "onset": bool(step.onset),
+            "onset": step.onset != 0.0,
             "onset_time": step.onset_time,
             "link": int(step.link),
-            "fault": batch.faults()[0],
-            "tau_ext_peak": batch.tau_peak[0].copy(),
+            "fault": batch.sensing[0].fault if batch.sensing else "",
             "alarm_delay": batch.alarm_delay.item(0),
             "reason": reason,
-        } | touches(batch, 0)
-        for name, term in rewards.items():
-            info[f"reward_{name}"] = float(term)
-        if batch.checks:
-            info["contacts"] = batch.contacts[0].copy()
+        }
+        for name, row in self._arrays.items():
+            info[name] = row.copy()
+        for key, term in rewards.items():
+            info[self._reward_keys[key]] = term
         return info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -393,15 +390,15 @@ def divergence(compiled: CompiledScene, kind: float) -> str:
     )
 
 
-def touches(batch: Batch, rows: int | slice) -> dict[str, Array]:
-    """Force, pressure, point and direction of each body region at its peak."""
-    peak = batch.peak[rows].copy()
-    return {
-        "region_force": peak["force"],
-        "region_pressure": region_pressure(batch.compiled, peak["force"]),
-        "region_point": peak["point"],
-        "region_direction": peak["direction"],
+def shown_arrays(batch: Batch) -> dict[str, Array]:
+    """The arrays of ``info``, a row a copy."""
+    found = {
+        "tau_ext": batch.tau_ext,
+        "residual": batch.residual,
+        "tau_ext_peak": batch.tau_peak,
+        **{name: getattr(batch, name) for name in TOUCHES},
     }
+    return found | {"contacts": batch.contacts} if batch.checks else found
 
 
 def frame_rate(compiled: CompiledScene) -> dict[str, Any]:

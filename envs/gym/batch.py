@@ -18,6 +18,7 @@ from tauguard.envs.gym.compiled import CompiledScene, RegionInfo
 from tauguard.envs.gym.people import REACHES, WALKS, anatomy, draw_script
 from tauguard.envs.gym.placing import check_clear
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
+from tauguard.envs.gym.second_arm import ARMS
 from tauguard.envs.gym.sensing import Sensing, listening
 from tauguard.envs.gym.settings import CONTROLS
 from tauguard.envs.gym.step_checks import StepChecks
@@ -43,6 +44,7 @@ class StepMetrics(NamedTuple):
     region: Any  #: of the largest ratio, 1-based; 0: none
     diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
     speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
+    cost_sum: Any  #: of the costs of the episode's actions so far [N]
 
 
 #: The same fields as columns of :attr:`Batch.metrics`.
@@ -52,11 +54,8 @@ METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
 CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
 #: Where a body is [m]; its orientation as w, x, y, z.
 POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
-#: Of a body region over an action: force [N], point [m], direction of the force on the person.
-PEAK = np.dtype([("force", "f8"), ("point", "f8", 3), ("direction", "f8", 3)])
 assert METRICS.itemsize == 8 * _plant.METRICS
 assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
-assert PEAK.itemsize == 8 * _plant.PEAK_WIDTH
 
 
 class Override(IntEnum):
@@ -68,14 +67,16 @@ class Override(IntEnum):
     BRAKE = 3  #: no power, and brakes
 
 
+#: What an action did to each body region, names of :class:`Batch`'s arrays and of ``info``.
+TOUCHES = ("region_force", "region_pressure", "region_point", "region_direction")
 #: A snapshot holds MuJoCo's integration state, derived fields that are read before the next physics
 #: step, and the rows of a copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
-    "observation", "metrics", "tau_ext", "residual", "alarm", "target", "contacts",
-    "q", "qd", "current", "tau", "contact", "region", "tau_peak", "peak", "alarm_delay",
-    "alarm_last", "cost_sum", "reaches", "walks",
+    "observation", "numbers", "tau_ext", "residual", "alarm", "target", "contacts",
+    "q", "qd", "current", "tau", "contact", "region", "tau_peak", *TOUCHES, "alarm_delay",
+    "alarm_last", "reaches", "walks",
 )  # fmt: skip
 #: An alarm later than this after the onset does not detect it [s].
 LATEST = 0.5
@@ -86,7 +87,8 @@ class Batch:
 
     Attributes:
         observation: shape (rows, size).
-        metrics: of the last action, by the names of :class:`StepMetrics`, shape (rows,).
+        numbers: of the last action, a column for each field of :class:`StepMetrics`.
+        metrics: the same by name, shape (rows,).
         tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
         tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
         target: of the tools [m], shape (rows, arms, 3).
@@ -94,15 +96,14 @@ class Batch:
         alarm: of the detector, shape (rows,).
         alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
         contacts: pairs that each checker reported during the last action, shape (rows, checkers).
-        cost_sum: of the episode's actions so far [N], shape (rows,).
         q, qd, current, tau: positions, velocities, motor currents [A] and external torque [N m] at
             every physics step of the last action, shape (rows, substeps, n).
         contact: what touched the arm at every physics step, by the names of :data:`CONTACT`, shape
             (rows, substeps).
         region: where the body regions were, by the names of :data:`POSE`, shape (rows, substeps,
             regions).
-        peak: of each body region, by the names of :data:`PEAK`, zero without a touch, shape (rows,
-            regions).
+        region_force, region_pressure, region_point, region_direction: of each body region at its
+            peak over the action [N, N/cm^2, m], shapes (rows, regions) and (rows, regions, 3).
         reaches, walks: what people do, person after person, see
             :func:`tauguard.envs.gym.people.draw_script`.
         drawn: what differs from the scene in each copy's episode, by name.
@@ -115,8 +116,8 @@ class Batch:
         self.actions: list[Entry] = action_table(compiled)
         n, steps = len(compiled.scene.joint_names), compiled.settings.substeps
         self.observation = np.zeros((rows, len(self.observations)))
-        self.metrics = np.zeros(rows, METRICS)
-        self._cost = self.metrics["cost"]
+        self.numbers = np.zeros((rows, len(StepMetrics._fields)))
+        self.metrics = self.numbers.view(METRICS)[:, 0]
         self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
         self.alarm = np.zeros(rows, dtype=np.bool_)
         self.target = np.zeros((rows, compiled.arms, 3))
@@ -125,10 +126,10 @@ class Batch:
         regions = len(compiled.regions)
         self.region = np.zeros((rows, steps, regions), POSE)
         self.tau_peak = np.zeros((rows, n))
-        self.peak = np.zeros((rows, regions), PEAK)
+        self.region_force, self.region_pressure = (np.zeros((rows, regions)) for _ in range(2))
+        self.region_point, self.region_direction = (np.zeros((rows, regions, 3)) for _ in range(2))
         self.alarm_delay = np.full(rows, -1.0)
         self.alarm_last = np.zeros(rows, dtype=np.bool_)
-        self.cost_sum = np.zeros(rows)
         self.drawn: list[dict[str, Array]] = [{} for _ in range(rows)]
         people = max(1, len(compiled.people))
         self.reaches = np.zeros((rows, 2 * people, REACHES, _plant.REACH_WIDTH))
@@ -250,7 +251,6 @@ class Batch:
             self._checked_step(i, action)
         else:
             self.plants[i].step(action)
-        self.cost_sum[i] += self._cost[i]
         if self.sensing is not None:
             self._sense(i, rng)
 
@@ -263,7 +263,6 @@ class Batch:
                 self._checked_step(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
-        self.cost_sum[mask] += self._cost[mask]
         if self.sensing is not None:
             for i in np.flatnonzero(mask):
                 self._sense(int(i), rngs[i])
@@ -319,7 +318,7 @@ class Batch:
         plant = make_plant(scene, compiled.nominal, compiled.gains, data)
         rows = _plant.Rows(
             observation=self.observation[i],
-            metrics=_numbers(self.metrics, i),
+            metrics=self.numbers[i],
             tau_ext=self.tau_ext[i],
             target=self.target[i],
             q=self.q[i],
@@ -329,7 +328,7 @@ class Batch:
             contact=_numbers(self.contact, i),
             region=_numbers(self.region, i),
             tau_peak=self.tau_peak[i],
-            peak=_numbers(self.peak, i),
+            **{name: getattr(self, name)[i] for name in TOUCHES},
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
@@ -387,6 +386,7 @@ def _surroundings(
         people_begin=len(scene.spec.proxies),
         people=[anatomy(person) for person in people],
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
+        arms_sensor=_sensor(model, ARMS) if labels and compiled.arms == 2 else -1,
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],
     )
@@ -406,6 +406,8 @@ def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:
         transient=region.transient,
         span=region.span,
         speed=region.speed,
+        area=compiled.settings.contact_area or 0.0,
+        least_pressure=region.least_pressure,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -66,6 +65,15 @@ class RegionInfo:
     speed: float  #: [m/s]
     unconfirmed: tuple[str, ...]  #: values that no open source confirmed
 
+    @property
+    def least_pressure(self) -> float:
+        """Mean pressure of a flat surface on a round region [N/cm^2], where no area is known.
+
+        The surface touches it in a circle, at the depth that its stiffness allows: pi radius F / k
+        (Hertz' geometry). The estimate is low, since a robot's edge presses harder.
+        """
+        return self.stiffness / (np.pi * self.radius) / 1e4
+
 
 @dataclass(frozen=True)
 class ForceBound:
@@ -114,11 +122,6 @@ class CompiledScene:
     def person(self) -> Person | None:
         """The first of the people."""
         return self.people[0] if self.people else None
-
-    @functools.cached_property
-    def least_pressure(self) -> Array:
-        """Of a touch of each region by a flat surface [N/cm^2], see :func:`region_pressure`."""
-        return np.array([r.stiffness / (np.pi * r.radius) for r in self.regions]) / 1e4
 
     def shown(self) -> mujoco.MjModel:
         """The scene with visual shapes; bodies, joints and flexes have the same ids."""
@@ -346,18 +349,6 @@ def _path_speed(obj: SceneObject) -> float:
     rows = np.array(obj.path)
     steps = np.diff(rows, axis=0)
     return float((np.linalg.norm(steps[:, 1:], axis=1) / steps[:, 0]).max())
-
-
-def region_pressure(compiled: CompiledScene, force: Array) -> Array:
-    """Mean pressure on each body region [N/cm^2] under forces of shape (..., k) [N].
-
-    The area is the setting ``contact_area`` if it is given. Otherwise it is the circle in which
-    a flat surface touches a round region at the depth that its stiffness allows, pi radius F / k
-    (Hertz' geometry). This pressure is a low estimate, since a robot's edge presses harder.
-    """
-    if compiled.settings.contact_area is not None:
-        return force / compiled.settings.contact_area
-    return np.where(force > 0, compiled.least_pressure, 0.0)
 
 
 def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:

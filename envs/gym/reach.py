@@ -130,7 +130,7 @@ class Reach(Task):
         """Progress and bonus; never over by itself. The memory is the last distance [m]."""
         reached = step.distance < self.tolerance
         rewards = {"progress": memory - step.distance, "target": BONUS * reached}
-        return Outcome(rewards, success=reached, memory=step.distance)
+        return Outcome(rewards, reached, step.distance)
 
     def after(self, i: int, rng: np.random.Generator) -> None:
         """The next target."""
@@ -152,7 +152,8 @@ class CarefulReach(Reach):
         """As :class:`Reach`, less the force over :data:`CONTACT_FORCE`, at most 1, a second."""
         outcome = super().score(step, memory)
         period = 1 / self.batch.compiled.settings.control_rate
-        outcome.rewards["contact"] = -period * np.minimum(step.force / CONTACT_FORCE, 1.0)
+        hard = step.force / CONTACT_FORCE
+        outcome.rewards["contact"] = -period * (hard - (hard - 1.0) * (hard > 1.0))
         return outcome
 
 

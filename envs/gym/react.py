@@ -117,7 +117,7 @@ class React(Task):
             "impulse": -IMPULSE_PRICE * period * step.limit_ratio,
             "time": -TIME_PRICE * period + 0.0 * step.distance,
         }
-        return Outcome(rewards, success=done, memory=step.distance, terminated=done | hurt)
+        return Outcome(rewards, done, step.distance, done | hurt)
 
 
 def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:

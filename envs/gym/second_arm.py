@@ -16,6 +16,8 @@ from tauguard.models.scene import _add_label, label_region, lean_model, people_p
 
 #: The second arm stands so far ahead of the first [m] and faces it.
 APART = 1.1
+#: Sensor of the force between the arms.
+ARMS = "contact_arms"
 
 
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
@@ -49,6 +51,8 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0
             _add_label(whole, link, f"contact_link{i}")
         for name in region_names(scene.spec):
             label_region(whole, scene.spec, name)
+        base = scene.model.body(int(scene.link_bodies[0])).name
+        _add_label(whole, SECOND + base, ARMS, subtree=True, against=base)
     parts: dict[str, Springy] = {proxy.region: proxy for proxy in scene.spec.proxies}
     parts |= {part.name: part for part in people_parts(scene.spec)}
     parts |= {

@@ -21,7 +21,7 @@ from tauguard.envs.gym.base import (
     divergence,
     frame_rate,
     make_spaces,
-    touches,
+    shown_arrays,
 )
 from tauguard.envs.gym.batch import StepMetrics
 from tauguard.envs.gym.randomization import check_options
@@ -72,7 +72,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         self.single_action_space, self.single_observation_space = make_spaces(self.batch)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._limit = max_episode_steps
+        self._limit, self._arrays = max_episode_steps, shown_arrays(self.batch)
         self._elapsed = np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: list[np.random.Generator] = [seeding.np_random(None)[0]] * num_envs
@@ -121,7 +121,6 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
         self.batch.draw(i, self._rngs[i], stated)
         self.task.begin(i, self._rngs[i])
-        self.batch.cost_sum[i] = 0.0
         self._elapsed[i], self._over[i] = 0, False
 
     def step(  # type: ignore[override]
@@ -193,8 +192,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
 
     def _metrics(self) -> StepMetrics:
         """The results of the last action, as copies that the next action does not overwrite."""
-        table = self.batch.metrics.copy()
-        return StepMetrics(*(table[name] for name in StepMetrics._fields))
+        return StepMetrics(*self.batch.numbers.T.copy())
 
     def _no_reward(self) -> dict[str, Array]:
         return {name: np.zeros(self.num_envs) for name in self.task.terms}
@@ -210,24 +208,19 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "success": success.copy(),
             "force": step.force,
             "cost": step.cost,
-            "cost_sum": batch.cost_sum.copy(),
+            "cost_sum": step.cost_sum,
             "pressure": step.region_force / area if area else np.zeros(self.num_envs),
             "limit_ratio": step.limit_ratio,
             "region": step.region.astype(np.int64),
-            "tau_ext": batch.tau_ext.copy(),
-            "residual": batch.residual.copy(),
             "alarm": batch.alarm.copy(),
             "onset": step.onset != 0,
             "onset_time": step.onset_time,
             "link": step.link.astype(np.int64),
             "fault": np.array(batch.faults(), dtype=object),
-            "tau_ext_peak": batch.tau_peak.copy(),
             "alarm_delay": batch.alarm_delay.copy(),
             "reason": reason,
-        } | touches(batch, slice(None))
+        } | {name: rows.copy() for name, rows in self._arrays.items()}
         infos |= {f"reward_{name}": term for name, term in terms.items()}
-        if batch.checks:
-            infos["contacts"] = batch.contacts.copy()
         for key in list(infos):
             infos[f"_{key}"] = mask.copy()
         return infos

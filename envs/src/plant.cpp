@@ -10,8 +10,10 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
@@ -72,10 +74,35 @@ void check_action(const Plant& p, Vector action) {
   check(action.data(), action.shape(0), 0);
 }
 
+// While one lives, MuJoCo does not read the clock for `MjData.timer`: a tenth of a small arm's
+// step. The function that it calls instead may be called by anybody, at any time.
+class Untimed {
+ public:
+  using Clock = double (*)();
+  static inline Clock* clock = nullptr;  // mjcb_time
+
+  Untimed() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (clock && users_++ == 0) before_ = std::exchange(*clock, [] { return 0.0; });
+  }
+  ~Untimed() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (clock && --users_ == 0) *clock = before_;
+  }
+  Untimed(const Untimed&) = delete;
+  Untimed& operator=(const Untimed&) = delete;
+
+ private:
+  static inline std::mutex mutex_;
+  static inline int users_ = 0;
+  static inline Clock before_ = nullptr;
+};
+
 void step_one(Plant& p, Vector action) {
   check_action(p, action);
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;
+  const Untimed untimed;
   p.step(action.data());
 }
 
@@ -92,6 +119,7 @@ void step_all(const std::vector<Plant*>& plants, Matrix actions,
   }
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;
+  const Untimed untimed;
   tauguard::geometry::ThreadPool::shared().parallel_for(
       n, threads, 1, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i)
@@ -112,6 +140,7 @@ std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix 
   track.wrench_body = wrench_body;
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;
+  const Untimed untimed;
   return p.follow({q_des.data(), qd_des.data(), tau_ff.data(), p.joints()}, rows, track);
 }
 
@@ -219,18 +248,19 @@ void bind_surroundings(nb::module_& m) {
       .def(
           "__init__",
           [](Region* self, int body, int joint, int qpos, int dof, int mocap, bool held, int sensor,
-             double quasi_static, double transient, double span, double speed) {
-            new (self) Region{body,   joint,        qpos,      dof,  mocap, held,
-                              sensor, quasi_static, transient, span, speed};
+             double quasi_static, double transient, double span, double speed, double area,
+             double least_pressure) {
+            new (self) Region{body,         joint,     qpos, dof,   mocap, held,          sensor,
+                              quasi_static, transient, span, speed, area,  least_pressure};
           },
           nb::kw_only(), "body"_a, "joint"_a, "qpos"_a, "dof"_a, "mocap"_a, "held"_a, "sensor"_a,
-          "quasi_static"_a, "transient"_a, "span"_a, "speed"_a);
+          "quasi_static"_a, "transient"_a, "span"_a, "speed"_a, "area"_a, "least_pressure"_a);
   nb::class_<Surroundings>(m, "Surroundings")
       .def(
           "__init__",
           [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
              std::vector<Region> regions, int people_begin, const std::vector<Anatomy>& people,
-             int sensor_begin, Numbers low, Numbers high) {
+             int sensor_begin, int arms_sensor, Numbers low, Numbers high) {
             if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
             new (self) Surroundings{
                 Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
@@ -240,10 +270,11 @@ void bind_surroundings(nb::module_& m) {
                 std::vector<Person>(people.begin(), people.end()),
                 std::move(low),
                 std::move(high),
-                sensor_begin};
+                sensor_begin,
+                arms_sensor};
           },
           nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "people_begin"_a,
-          "people"_a, "sensor_begin"_a, "low"_a, "high"_a);
+          "people"_a, "sensor_begin"_a, "arms_sensor"_a, "low"_a, "high"_a);
 }
 
 void bind_outputs(nb::module_& m) {
@@ -251,15 +282,18 @@ void bind_outputs(nb::module_& m) {
       "__init__",
       [](Rows* self, Array observation, Array metrics, Array tau_ext, Array target, Array q,
          Array qd, Array current, Array tau, Array contact, Array region, Array tau_peak,
-         Array peak, Array reaches, Array walks) {
+         Array region_force, Array region_pressure, Array region_point, Array region_direction,
+         Array reaches, Array walks) {
+        const Touched touched{held(region_force), held(region_pressure), held(region_point),
+                              held(region_direction)};
         new (self)
             Rows{held(observation), held(metrics), held(tau_ext), held(target),  held(q),
                  held(qd),          held(current), held(tau),     held(contact), held(region),
-                 held(tau_peak),    held(peak),    held(reaches), held(walks)};
+                 held(tau_peak),    touched,       held(reaches), held(walks)};
       },
       nb::kw_only(), "observation"_a, "metrics"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
-      "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "peak"_a, "reaches"_a,
-      "walks"_a);
+      "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "region_force"_a,
+      "region_pressure"_a, "region_point"_a, "region_direction"_a, "reaches"_a, "walks"_a);
   nb::class_<Track>(m, "Track")
       .def(
           "__init__",
@@ -340,7 +374,7 @@ void bind_plant(nb::module_& m) {
             p.begin(action.data());
           },
           "action"_a)
-      .def("run", &Plant::run, "steps"_a, nb::call_guard<nb::gil_scoped_release>())
+      .def("run", &Plant::run, "steps"_a, nb::call_guard<nb::gil_scoped_release, Untimed>())
       .def("finish", &Plant::finish)
       .def("refresh", &Plant::refresh)
       .def(
@@ -378,11 +412,14 @@ NB_MODULE(_plant, m) {
   bind_surroundings(m);
   bind_outputs(m);
   bind_plant(m);
+  m.def(
+      "set_clock",
+      [](std::uintptr_t address) { Untimed::clock = reinterpret_cast<Untimed::Clock*>(address); },
+      "address"_a);
   m.def("step_all", &step_all, "plants"_a, "actions"_a, "mask"_a, "threads"_a);
   m.def("poses", &poses, "physics"_a, "qpos"_a, "q"_a, "bodies"_a, "joints"_a, nb::kw_only(),
         "position"_a, "rotation"_a, "anchor"_a, "axis"_a);
   m.attr("CONTACT_WIDTH") = contact_width;
-  m.attr("PEAK_WIDTH") = peak_width;
   m.attr("REACH_WIDTH") = reach_width;
   m.attr("WALK_WIDTH") = walk_width;
   m.attr("PERSON_SEGMENTS") = person_segments;

@@ -92,6 +92,7 @@ class Plant {
     for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
     controls.reset(q_);
     finish();
+    rows_.result().cost_sum = 0;
   }
 
   void begin(const double* action) {
@@ -134,6 +135,7 @@ class Plant {
       observe();
     }
     report();
+    rows_.result().cost_sum += contact_.cost;
   }
 
   void step(const double* action) {
@@ -312,7 +314,7 @@ class Plant {
 
   void clear_peaks() {
     std::fill_n(rows_.tau_peak.data(), joints(), 0.0);
-    std::fill_n(rows_.peak.data(), peak_width * around_.regions.size(), 0.0);
+    rows_.touched.clear();
   }
 
   // Over the last physics step; the row has where the regions were before it.
@@ -356,7 +358,9 @@ class Plant {
     double* peak = rows_.tau_peak.data();
     for (std::size_t i = 0; i < n; ++i)
       if (std::fabs(tau[i]) > std::fabs(peak[i])) peak[i] = tau[i];
-    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_, rows_.peak.data());
+    const double* arms = physics_.sensors() + around_.arms_sensor;
+    const double between = around_.arms_sensor < 0 || arms[0] == 0 ? 0.0 : norm(load(arms + 1));
+    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_, rows_.touched, between);
   }
 
   // Whether the arm can exert the largest force so far; a solver that fails reports any number.

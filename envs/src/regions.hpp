@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kinematics.hpp"
+#include "physics.hpp"
 
 namespace tauguard::envs {
 
@@ -20,12 +21,22 @@ struct Region {
   int sensor = -1;                         // address of its ten contact numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no impact is allowed
   double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
+  double area = 0;             // of the robot's contact surface [cm^2]; 0: unknown
+  double least_pressure = 0;   // of a flat surface, where the area is unknown [N/cm^2]
   double touching = 0;         // unbroken contact so far [s]
   double force = 0;            // at the last physics step [N]
 };
 
-// A row of a region's peak over an action: force [N], point [m], direction of the force on it.
-constexpr int peak_width = 7;
+// Of each region at its peak over an action: force [N], pressure [N/cm^2], point [m], direction of
+// the force on it.
+struct Touched {
+  Held force, pressure, point, direction;
+
+  void clear() const {
+    for (const Held* h : {&force, &pressure, &point, &direction})
+      std::fill_n(h->data(), h->size(), 0.0);
+  }
+};
 
 // The largest values over one control step, and what lasts longer.
 struct Contact {
@@ -92,10 +103,11 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
 // Reads the regions' contact sensors. An impact counts against the transient limit, unbroken
 // contact beyond half a second and a region that cannot move away against the quasi-static one.
 // Where no impact is allowed the whole force is cost, and the ratio is against the quasi-static
-// limit.
+// limit. `between` is the force between two arms, which are never meant to touch: all of it is
+// cost.
 inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c,
-                         double* peaks) {
-  double cost = 0;
+                         const Touched& peak, double between) {
+  double cost = between;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Region& r = regions[i];
     const double* s = sensors + r.sensor;
@@ -111,12 +123,13 @@ inline void read_regions(std::vector<Region>& regions, const double* sensors, do
     const double ratio = force / (limit > 0 ? limit : r.quasi_static);
     cost += std::max(0.0, force - limit);
     c.region_force = std::max(c.region_force, force);
-    double* peak = peaks + peak_width * i;
-    if (force > peak[0]) {
+    if (force > peak.force.data()[i]) {
       const Vec3 direction = (-1.0 / force) * load(s + 1);
-      peak[0] = force;
-      std::copy(s + 7, s + 10, peak + 1);
-      peak[4] = direction.x, peak[5] = direction.y, peak[6] = direction.z;
+      double* d = peak.direction.data() + 3 * i;
+      peak.force.data()[i] = force;
+      peak.pressure.data()[i] = r.area > 0 ? force / r.area : r.least_pressure;
+      std::copy(s + 7, s + 10, peak.point.data() + 3 * i);
+      d[0] = direction.x, d[1] = direction.y, d[2] = direction.z;
     }
     if (ratio > c.ratio) {
       c.ratio = ratio;

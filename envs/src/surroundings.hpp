@@ -14,7 +14,7 @@ namespace tauguard::envs {
 // What one action came to, as numbers; Python's StepMetrics has the same fields in this order.
 struct Metrics {
   double time, distance, force, cost, limit_ratio, region_force;
-  double onset, onset_time, link, region, diverged, speed_ratio;
+  double onset, onset_time, link, region, diverged, speed_ratio, cost_sum;
 };
 constexpr std::size_t metrics_width = sizeof(Metrics) / sizeof(double);
 
@@ -27,6 +27,7 @@ struct Surroundings {
   std::vector<Person> people;
   std::vector<double> low, high;  // of the observation
   int sensor_begin = -1;          // of the links' contact sensors; -1: none
+  int arms_sensor = -1;           // of what two arms do to one another; -1: none
 };
 
 // Where an environment's results go: rows of arrays that Python owns.
@@ -34,7 +35,8 @@ struct Rows {
   Held observation, metrics, tau_ext, target;
   Held q, qd, current, tau;  // physics steps x joints
   Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
-  Held tau_peak, peak;       // joints; regions x peak_width
+  Held tau_peak;             // joints
+  Touched touched;           // of the regions
   Held reaches, walks;       // the people's scripts: hands x rows x reach_width, rows x walk_width
 
   Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }

@@ -22,7 +22,6 @@ from tauguard.datasets.schedule import Planned, planned
 from tauguard.datasets.shard import residual_of, writing
 from tauguard.detectors import RobotNumbers
 from tauguard.envs import Simulation
-from tauguard.envs.plant import untimed
 from tauguard.models import pin_model
 from tauguard.report import Row
 
@@ -79,24 +78,23 @@ def rate_rows(quick: bool, seed: int) -> list[Row]:
 def timed_parts(one: Planned) -> dict[str, float]:
     """Processor seconds of each part and of the rollout, and samples, of one episode."""
     spent = dict.fromkeys(PARTS, 0.0)
-    with untimed():
-        with clock(spent, "prepare"):
-            simulation = Simulation(one.episode)
-        striking: Any = simulation.striking
-        count_time(spent, "steps", simulation.loop, "run")
-        count_time(spent, "targets", striking._aim, "find")
-        with clock(spent, "labels"):
-            trace = simulation.run()
-        spent["labels"] -= spent["steps"] + spent["targets"]
-        with clock(spent, "observer"):
-            robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
-            residual = residual_of(trace, robot, simulation.nominal)
-        like = schema(len(trace.joint_names), True)
-        with clock(spent, "writing"):
-            rows = stored(trace, 1)
-            shard = columns_of_shards.table(rows, one.number, rounded(RESIDUAL, residual), like)
-            with pq.ParquetWriter(io.BytesIO(), like, **writing(like)) as writer:
-                writer.write_table(shard, len(trace.t))
+    with clock(spent, "prepare"):
+        simulation = Simulation(one.episode)
+    striking: Any = simulation.striking
+    count_time(spent, "steps", simulation.loop, "run")
+    count_time(spent, "targets", striking._aim, "find")
+    with clock(spent, "labels"):
+        trace = simulation.run()
+    spent["labels"] -= spent["steps"] + spent["targets"]
+    with clock(spent, "observer"):
+        robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
+        residual = residual_of(trace, robot, simulation.nominal)
+    like = schema(len(trace.joint_names), True)
+    with clock(spent, "writing"):
+        rows = stored(trace, 1)
+        shard = columns_of_shards.table(rows, one.number, rounded(RESIDUAL, residual), like)
+        with pq.ParquetWriter(io.BytesIO(), like, **writing(like)) as writer:
+            writer.write_table(shard, len(trace.t))
     seen: Any = simulation._rollout
     peer, error = rollout_pieces(simulation, seen.q, seen.qd)
     return {**spent, "rollout": peer, "error": error, "samples": float(len(trace.t))}

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tauguard.cli.simulate import described
+from tauguard.datasets import write_dataset
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, simulate
 from tauguard.envs.episodes import labels
 from tauguard.envs.episodes.poses import Poses
-from tauguard.envs.plant import untimed
 from tauguard.models import Mismatch, SceneSpec, compose
-from tauguard.traces import STRATA
+from tauguard.traces import STRATA, read_mcap
 
 KINDS = ("strike", "pulse", "clamp")
 
@@ -109,6 +110,25 @@ def test_pulse_truth_is_the_applied_generalised_force():
     np.testing.assert_allclose(got, expected[run.scene.dof_adr], atol=1e-12)
 
 
+def test_planned_collisions_that_did_not_come_about_say_why(tmp_path, capsys):
+    plans = (
+        CollisionPlan("strike", 1.0, 4),
+        CollisionPlan("strike", 1.1, 3),
+        CollisionPlan("clamp", 3.5, 3, severity=(500.0, 600.0)),
+    )
+    episode = Episode(seed=1, seconds=4.0, collisions=plans)
+    (path,) = write_dataset([episode], tmp_path, workers=1)
+    assert len(read_mcap(path).truth.collisions) == 1
+    row = described(path, episode)
+    assert (row["planned"], row["collisions"]) == (3, 1)
+    first, second = row["missed"]
+    assert first.startswith("strike on link 4 at 1 s: no time is left before the next collision")
+    assert second.startswith("clamp on link 3 at 3.5 s: no")
+    out = capsys.readouterr().out
+    assert "1 of 3 planned collisions" in out
+    assert first in out
+
+
 def test_a_payload_is_not_a_collision():
     episode = Episode(seed=6, seconds=4.0, picks=(PayloadPick(2.0, 4039.0),))
     trace = simulate(episode)
@@ -142,7 +162,8 @@ def test_labels_merge_gaps_below_half_a_second():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"speed": 0}, "percentage above 0"),
+        ({"speed": 0}, "above 1 and at most 100"),
+        ({"speed": 0.3}, "for 30 percent say 30"),
         ({"seconds": -1}, "more than 0"),
         ({"payload_g": -5}, "0 or more grams"),
         ({"picks": (PayloadPick(99.0, 1.0),)}, "outside the episode"),
@@ -189,13 +210,11 @@ def test_external_torque_is_that_of_mujocos_jacobians(seed):
 
 
 def test_mujoco_keeps_its_clock_after_a_run_without_it():
-    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
-    data = mujoco.MjData(model)
-    with untimed():
-        mujoco.mj_step(model, data)
-        assert data.timer[0].duration == 0
-    mujoco.mj_step(model, data)
-    assert data.timer[0].duration > 0
+    run = Simulation(Episode(seed=1, seconds=0.5))
+    run.run()
+    assert run.loop.data.timer[0].duration == 0
+    mujoco.mj_step(run.loop.model, run.loop.data)
+    assert run.loop.data.timer[0].duration > 0
 
 
 def test_drives_without_losses_part_by_part_are_ideal_drives():

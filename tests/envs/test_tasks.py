@@ -176,7 +176,11 @@ def test_two_arms_push_one_another_with_equal_and_opposite_forces():
             checked += 1
         if checked > 20:
             break
+        both = {int(model.body_rootid[model.geom_bodyid[g]]) for g in data.contact.geom.ravel()}
+        if data.ncon and len(both) == 2 and 0 not in both:  # nothing but the arms
+            assert info["cost"] == pytest.approx(info["force"], rel=0.5)
     assert checked > 20
+    assert info["cost_sum"] > 0
 
 
 def test_two_arms_use_the_same_arm_twice():

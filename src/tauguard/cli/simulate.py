@@ -96,17 +96,21 @@ def described(path: Path, episode: Episode) -> dict[str, object]:
     trace = read_mcap(path)
     found = trace.truth.collisions if trace.truth else ()
     contacts = {one.checker: len(one) for one in trace.contacts}
+    planned, missed = len(episode.collisions), trace.meta.get("missed", "").splitlines()
     print(
         f"{path.name}  {episode.seconds:6.1f} s  {episode.speed:5.1f} %  "
-        f"{episode.payload_g:6.0f} g  {len(found)} collisions"
+        f"{episode.payload_g:6.0f} g  {len(found)} of {planned} planned collisions"
         + "".join(f"  {name}: {count} contacts" for name, count in contacts.items())
+        + "".join(f"\n    not {why}" for why in missed)
     )
     return {
         "file": path.name,
         "seconds": episode.seconds,
         "speed": episode.speed,
         "payload_g": episode.payload_g,
+        "planned": planned,
         "collisions": len(found),
+        "missed": missed,
         **{f"contacts_{name}": count for name, count in contacts.items()},
         "peak_tau": max((c.peak_tau for c in found), default=0.0),
     }
