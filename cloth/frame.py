@@ -15,16 +15,15 @@ class FrameStats:
     """Counts and times of a frame.
 
     Attributes:
-        vf: Counts of the vertex-face side, in the order in which work is left out: ``node_tests``,
-            ``front`` (entries kept for the next frame), ``leaf_pairs``; pairs of features left out
-            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them were
-            apart on an axis (``axes``: asked where the volumes sweep the step), how many the
-            cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
-            how many touch ``at_start``; how many were decided while ``sliding`` on a plane across
-            an axis; how many were ``resolved`` one by one, cut into how many ``intervals`` of time;
-            how many ``exact`` arithmetic decided, and of these with integers of any length
-            (``long_exact``), the others with integers of fixed width; ``hits``.
-        ee: The same of the edge-edge side.
+        vf: Counts of the vertex-face side. Broad phase: ``node_tests``; ``front``, entries kept
+            for the next frame; ``leaf_pairs``; pairs left out because they share a vertex
+            (``adjacent``) or their groups never touch (``kept_apart``); ``candidates``. Candidates
+            without contact: ``axes`` (apart on an axis; counted with sweeping volumes only),
+            ``cubic_sign`` (the cubic has no root), ``roots`` (no contact at a root). Decided in
+            other ways: ``at_start`` (touch at the start), ``sliding`` (on a plane across an axis),
+            ``resolved`` (one by one, in ``intervals`` pieces of time), ``exact`` (in exact
+            arithmetic; ``long_exact`` of them with integers of any length). ``hits``: collisions.
+        ee: The same counts of the edge-edge side.
         seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
             ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),
             ``total``; and ``vf_narrow``, ``ee_narrow``: the narrow phase alone, summed over

@@ -30,7 +30,7 @@ METHODS: dict[str, int] = {"ab2pf": 0, "exact": 1}
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """First contacts, one a row.
+    """First contacts, one per row.
 
     Attributes:
         hit: Shape (N,).

@@ -91,35 +91,35 @@ class MeshCCD:
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Rows of vertices, an own copy, read-only; ``Frame.vf`` counts them. Shape (F, 3)."""
+        """Faces as rows of vertices, read-only; ``Frame.vf`` refers to them. Shape (F, 3)."""
         return self._topology.faces
 
     @property
     def edges(self) -> NDArray[np.int32]:
-        """Edges of faces and the given ones, each once, smaller vertex first, read-only.
+        """Edges of the faces and the given ones, each once, smaller vertex first, read-only.
 
-        ``Frame.ee`` counts them. Shape (E, 2).
+        ``Frame.ee`` refers to them. Shape (E, 2).
         """
         return self._topology.edges
 
     @property
     def points(self) -> NDArray[np.int32]:
-        """The given points that no face or edge has. Shape (P,)."""
+        """The given points that belong to no face or edge. Shape (P,)."""
         return self._topology.isolated.points
 
     @property
     def groups(self) -> Groups | None:
-        """Which parts meet, as given."""
+        """The groups, as given."""
         return self._topology.groups
 
     @property
     def method(self) -> str:
-        """How the narrow phase decides."""
+        """The narrow phase."""
         return self._method
 
     @property
     def threads(self) -> int:
-        """At least 1."""
+        """The number of threads, at least 1."""
         return self._threads
 
     @property

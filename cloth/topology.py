@@ -31,7 +31,7 @@ class Isolated:
     def of(
         faces: NDArray[np.int32], edges: ArrayLike, points: ArrayLike, groups: Groups | None
     ) -> Isolated:
-        """Check both lists; leave out edges of faces, and vertices of faces or edges.
+        """Check both lists and remove edges that a face has, and vertices that a face or edge has.
 
         Raises:
             ValueError: not (L, 2) or (P,) integers from 0, an edge between equal vertices, an edge
@@ -53,7 +53,7 @@ class Isolated:
         )
 
     def rows(self) -> NDArray[np.int32]:
-        """As faces without area, for the kernel: (a, b, b) of an edge, (p, p, p) of a point."""
+        """Faces without area, as the kernel takes them: edges (a, b, b), points (p, p, p)."""
         return np.concatenate([self.edges[:, [0, 1, 1]], np.repeat(self.points, 3).reshape(-1, 3)])
 
 
@@ -99,7 +99,7 @@ class Topology:
         self._vertices = start
 
     def parts(self, pairs: NDArray[np.int32], impacts: Impacts) -> dict[str, Any]:
-        """Fields of a frame from vertex-face pairs, whose last faces are isolated parts."""
+        """Separate vertex-face pairs with isolated parts, which follow the faces, into fields."""
         number = pairs[:, 1] - len(self.faces)
         edges = len(self.isolated.edges)
         of_face, of_point = number < 0, number >= edges

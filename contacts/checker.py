@@ -107,7 +107,7 @@ class State:
 
 
 def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
-    """``state``, if its poses are finite and of the model's size.
+    """Check that the poses of ``state`` are finite and of the model's size, and return it.
 
     Raises:
         ValueError: another shape, or an entry that is not finite (the field and first bad row).
@@ -265,7 +265,7 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
 
 
 def registered() -> tuple[str, ...]:
-    """Names of the checkers there are."""
+    """Names of all registered checkers."""
     return tuple(_FACTORIES)
 
 

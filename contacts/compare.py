@@ -186,7 +186,7 @@ def _first_contact(
 def _beside(
     score: Score, first: tuple[float, set[tuple[str, str]]], covers: frozenset[tuple[str, str]]
 ) -> Score:
-    """The score with its first report beside that contact, where the checker covers the pair."""
+    """Add MuJoCo's first contact to the score, if the checker covers the pair."""
     if score.first is None or not first[1] & covers:
         return score
     return replace(score, first_error_ms=1e3 * (score.first - first[0]))

@@ -19,7 +19,7 @@ WAITING = 1000
 
 
 def sample_of(message: Any, names: Sequence[str], arrived: int) -> Sample:
-    """A JointState as a sample, its joints by name in any order.
+    """Convert a JointState to a sample; its joints are found by name.
 
     Raises:
         ValueError: a joint is not in it, or it has no velocities or no efforts.

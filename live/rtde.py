@@ -51,7 +51,7 @@ class Packet:
 
 
 def packet(kind: int, payload: bytes = b"") -> bytes:
-    """A packet as it goes over the wire.
+    """Encode a packet.
 
     Raises:
         ValueError: the payload does not fit the 16 bits of the size.
@@ -94,7 +94,7 @@ class PacketReader:
 
 @dataclass(frozen=True)
 class Recipe:
-    """What one data packet holds: the variables' types in the order that was asked."""
+    """Types of the variables of a data packet, in the requested order."""
 
     number: int
     types: tuple[str, ...]
@@ -105,7 +105,7 @@ class Recipe:
         return struct.Struct(">B" + "".join(FORMATS[kind] for kind in self.types))
 
     def pack(self, values: Sequence[float]) -> bytes:
-        """A data packet of ``values``, one number an element, in order."""
+        """Encode a data packet; ``values`` has one number for each element, in order."""
         return packet(DATA_PACKAGE, self.layout.pack(self.number, *values))
 
 

@@ -174,7 +174,7 @@ class _SilenceClock:
             self._report(sample, said)
 
     def _look(self) -> float:
-        """Record and report silence, if it is one; seconds until it may be one (again)."""
+        """Record and report a silence. Returns the seconds until the next one may begin."""
         with self._lock:
             since = time.monotonic() - self._last
             if since < self._most:

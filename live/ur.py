@@ -73,7 +73,7 @@ class UrStream(Closing):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """UR's own names."""
+        """The names that UR gives."""
         return UR_JOINTS
 
     @property

@@ -86,7 +86,7 @@ class UrServer(Closing):
         return self
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Until the log is over; whether it is."""
+        """Wait for the end of the log. Returns whether it was reached."""
         return self._over.wait(timeout)
 
     def close(self) -> None:
@@ -123,7 +123,7 @@ class UrServer(Closing):
             session.run()
 
     def begin(self) -> float:
-        """Start the clock unless it runs; seconds since it was started."""
+        """Start the clock unless it runs. Returns the seconds since its start."""
         with self._lock:
             if self._began is None:
                 self._began = time.monotonic()
@@ -163,7 +163,7 @@ class _Session:
                 self._answer(request)
 
     def _send_due(self) -> float:
-        """Send what is due; seconds until there is more."""
+        """Send what is due. Returns the seconds until more is due."""
         packets, now = self.server.packets, self.server.clock()
         while self.row < len(packets.due) and packets.due[self.row] <= now:
             if self.row % self.step == 0:

@@ -120,7 +120,7 @@ def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
 
 
 def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> set[str]:
-    """The joints of the file that are meant: by name, or from one to another below it."""
+    """The joints that the user asked for: by name, or from one to another below it."""
     kept = set()
     for entry in wanted:
         ends = entry.split("..")
@@ -282,7 +282,7 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
 
 
 def _carrier(spec: mujoco.MjSpec, name: str) -> str:
-    """The body that carries a body which cannot move in it: itself where it has a joint."""
+    """The nearest ancestor with a joint; the body itself if it has one."""
     body = spec.body(name)
     while body is not None and body.name != "world" and not body.joints:
         body = body.parent

@@ -1,4 +1,4 @@
-"""What a model of the drives leaves of an arm's currents, played again where the motion is alike.
+"""The currents that a model of an arm's drives does not explain, replayed along like motions.
 
 Most of what a model of a real drive does not explain repeats with the motion, has heavy tails and
 depends on speed, acceleration and the time since a stop. Random processes have its level and are
@@ -115,7 +115,7 @@ class LeftOver:
 
     @cached_property
     def remaining(self) -> NDArray[np.int64]:
-        """Samples of the log after each, shape (N,)."""
+        """Number of samples of the log after each sample, shape (N,)."""
         last = np.searchsorted(self.log, self.log, side="right") - 1
         return last - np.arange(len(self.log))
 
@@ -160,7 +160,7 @@ class LeftOver:
 
 
 class _Motion:
-    """What is known of a motion up to each sample, block by block."""
+    """Features of a motion up to each sample, computed block by block."""
 
     def __init__(self, dt: float) -> None:
         self._dt = dt
@@ -204,7 +204,7 @@ class _Motion:
 
 
 class Player:
-    """Gives the errors along a motion that goes on, block by block."""
+    """Gives the errors along a running motion, block by block."""
 
     def __init__(self, source: LeftOver, dt: float, rng: np.random.Generator) -> None:
         """Begin anywhere.

@@ -69,7 +69,7 @@ def first_contact(
     motion_b: Motion,
     threads: int,
 ) -> MeshImpacts:
-    """When the surface first touches each body; the mesh is ``b`` where ``swapped``."""
+    """When the surface first touches each body; the mesh is ``b`` if ``swapped``."""
     motion_mesh, motion_solid = (motion_b, motion_a) if swapped else (motion_a, motion_b)
     bodies = bodies_of(_other(swapped), solid)
     lengths = {"bodies": len(solid), "motion_a": len(motion_a), "motion_b": len(motion_b)}

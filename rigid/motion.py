@@ -86,7 +86,7 @@ class Motion(Rebuilt):
         return self.pose_t0, self.linear, self.angular
 
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Poses at time ``t`` (a number, or one a row). Shape (N, 4, 4)."""
+        """Poses at time ``t`` (a number, or one for each row). Shape (N, 4, 4)."""
         from scipy.spatial.transform import Rotation
 
         time = np.broadcast_to(np.asarray(t, dtype=np.float64), (len(self),))[:, None]
@@ -98,7 +98,7 @@ class Motion(Rebuilt):
 
 
 def bounded(name: str, motion: Motion) -> None:
-    """Nothing: a coordinate beyond 1e100, whose products would overflow, is a ``ValueError``."""
+    """Refuse coordinates beyond 1e100, whose products would overflow."""
     for value in (motion.pose_t0[:, :3, 3], motion.linear):
         if np.abs(value).max(initial=0.0) > 1e100:
             raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")

@@ -49,7 +49,7 @@ def native_overlap(
 
 
 def refuse_hulls(a: Bodies, b: Bodies) -> None:
-    """Nothing; hulls and polygons, whose facets are not known, are a ``ValueError``."""
+    """Refuse hulls and polygons, whose facets are not known (``ValueError``)."""
     if isinstance(a, Hulls | Polygons) or isinstance(b, Hulls):
         raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
 
@@ -120,7 +120,7 @@ def native_sweep(
 
 @contextmanager
 def portable() -> Iterator[None]:
-    """Without vector instructions inside the block, for studies and tests; for all threads."""
+    """Switch vector instructions off inside the block, in all threads, for studies and tests."""
     _rigid.allow_vectors(False)
     try:
         yield

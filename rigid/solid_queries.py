@@ -23,7 +23,7 @@ def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
 
 
 def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
-    """Whether bodies with radii share a point; exact as a distance is, without its depth."""
+    """Whether bodies with radii share a point, as exactly as by their distance."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
     _rigid_mesh.meets(

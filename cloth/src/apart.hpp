@@ -1,6 +1,7 @@
-// The first filter of single queries: it finds those that are apart on an axis, on the same side at
-// both ends of the step and so in between. It compares x, y and z, which is exact. If many queries
-// share positions, it uses the seven axes of a 14-DOP in float32, with a margin for rounding.
+// The first filter of single queries. Two features cannot meet if one axis separates them on the
+// same side at both ends of the step. The filter compares x, y and z, which is exact. If many
+// queries share positions, it uses the seven axes of a 14-DOP in float32, with a margin for
+// rounding.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +32,7 @@ TAUGUARD_INLINE Double4 point(const Ends& x, bool end, std::int32_t v) {
   return Double4{p[0], p[1], p[2], p[2]};
 }
 
-// The queries of n that are not: their numbers go to `left`. rows: (n, 4) vertices.
+// Writes to `left` the numbers of the queries that no axis separates. rows: (n, 4) vertices.
 template <bool vf>
 TAUGUARD_INLINE int not_apart(const Ends& x, const std::int32_t* rows, int n, std::int32_t* left) {
   int count = 0;
@@ -52,17 +53,18 @@ TAUGUARD_INLINE int not_apart(const Ends& x, const std::int32_t* rows, int n, st
   return count;
 }
 
-// What the other looks at: both ends of the step on 7 axes, 64 bytes a vertex (a cache line).
+// The volume of the second filter: 7 axes at both ends of the step, one cache line (64 bytes) per
+// vertex.
 inline constexpr VolumeKind seven_axes{14, true};
 
-// Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. Where x > fl(y +
-// gap), the exact ones differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 to the same side.
+// Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. If x > fl(y + gap),
+// the exact values differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 in the same direction.
 TAUGUARD_INLINE Mask8 above(Float8 x, Float8 y) {
   constexpr float gap = 0x1p-21f;
   return x > y + gap;
 }
 
-// On which axes the first feature lies over the second, and under it.
+// The axes on which the first feature lies above the second, and those on which it lies below.
 struct Sides {
   Mask8 over, under;
 };
@@ -72,7 +74,7 @@ TAUGUARD_INLINE Sides sides(Float8 a, Float8 b, Float8 c, Float8 d) {
   return {above(min(a, b), max(c, d)), above(min(c, d), max(a, b))};
 }
 
-// The same on `points`: of `seven_axes`.
+// The same with projections onto `seven_axes`.
 template <bool vf>
 TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* rows, int n,
                                        std::int32_t* left) {

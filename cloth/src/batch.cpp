@@ -15,12 +15,13 @@ TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
   return (Double4)((std::int64_t{0x7fe} << 52) - exponent);
 }
 
-// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. Differences carry u. A triple
-// product of differences is 6 products: 3 u and 5 u of arithmetic on each: 48 u M. The mixed ones
-// double the cross product: 108 u M, and with 48 u M of the other and the sums, divided by three:
-// 64 u M for each coefficient, which is at most 6 M. Each of three cuts adds 54 u M, a value of the
-// polynomial 60 u M, its argument's own rounding 324 u M: 610 u M in all, below the 1024 u M =
-// 2^-43 M in use. Underflow adds less than 2^-1000.
+// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. A difference has a relative error
+// of u. A triple product of differences has 6 terms; each adds 3 u of its factors and 5 u of
+// arithmetic, 48 u M in all. A mixed product doubles the cross product: 108 u M. With the other
+// product (48 u M) and the sums, divided by three, this is 64 u M for each coefficient, which is at
+// most 6 M. Each of three cuts adds 54 u M, a value of the polynomial 60 u M, and the rounding of
+// its argument 324 u M. The total is 610 u M, below the 1024 u M = 2^-43 M in use. Underflow adds
+// less than 2^-1000.
 TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, Group& g) {
   Double4 sizes[3] = {splat(0), splat(0), splat(0)};
   for (int e = 0; e < 2; ++e) {
@@ -51,7 +52,7 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   store4(g.value[Group::scale], s);
 }
 
-// Of one query, at one end of the step.
+// The differences of one query at one end of the step.
 struct Differences {
   Double4 p, q, r;
 };
@@ -131,7 +132,7 @@ TAUGUARD_INLINE Cut cut(const Group* groups, std::int32_t* queries, int n, Piece
   return found;
 }
 
-// Pieces, transposed, with the differences of their queries.
+// Pieces with the differences of their queries, one piece per lane.
 struct Pieces {
   Vec3x4 p[2], q[2], r[2];
   Double4 start, length, root, cubic[4], error, big;
@@ -177,10 +178,10 @@ TAUGUARD_INLINE Double4 at(const Double4* b, Double4 x) {
   return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
 }
 
-// Roots in (0, 1) of many cubics: Newton's steps kept within the bracket until a step is below
-// 2^-24, after which the root is off by less than 2^-40 or so (what is not is found out). A lane
-// stops by itself, so that a root does not depend on its neighbours; several groups at once hide
-// the latency of the divisions.
+// Roots in (0, 1) of many cubics by Newton's method, kept within the bracket, until a step is below
+// 2^-24. The root is then off by about 2^-40; larger errors are detected later. Each lane stops by
+// itself, so that a root does not depend on its neighbours. Several groups at once hide the latency
+// of the divisions.
 constexpr int together = 4;
 TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   alignas(64) double value[5][together * width];
@@ -221,12 +222,12 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   }
 }
 
-// Contact at a root is the origin in the hull of the features' differences g_i: on the same side of
-// all its edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be what the time may be off, B
-// the largest |p|, |q|, |r|, and G that of the g_i near the root. Then |q|, |r| <= 2 G, |n| <= 8
-// G^2, and since g changes by at most 6 B a unit of time, q and r by 2 B, a side changes by at most
-// (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 a unit: 2^-23.6 B G^3 in d. Rounding adds less than 2^-38
-// B G^3. In use: 2^-23 B G^3.
+// At a root the features touch if the hull of their differences g_i contains the origin: if the
+// origin is on the same side of all edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be
+// the error of the time, B the largest |p|, |q|, |r|, and G the largest |g_i| near the root. Then
+// |q|, |r| <= 2 G and |n| <= 8 G^2. Per unit of time g changes by at most 6 B, and q and r by 2 B.
+// So a side changes by at most (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit, which is 2^-23.6 B
+// G^3 in d. Rounding adds less than 2^-38 B G^3. The bound in use is 2^-23 B G^3.
 template <bool vf>
 TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome,
                               double* toi) {

@@ -23,9 +23,9 @@ using geometry::FixedInt;
 constexpr int time_bits = 52;
 constexpr std::int64_t end_of_time = std::int64_t{1} << time_bits;
 
-// 128 bits a degree. With coefficients of degree 1 below 2^117, those of a side of the hull are
-// below 2^236, of the sum of its sides below 2^238, of the cubic below 2^356, and of the remainders
-// below 2^834.
+// 128 bits for each degree. With coefficients of degree 1 below 2^117, those of a side of the hull
+// are below 2^236, of the sum of its sides below 2^238, of the cubic below 2^356, and of the
+// remainders below 2^834.
 template <int degree>
 struct Bernstein {
   std::array<FixedInt<2 * degree>, degree + 1> c;
@@ -94,7 +94,7 @@ inline void halve(const Bernstein<3>& f, Bernstein<3>& left, Bernstein<3>& right
 
 constexpr int unknown_sign = 2;
 
-// A root: at lo exactly, or the only one of `of` in the open interval (lo, hi), where it is simple.
+// A root: exactly lo, or the only root of `of` in the open interval (lo, hi), a simple one.
 template <int degree>
 struct BernsteinRoot {
   std::int64_t lo, hi;  // in 2^-52
@@ -125,8 +125,8 @@ inline double estimate(const Bernstein<2>& part, int before) {
   return estimate(raised, before);
 }
 
-// Adds the roots of f inside (start, start + length), of which `part` is the restriction. Parts are
-// halved five times at most, which the width allows for.
+// Adds the roots of f inside (start, start + length). `part` is f on that interval. Parts are
+// halved at most five times; the integers are wide enough for that.
 template <int degree>
 void add_roots_inside(const Bernstein<degree>& f, const Bernstein<degree>& part, std::int64_t start,
                       std::int64_t length, BernsteinRoots<degree>& roots) {
@@ -162,7 +162,7 @@ void add_roots_inside(const Bernstein<degree>& f, const Bernstein<degree>& part,
   roots.complete = false;
 }
 
-// The roots of f in [0, 1]; f must not be zero, and outlive them.
+// The roots of f in [0, 1]. f must not be zero and must outlive the result.
 template <int degree>
 BernsteinRoots<degree> roots_of(const Bernstein<degree>& f) {
   BernsteinRoots<degree> roots;
@@ -195,8 +195,8 @@ inline std::array<FixedInt<8>, 2> remainder(const Bernstein<2>& f, const Bernste
   return {r0, r1};
 }
 
-// The sign of q at the one root of f in (lo, hi), where q has one root as well, and its own signs
-// at both ends.
+// The sign of q at the one root of f in (lo, hi). q has one root there too, and the signs at_lo and
+// at_hi at the ends.
 template <int degree>
 int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Bernstein<degree>& f,
                            std::int64_t lo, std::int64_t hi) {
@@ -223,7 +223,8 @@ int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Be
   return f_at_q == f_lo ? at_hi : at_lo;  // is the root of q before that of f?
 }
 
-// The sign of a quadratic at a root; unknown_sign where that takes a narrower interval, or Sturm.
+// The sign of a quadratic at a root. unknown_sign: this needs a narrower interval, or Sturm's
+// theorem.
 template <int degree>
 int sign_at(const Bernstein<2>& q, const BernsteinRoot<degree>& root) {
   if (q.zero()) return 0;

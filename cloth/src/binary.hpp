@@ -1,4 +1,5 @@
-// Doubles as integers of fixed width in a common unit, which changes neither contact nor its time.
+// Converts doubles to integers of fixed width in a common unit. The unit changes neither the
+// contact nor its time.
 #pragma once
 
 #include <algorithm>

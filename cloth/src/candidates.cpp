@@ -15,7 +15,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
   // Every pair is written, but the position advances only for hits (no branch to mispredict).
   for (; hits; hits &= hits - 1) {
     const int lane = __builtin_ctz(hits);
-    // A vertex goes by its own number, not by its place among the vertices in use.
+    // Vertices are named by their own number, not by their position among the vertices in use.
     const std::int32_t id_a = ArityA == 1 ? a[0] : ids_a[i], id_b = ids_b[lane];
     const bool swap = ArityA == ArityB && id_a > id_b;
     const int at_a = swap ? ArityB : 0, at_b = swap ? 0 : ArityA;
@@ -40,7 +40,7 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
   LeafLanes left = a.lanes_of(leaves.a);
   const LeafLanes right = b.lanes_of(leaves.b);
-  if (!same)  // x, y and z leave out nearly all rows that can be
+  if (!same)  // x, y and z reject nearly all rows that any axis can
     left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3,
                                           a.times(), left.occupied);
   Overlaps found;

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t block = 512;  // queries at a time
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tolerance of the barycentric weights at a root, of the size that the published codes use.
+// Tolerance of the barycentric weights at a root, about that of the published codes.
 constexpr double inside_tolerance = 1e-10;
 
 int variations(const double* a) {
@@ -75,7 +75,7 @@ bool filtered_out(const Cubic& c, Comparator comparator) {
   }
 }
 
-// The first root at which the features meet, or never.
+// The first root at which the features meet; infinity if there is none.
 double first_root_inside(const Query& k, const Cubic& c, Comparator comparator, bool vf) {
   double cut[4] = {0, 1, 1, 1};
   int cuts = 1;

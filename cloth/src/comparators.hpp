@@ -5,13 +5,13 @@
 //
 // They follow the published descriptions; details that these leave open were inferred:
 //   naive  Provot 1997, Bridson et al. 2002: no filter, all roots.
-//   iccd   Tang et al. 2009: the same for each pair. Its own part is the broad phase: 18-DOPs and
-//          testing each pair once are here, normal cones are not.
+//   iccd   Tang et al. 2009: the same for each pair. Its own contribution is the broad phase, of
+//          which 18-DOPs and testing each pair once are implemented; normal cones are not.
 //   dnf    Tang et al. 2010: Bernstein coefficients of one sign. Its projections are left out.
 //   scd    Zhang et al. 2014: no sign variation (Descartes) of the cubic in t or in 1 - t.
 //   vcd    Zhang et al. 2015: no sign variation after the Moebius map of (0, 1) to (0, inf)
-//          (Vincent), which is the Bernstein form's. One variation is one root, found without
-//          splitting.
+//          (Vincent), which equals that of the Bernstein form. One variation means one root, found
+//          without splitting.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ namespace tauguard::cloth {
 
 enum class Comparator : int { naive = 0, iccd, dnf, scd, vcd };
 
-// As solve_vf and solve_ee, without a minimum distance.
+// Like solve_vf and solve_ee, without a minimum distance.
 void compare_vf(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator comparator,
                 std::uint8_t* hit, ImpactArrays impacts, Stats& stats);
 void compare_ee(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator comparator,

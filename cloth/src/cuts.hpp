@@ -21,8 +21,8 @@ TAUGUARD_INLINE Mask4 one_sign(const Cubics& c, Double4 error) {
   return (least > error) | (most < -error);
 }
 
-// The coefficients change their sign once, beyond the error: one root. The ends have different
-// signs, and not both coefficients between them the other end's.
+// The coefficients change their sign once, beyond the error: there is one root. Then the ends have
+// different signs, and the coefficients between them change at most once.
 TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
   const Double4 *b = c.b, below = -error;
   const Mask4 falls = (b[0] > error) & (b[3] < below) & ((b[1] > error) | (b[2] < below)),

@@ -1,9 +1,10 @@
-// Contact is the origin in the convex hull of the features' differences g_i(t): three of a vertex
-// and a face, four (a parallelogram) of two edges. Its first time is 0, or a root of the
-// coplanarity cubic. Where the cubic is zero throughout, everything stays in one (turning) plane,
-// and the first time has the origin on the boundary of the hull: between two of its corners, g_i x
-// g_j = 0; and where that too is zero throughout, at a corner, g_i = 0. Each is a finite list of
-// roots, at which the hull is tested by signs of quadratics.
+// Contact is the origin in the convex hull of the features' differences g_i(t): three for a vertex
+// and a face, four (a parallelogram) for two edges. Its first time is 0, or a root of the
+// coplanarity cubic. If the cubic is zero at all times, the features stay in one plane, which may
+// turn. At the first contact the origin then lies on the boundary of the hull: between two
+// neighbouring corners, where g_i x g_j = 0. If this product is zero at all times too, the origin
+// is at a corner, g_i = 0. Each case gives a finite list of roots. At each root the signs of
+// quadratics tell whether the hull contains the origin.
 #include "exact.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The reference: does a query hit, and when first, in exact arithmetic. Right for all finite
-// doubles.
+// The reference in exact arithmetic: whether a query hits, and when first. It is right for all
+// finite doubles.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace tauguard::cloth {
 
-// Infinity without a hit, else the first time of contact, rounded down (by 2^-52 of it or 2^-60).
-// row: 4 vertices: vertex and face, or edge and edge.
+// The first time of contact, rounded down (by 2^-52 of it or 2^-60); infinity without a hit. row: 4
+// vertices: vertex and face, or edge and edge.
 double exact_contact(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

@@ -9,8 +9,8 @@ const Dyadic one(1.0);
 
 Dyadic magnitude(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
 
-// a := |lead b|^n a - quotient b, of degree below b's. The multiplier is positive, so that signs
-// stay; `quotient`, if asked for, is up to that multiplier.
+// The remainder |lead b|^n a - quotient b, of lower degree than b. The multiplier is positive, so
+// that signs are kept. `quotient`, if asked for, is scaled by the same multiplier.
 Polynomial remainder(Polynomial a, const Polynomial& b, Polynomial* quotient = nullptr) {
   const Dyadic lead = magnitude(b.back());
   if (quotient) quotient->assign(a.size() < b.size() ? 0 : a.size() - b.size() + 1, Dyadic());
@@ -52,7 +52,8 @@ int variations(const std::vector<Polynomial>& sequence, const Dyadic& x) {
   return count;
 }
 
-// p without the factors that it shares with its derivative: the same roots, all simple.
+// Divides p by the factors that it shares with its derivative. The result has the same roots, all
+// simple.
 Polynomial square_free(const Polynomial& p) {
   const auto all = sequence(p, derivative(p));
   if (all.back().size() == 1) return p;
@@ -88,7 +89,7 @@ int variations_between_ends(const Polynomial& p) {
   return count;
 }
 
-// Halves the interval where `middle` is in it; true where `middle` is the root.
+// Cuts the interval at `middle` if that lies inside. True if `middle` is the root.
 bool narrow(Root& root, const Dyadic& middle, int below) {
   if (!(root.lo < middle && middle < root.hi)) return false;
   const int s = value(root.of, middle).sign();
@@ -121,7 +122,7 @@ double estimate(const Root& root) {
   return lo;
 }
 
-// Bisects to 2^-60, starting from a guess where it is good.
+// Bisects to 2^-60. It starts from an estimate in doubles if that is good.
 void refine(Root& root) {
   const int below = value(root.of, root.lo).sign();
   const double guess = estimate(root);
@@ -132,8 +133,8 @@ void refine(Root& root) {
   narrow(root, Dyadic(root.hi.to_double()), below);  // a root that is a double is exact
 }
 
-// Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint
-// is a root, it is returned through `found` and nothing else is of use.
+// Intervals with one root of p each. p must have no double roots and none at 0 or 1. If a midpoint
+// is a root, it is returned in `found`, and the intervals are not valid.
 std::vector<Root> isolate(const Polynomial& p, Dyadic& found) {
   const auto sturm = sequence(p, derivative(p));
   struct Part {

@@ -1,7 +1,7 @@
-// Polynomials with dyadic coefficients, and signs of one at a root of another: Sturm's theorem and
-// its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic Geometry",
-// chapter 2). No rounding anywhere, and no bisection down to the distance of two roots where a sign
-// is zero.
+// Polynomials with dyadic coefficients, and the sign of one at a root of another, by Sturm's
+// theorem and its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic
+// Geometry", chapter 2). Nothing is rounded. A sign of zero is found without bisecting down to the
+// distance of two roots.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,8 @@ namespace tauguard::cloth {
 
 using geometry::Dyadic;
 
-// Coefficients in ascending powers; the leading one is not zero. No coefficients: the zero
-// polynomial.
+// Coefficients in ascending powers. The leading one is not zero; the zero polynomial has no
+// coefficients.
 using Polynomial = std::vector<Dyadic>;
 
 Polynomial trimmed(Polynomial p);
@@ -23,13 +23,13 @@ Polynomial operator*(const Polynomial& a, const Polynomial& b);
 Polynomial derivative(const Polynomial& p);
 Dyadic value(const Polynomial& p, const Dyadic& x);
 
-// A root in (0, 1) or at an end: either exactly `lo` == `hi`, or the only root of `of` in (lo, hi),
-// where it is simple and `of` is not zero at either end.
+// A root in [0, 1]. If `lo` == `hi`, it is exactly there. Otherwise it is the only root of `of` in
+// (lo, hi); it is simple, and `of` is not zero at either end.
 struct Root {
   Dyadic lo, hi;
   Polynomial of;
   bool exact() const { return of.empty(); }
-  // The largest double below the interval: at most 2^-60 before the root, or it.
+  // A double that is the root or at most 2^-60 before it.
   double floor() const { return lo.to_double(); }
 };
 

@@ -15,9 +15,9 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Features of a leaf at build, of 16 slots. Shares are rounded down to the left at every level,
-// which lets a leaf receive up to 2 more (1 + 1/2 + 1/4 + ...); the rest is room for features that
-// come later.
+// Features that a leaf of 16 slots gets at a build. Halves are rounded down to the left at every
+// level, so a leaf may receive up to 2 more (1 + 1/2 + 1/4 + ...). The remaining slots are for
+// features that come later.
 constexpr std::size_t fill = 13;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -130,7 +130,8 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
   }
 }
 
-// Both ends of the step on every axis slot, [end][slot], four values at a time.
+// The bounds of a feature on every axis slot at both ends of the step, [end][slot], four values at
+// a time.
 template <int slots>
 struct Row {
   using Four = geometry::Float4;
@@ -151,7 +152,7 @@ struct Row {
   }
 };
 
-// Both ends of the step, exchanged.
+// Exchanges both ends of the step.
 template <int slots>
 Row<slots> other_end(const Row<slots>& row) {
   Row<slots> other;
@@ -159,7 +160,7 @@ Row<slots> other_end(const Row<slots>& row) {
   return other;
 }
 
-// One side of 16 volumes into a block, four lanes by four axis slots at a time.
+// Writes one side of 16 volumes into a block, four lanes by four axis slots at a time.
 template <int slots>
 void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
   for (int r = 0; r < times * slots; r += 4) {
@@ -294,12 +295,12 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
       if (new_id[id] < 0) {
         put(leaf, lane, -1, features);
       } else {
-        id = new_id[id];  // its vertices are the same
+        id = new_id[id];  // it has the same vertices
       }
     }
   for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
 
-  // A leaf that touches each vertex, for new features to settle near.
+  // A leaf for each vertex; new features are placed in the leaf of one of their vertices.
   const auto used =
       used_vertices(missing.empty() ? std::vector<std::int32_t>() : features.vertices);
   const VertexTable table(used);

@@ -23,7 +23,8 @@ struct Features {
   const std::int32_t* of(std::size_t i) const { return vertices.data() + arity * i; }
 };
 
-// Which vertices may meet: a group per vertex, a symmetric table of groups. Empty: all meet.
+// Which vertices may meet: a group for each vertex and a symmetric table of groups. If empty, all
+// may meet.
 struct Groups {
   std::vector<std::int32_t> of_vertex;
   std::vector<std::uint8_t> meets;  // count x count
@@ -34,13 +35,14 @@ struct Groups {
 
 class FeatureTree {
  public:
-  // Places every feature by the centroid of its vertices at the start of the step. Groups are split
-  // before space is.
+  // Places every feature by the centroid of its vertices at the start of the step. The upper levels
+  // of the tree separate groups, the lower ones space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
   // Bounds of every leaf and node for this step.
   void refit(const Projection& points, int threads);
-  // The features are now `features`; old feature i is new_id[i], or gone (-1). New ones go near
-  // features that share their vertices. False where the free slots do not suffice: build again.
+  // Replaces the features by `features`. Old feature i becomes new_id[i], or -1 if it is gone. New
+  // features are placed near features that share their vertices. False if the free slots do not
+  // suffice; then build() must be called.
   bool update(const Features& features, const std::vector<std::int32_t>& new_id,
               const Groups& groups);
 
@@ -66,7 +68,7 @@ class FeatureTree {
   bool may_meet(std::int32_t i, const FeatureTree& other, std::int32_t j) const {
     return members_.empty() || (members_[i] & other.partners_[j]) != 0;
   }
-  // Sum over the leaves of the extents of their x, y, z intervals: how spread out the leaves are.
+  // The sum of the leaves' extents along x, y and z, a measure of how spread out the leaves are.
   double spread() const { return spread_; }
   std::size_t bytes() const;
 
@@ -84,10 +86,11 @@ class FeatureTree {
   std::int32_t leaves_ = 0;
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;
-  std::vector<std::int32_t> ids_, vertices_, free_;  // free_: empty slots below every node
+  std::vector<std::int32_t> ids_, vertices_,
+      free_;  // free_: number of empty slots below every node
   std::vector<Mask> occupied_;
   std::vector<std::uint64_t> members_,
-      partners_;  // groups below a node, groups they meet; modulo 64
+      partners_;  // bits of the groups below a node and of those they may meet, modulo 64
 };
 
 }  // namespace tauguard::cloth

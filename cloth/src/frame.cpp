@@ -20,7 +20,8 @@ double seconds(Instant from, Instant to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// One collision before it is described, and those of one chunk of candidates.
+// One collision before its point and normal are computed, and the collisions of one chunk of
+// candidates.
 struct Row {
   std::int32_t pair[2], vertices[4];
   double toi;
@@ -37,7 +38,7 @@ struct Place {
   const Row* row;
 };
 
-// By key, a digit at a time from the last (radix sort).
+// Radix sort by key, from the last digit.
 void sort(std::vector<Place>& places) {
   constexpr int digit = 11;
   std::vector<Place> other(places.size());
@@ -59,7 +60,7 @@ struct Answers {
   double toi[CandidateBlock::capacity];
 };
 
-// In the order of the pairs. A pair occurs once, so that the order is unique.
+// Sorts by pair. A pair occurs once, so that the order is unique.
 std::vector<Place> in_order(const std::vector<Part>& parts) {
   std::size_t n = 0;
   std::uint32_t largest = 0;
@@ -67,7 +68,7 @@ std::vector<Place> in_order(const std::vector<Part>& parts) {
     n += part.rows.size();
     for (const auto& row : part.rows) largest = std::max(largest, std::uint32_t(row.pair[1]));
   }
-  // The second number takes no more bits than it needs: fewer digits to sort by.
+  // The second number gets no more bits than it needs, which leaves fewer digits to sort by.
   const int bits = largest == 0 ? 0 : 32 - __builtin_clz(largest);
   std::vector<Place> places;
   places.reserve(n);
@@ -79,7 +80,7 @@ std::vector<Place> in_order(const std::vector<Part>& parts) {
   return places;
 }
 
-// Where, along which normal and with which weights: written straight to where it stays.
+// Writes points, normals and weights of the collisions to the final arrays.
 template <bool vf>
 void describe_all(const Ends& x, const std::vector<Place>& places, int threads, Collisions& out) {
   constexpr std::size_t grain = 2048;
@@ -87,7 +88,7 @@ void describe_all(const Ends& x, const std::vector<Place>& places, int threads, 
                              out.weights.data()};
   geometry::interruptible_for(places.size(), threads, grain, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
-      // Rows lie anywhere in memory, and so do their vertices: both are asked for before their use.
+      // Rows and their vertices are scattered in memory, so both are prefetched.
       const auto next = [&](int steps) { return places[std::min(i + steps * ahead, end - 1)].row; };
       __builtin_prefetch(next(2));
       prefetch<true>(x, next(1)->vertices);
@@ -122,7 +123,7 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
                            std::size_t limit) {
   const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
-  // Volumes that move have compared x, y and z already.
+  // Moving volumes have compared x, y and z already.
   const AxisFilter axes{!ccd.volume().moving};
   return find_collisions(
       ccd, kind,

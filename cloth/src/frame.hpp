@@ -13,19 +13,19 @@ namespace tauguard::cloth {
 // The collisions of one kind, in the order of their pairs.
 struct Collisions {
   SpareArray<std::int32_t> pairs;                  // (n, 2)
-  SpareArray<double> toi, point, normal, weights;  // (n), (n, 3), (n, 3), (n, 4)
+  SpareArray<double> toi, point, normal, weights;  // shapes shapes (n), (n, 3), (n, 3), (n, 4)
   Stats stats;
   double narrow_s = 0;  // in the narrow phase, summed over threads
-  double total_s = 0;   // candidates, narrow phase and sorting, by the clock
+  double total_s = 0;   // wall time of candidates, narrow phase and sorting
   std::size_t size() const { return toi.size(); }
 };
 
-// Decides a block of candidates, rows (n, 4) of vertices, as solve_vf does; of the impacts only the
-// times are asked for. Called from several threads.
+// Decides a block of candidates, rows (n, 4) of vertices, like solve_vf. Only the times of the
+// impacts are needed. Called from several threads.
 using NarrowPhase = std::function<void(const Ends& x, const std::int32_t* rows, std::size_t n,
                                        std::uint8_t* hit, ImpactArrays impacts, Stats& stats)>;
 
-// After ccd.prepare. Throws TooMany where there are more than `limit`.
+// Call ccd.prepare first. Throws TooMany if there are more than `limit` collisions.
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
                            std::size_t limit);
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& narrow_phase,

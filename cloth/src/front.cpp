@@ -9,13 +9,14 @@
 namespace tauguard::cloth {
 namespace {
 
-// Front entries of a chunk: a kept entry is about one test, one near the root a whole descent.
+// Number of front entries in a chunk. A kept entry costs about one test; an entry near the root
+// costs a whole descent.
 constexpr std::size_t kept_grain = 1024, root_grain = 16;
-constexpr int first_depth = 5;  // the cut to start from: all pairs at this depth
+constexpr int first_depth = 5;  // the first cut has all pairs at this depth
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
-// Entries of the new cut so far, of all chunks.
+// Number of entries of the new cut so far, over all chunks.
 struct Total {
   std::size_t limit;
   std::atomic<std::size_t> entries{0};
@@ -24,14 +25,15 @@ struct Total {
   }
 };
 
-// One chunk's walk: reads a run of the old cut and writes its part of the new one, once that
+// Processes one chunk: reads a run of the old cut, and writes its part of the new cut if that
 // differs.
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
       : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
 
-  // At one depth both sides split, else the deeper one: the other is a leaf.
+  // Two nodes of one depth are both split. Otherwise the deeper one is split, because the other is
+  // a leaf.
   int children(NodePair p, NodePair* child) const {
     const int gap = depth(p.a) - depth(p.b);
     const bool split_a = gap >= 0 && !a_.is_leaf(p.a), split_b = gap <= 0 && !b_.is_leaf(p.b);
@@ -44,19 +46,20 @@ class Walk {
     return n;
   }
 
-  // `n` entries of the old cut, at most a chunk. Where all children of a pair stand in a row and
-  // the pair itself is apart, it takes their place.
+  // Processes `n` entries of the old cut, at most a chunk. If all children of a pair follow each
+  // other and the pair itself is apart, the pair replaces them.
   void move(const NodePair* entry, int n) {
     bool meet[kept_grain];
     for (int i = 0; i < n; ++i) {
-      // Nodes lie anywhere in memory: what is looked at some entries later is asked for now.
+      // Nodes are scattered in memory, so those of later entries are prefetched.
       const NodePair& later = entry[std::min(i + ahead, n - 1)];
       fetch(a_, later.a);
       fetch(b_, later.b);
       meet[i] = meets(entry[i]);
     }
     look_up();
-    // Most entries stay. Those of leaves that meet are written without a branch to mispredict.
+    // Most entries stay. Pairs of leaves that meet are written without a branch, which would be
+    // mispredicted.
     NodePair found[kept_grain];
     int count = 0;
     for (int i = 0; i < n; ++i) {
@@ -81,11 +84,11 @@ class Walk {
   }
 
   std::vector<NodePair> cut, leaf_pairs;
-  bool differs = false;  // false: the run of the old cut stays, `cut` is empty
+  bool differs = false;  // if false, the run of the old cut is kept and `cut` is empty
   std::size_t tests = 0;
 
  private:
-  static constexpr std::size_t pause = 1024;  // tests between two looks
+  static constexpr std::size_t pause = 1024;  // tests between two calls of look_up
   static constexpr int ahead = 8;
 
   bool meets(NodePair p) {
@@ -95,7 +98,7 @@ class Walk {
   bool both_leaves(NodePair p) const { return a_.is_leaf(p.a) & b_.is_leaf(p.b); }
   NodePair leaf_numbers(NodePair p) const { return {p.a - a_.leaves(), p.b - b_.leaves()}; }
 
-  // From entry `i` on.
+  // Starts the new cut; it differs from the old one from entry `i` on.
   void differ(const NodePair* entry, int i) {
     if (!differs) cut.assign(entry, entry + i);
     differs = true;
@@ -106,7 +109,7 @@ class Walk {
     meets(p) ? enter(p) : cut.push_back(p);
   }
 
-  // Below a pair that overlaps.
+  // Descends below a pair that overlaps.
   void enter(NodePair p) {
     if (both_leaves(p)) {
       cut.push_back(p);
@@ -118,13 +121,14 @@ class Walk {
     for (int i = 0; i < n; ++i) descend(child[i]);
   }
 
-  // The deeper side came from a split; at one depth both did.
+  // The parent of a pair. The deeper side came from a split; at equal depths both sides did.
   NodePair parent(NodePair p) const {
     const int gap = depth(p.a) - depth(p.b);
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
   }
 
-  // How many of the n entries are all children of one pair, if they and the pair are apart; else 0.
+  // The number of entries that together are all children of one pair, if they and the pair are
+  // apart; otherwise 0.
   int apart_siblings(const NodePair* entry, const bool* meet, int n) {
     const NodePair up = parent(*entry);
     // First children have even numbers.
@@ -138,7 +142,7 @@ class Walk {
     return row > 0 && !meets(up) ? row : 0;
   }
 
-  // Ctrl-C, and the size that all walks together have reached.
+  // Checks for Ctrl-C, and for the size that all chunks together have reached.
   void look_up() {
     geometry::poll_interrupt();
     total_.add(cut.size() - counted_);
@@ -165,7 +169,7 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
   Total total{limit};
   const std::size_t step = cut_.empty() ? root_grain : kept_grain;
   if (cut_.empty()) {
-    // Split every entry, without looking at the volumes, until it is `first_depth` deep or two
+    // Splits every entry, without testing volumes, until it is `first_depth` deep or a pair of
     // leaves.
     const Walk walk(a, b, total);
     cut_.push_back({1, 1});

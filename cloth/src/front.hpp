@@ -1,10 +1,10 @@
 // The bounding-volume traversal tree of two feature trees (or one with itself) and its front.
 //
-// Its nodes are pairs of tree nodes. Children: a pair at one depth splits both sides (the inner
-// ones), else the side that is not yet a leaf. The front is a cut: every pair of leaves lies below
-// exactly one entry. Between steps of a coherent motion the entries hardly change, so the descent
-// starts from the last front and not from the root (Li & Chen 1998; Tang et al. 2010). Whatever the
-// cut, the leaf pairs found are the same: a child lies within its parent.
+// Its nodes are pairs of tree nodes. The children of a pair split both nodes if these have the same
+// depth, and otherwise the node that is not a leaf. The front is a cut: every pair of leaves lies
+// below exactly one entry. Between steps of a coherent motion the entries hardly change, so the
+// descent starts from the last front and not from the root (Li & Chen 1998; Tang et al. 2010). The
+// leaf pairs found do not depend on the cut, because a child lies within its parent.
 #pragma once
 
 #include <cstddef>
@@ -23,9 +23,9 @@ class Front {
  public:
   // Forgets the cut; the next update starts near the root.
   void reset() { cut_.clear(); }
-  // Moves the front to where the trees now stand and returns the pairs of leaf numbers that
-  // overlap. For a tree with itself pass the same tree twice: each unordered pair is visited once.
-  // Throws TooMany where the cut outgrows `limit`; reset comes next then.
+  // Moves the front to the present volumes and returns the pairs of leaf numbers that overlap. To
+  // test a tree against itself, pass it twice; each unordered pair is visited once. Throws TooMany
+  // if the cut outgrows `limit`; call reset then.
   const std::vector<NodePair>& update(const FeatureTree& a, const FeatureTree& b, int threads,
                                       std::size_t limit);
 

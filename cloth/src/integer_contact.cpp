@@ -1,4 +1,4 @@
-// The same steps as in exact.cpp; the words are explained there.
+// The same steps as in exact.cpp, which explains the terms.
 #include "integer_contact.hpp"
 
 #include <algorithm>
@@ -61,7 +61,7 @@ class Hull {
     return *known;
   }
 
-  // Sets open_ where a sign is unknown; what is returned then is of no use.
+  // Sets open_ if the sign is unknown; the returned sign is then invalid.
   template <class Time>
   int sign(const Bernstein<2>& q, const Time& t) {
     const int s = sign_at(q, t);
@@ -129,8 +129,8 @@ class Hull {
     return first_of(times.data(), count, complete);
   }
 
-  // A corner's first coordinate that is not zero throughout, as a polynomial of degree 2; null:
-  // none.
+  // The first coordinate of a corner that is not zero at all times, as a polynomial of degree 2;
+  // null if there is none.
   const Bernstein<2>* raised(int i) {
     i %= corners_;
     for (const Bernstein<1>& x : corner_[i]) {

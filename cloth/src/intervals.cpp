@@ -101,8 +101,8 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
   const double* c = stack[0].c.b;
   const bool flat =
       std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
-  // Flat features go to exact arithmetic at once, unless the face is an edge or a point: these are
-  // nearly always apart.
+  // Flat features go to exact arithmetic at once. Faces that are an edge or a point are nearly
+  // always apart, so they are filtered first.
   const int most = k.distance > 0 ? 4000 : !flat ? 40 : vf && is_wire(k) ? 12 : 0;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];

@@ -40,7 +40,7 @@ const std::int8_t (*axes_of(int k))[3];
 // errors: 2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
 class Projection {
  public:
-  // Of n vertices, finite.
+  // Projects n vertices with finite coordinates.
   void set(const Ends& x, std::size_t n, VolumeKind kind, double min_distance, int threads);
 
   VolumeKind kind() const { return kind_; }

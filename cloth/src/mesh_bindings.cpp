@@ -32,7 +32,7 @@ using Positions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::
 using Pairs = nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 2>, nb::c_contig>;
 using Named = nb::typed<nb::dict, nb::str, nb::any>;
 
-// Of a std::vector or a SpareArray.
+// Makes an array from a std::vector or a SpareArray.
 template <class Array, class Values>
 Array array_of(Values values, std::initializer_list<std::size_t> shape) {
   auto* owned = new Values(std::move(values));
@@ -52,19 +52,19 @@ Groups groups_of(const Ids& ids, const Table& meets) {
   return groups;
 }
 
-// Feature numbers of a pair as one key: keys in order are rows in order.
+// The feature numbers of a pair as one key. Sorting by key sorts the rows.
 std::uint64_t key_of(const std::int32_t* pair) {
   return std::uint64_t(std::uint32_t(pair[0])) << 32 | std::uint32_t(pair[1]);
 }
 
-// One step at a time, whatever Python threads, signals and forks do.
+// A mesh that processes one step at a time, also with Python threads, signals and forks.
 struct Mesh {
   Mesh(Faces faces, Ids ids, Table meets, int k, bool moving, int threads)
       : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving}, threads) {}
   MeshCcd ccd;
   CallLock lock;
 };
-// A call on it: without the interpreter's lock, open to Ctrl-C.
+// A call on a mesh. It releases the interpreter's lock and can be ended by Ctrl-C.
 struct Call {
   explicit Call(Mesh& mesh) : one(mesh.lock) {}
   LongCall open;
@@ -147,7 +147,7 @@ void add_counts(nb::dict& d, const Stats& s) {
   d["long_exact"] = s.long_exact;
 }
 
-// {"pairs", "toi", "point", "normal", "weights"} and, under "counts", what led to them.
+// The arrays "pairs", "toi", "point", "normal" and "weights", and "counts" of the search.
 nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
   using Scalars = nb::ndarray<nb::numpy, double, nb::shape<-1>, nb::c_contig>;
   using Rows = nb::ndarray<nb::numpy, double, nb::shape<-1, -1>, nb::c_contig>;
@@ -166,7 +166,7 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
 
 using Found = nb::typed<nb::tuple, Named, Named, Named>;
 
-// Collisions of both kinds that search(kind) finds, and statistics.
+// The collisions of both kinds that search(kind) finds, and statistics.
 template <class Search>
 Found found_by(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh,
                std::size_t limit, Search search) {
@@ -224,7 +224,7 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
     const Ends ends = Ends::of(x_t0.data(), x_t1.data());
     Projection points;
     AxisFilter axes;
-    // Queries a vertex: to project a vertex costs 18 ns and saves 6 ns a query.
+    // Queries for each vertex. Projecting a vertex costs 18 ns and saves 6 ns for each query.
     constexpr std::size_t pays = 4;
     if (Method(method) == Method::ab2pf && min_distance == 0 &&
         rows.shape(0) >= pays * x_t0.shape(0)) {
@@ -307,8 +307,8 @@ NB_MODULE(_mesh, m) {
       [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,
       "For tests: narrow-phase kernels to use from now on (\"portable\", \"avx2\"); any other name "
       "selects the fastest ones. True if they exist here.");
-  // For tests: of two leaves, the lanes that each row meets, then how many share a vertex with
-  // theirs; by the named variant, empty where it cannot run here.
+  // For tests: the lanes of one leaf that each row of another meets, then the number of pairs that
+  // share a vertex, computed by the named variant. Empty if the processor cannot run it.
   m.def(
       "leaf_pair",
       [](const std::string& variant,

@@ -12,13 +12,13 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr std::size_t chunk_pairs = 512;  // leaf pairs of a chunk
-// Trees are built anew where the leaves have spread this much wider than when they were built.
+constexpr std::size_t chunk_pairs = 512;  // number of leaf pairs in a chunk
+// A tree is built again if its leaves are spread wider by this factor than at its last build.
 constexpr double worn = 2;
-// Pairs of leaves that a step may hold for each collision that it may.
+// The limit of leaf pairs of a step, for each collision that is allowed.
 constexpr std::size_t leaf_pairs = 8;
 
-// Asks for the volumes of a leaf, which lie anywhere in memory.
+// Prefetches the volumes of a leaf.
 void prefetch(const FeatureTree& tree, std::int32_t leaf) {
   constexpr int line = 16;  // floats of a cache line
   const int values = 2 * lanes * tree.axes() * tree.times();
@@ -44,7 +44,7 @@ class Clock {
 
 MeshCcd::MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, int threads)
     : groups_(std::move(groups)), volume_(volume), threads_(threads) {
-  axes_of(volume.k);  // throws where there is no such k
+  axes_of(volume.k);  // throws if k is not supported
   topology_.set(std::move(faces));
 }
 
@@ -57,7 +57,7 @@ void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, dou
     place(min_distance);
     descend(fresh, limit);
   } catch (...) {
-    forget();  // trees and fronts may be half done
+    forget();  // trees and fronts may be incomplete
     throw;
   }
 }
@@ -67,7 +67,7 @@ void MeshCcd::copy(const double* x_t0, const double* x_t1, std::size_t n) {
     throw std::invalid_argument("x_t0: fewer vertices than the mesh has");
   lines_.resize(std::max<std::size_t>(n, 1));
   isolated_ = isolated_vertices(topology_, n);
-  double wild = 0;  // NaN where an entry is not finite
+  double wild = 0;  // NaN if an entry is not finite
   for (std::size_t i = 0; i < n; ++i) {
     double* line = lines_[i].value;
     for (int k = 0; k < 3; ++k) {
@@ -187,7 +187,7 @@ TopologyChange MeshCcd::update_topology(std::vector<std::int32_t> faces, Groups 
       }
     }
   } catch (...) {
-    forget();  // the mesh is as before, its trees are not
+    forget();  // the mesh is unchanged, but its trees are not
     throw;
   }
   topology_ = std::move(after);

@@ -1,5 +1,5 @@
-// Continuous collision detection of a deforming mesh with itself: the broad phase kept between
-// steps and the narrow phase on what it leaves.
+// Continuous collision detection of a deforming mesh with itself. The broad phase is kept between
+// steps; the narrow phase tests the candidates that it leaves.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct BroadStats {
 
 struct TopologyChange {
   std::array<std::uint64_t, 3> removed{}, added{};  // vertices, edges, faces
-  std::uint64_t rebuilt = 0;                        // trees that had no room
+  std::uint64_t rebuilt = 0;                        // trees without room for the new features
 };
 
 class MeshCcd {
@@ -44,18 +44,17 @@ class MeshCcd {
   int threads() const { return threads_; }
   VolumeKind volume() const { return volume_; }
 
-  // Trees, volumes and fronts for this step, of a copy of the positions (n, 3): what the caller
-  // does to them meanwhile changes nothing. fresh: descend from the root instead of the last front.
-  // Throws std::invalid_argument where the features use more vertices or a position is not finite,
-  // TooMany where more than 8 `limit` pairs of leaves are held; the next call is none the worse for
-  // it.
+  // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied, so the caller
+  // may change them meanwhile. fresh: descend from the root instead of the last front. Throws
+  // std::invalid_argument if the features use more vertices or a position is not finite, and
+  // TooMany if there are more than 8 `limit` pairs of leaves. The object can be used after an
+  // exception.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
                bool fresh, std::size_t limit);
-  // Of the last prepare.
+  // The positions of the last prepare.
   Ends ends() const { return Ends::packed(lines_.data()->value); }
-  // After prepare: hands the candidates of one kind to `take(block, chunk)`, from several threads;
-  // a chunk is always the same candidates, taken in the same order, and comes in blocks of some
-  // thousand.
+  // Call prepare first. Passes the candidates of one kind to `take(block, chunk)`, from several
+  // threads. A chunk always has the same candidates in the same order, in blocks of some thousand.
   using Take = std::function<void(const CandidateBlock&, std::size_t)>;
   std::size_t chunks(Kind kind) const;
   void for_each_block(Kind kind, const Take& take);
@@ -63,7 +62,7 @@ class MeshCcd {
   TopologyChange update_topology(std::vector<std::int32_t> faces, Groups groups);
 
   const BroadStats& stats() const { return stats_; }
-  // For arrays that answers are handed out in; they may outlive this.
+  // Memory of the arrays of answers; the arrays may outlive this object.
   const std::shared_ptr<SpareMemory>& spare() const { return spare_; }
   std::size_t bytes() const;
 

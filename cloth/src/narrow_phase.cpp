@@ -25,11 +25,12 @@
 namespace tauguard::cloth {
 namespace {
 
-// Queries at a time: `block` before and `batch` after queries that an axis separates are left out.
+// Numbers of queries that are processed together: `block` in the axis filter, `batch` in the stages
+// after it.
 constexpr int batch = 128, block = 512;
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Four times the same.
+// The same cubic in all four lanes.
 Cubics cubics_of(const double* b) { return {{splat(b[0]), splat(b[1]), splat(b[2]), splat(b[3])}}; }
 
 // Writes pieces that hold one root each, in order, and together all roots of the cubic. Returns
@@ -86,7 +87,7 @@ struct Batch {
   Outcome outcome[3 * batch];
   double at[3 * batch];
   std::int32_t open[batch];
-  int count = 0, left = 0;  // pieces; queries that stay open
+  int count = 0, left = 0;  // number of pieces; number of undecided queries
 };
 
 // Writes the pieces of all queries that may have contact. Queries with a single piece come first;
@@ -197,7 +198,7 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
   }
 }
 
-// A block: what no axis keeps apart goes on in batches.
+// Answers a block: queries that no axis separates are answered in batches.
 template <bool vf>
 void in_batches(const Ends& x, const std::int32_t* rows, int n, AxisFilter axes, double* toi,
                 Stats& stats) {

@@ -1,5 +1,5 @@
-// Vertex-face and edge-edge queries: does a moving vertex meet a moving face, do two moving edges
-// meet?
+// Vertex-face and edge-edge queries: whether a moving vertex meets a moving face, and whether two
+// moving edges meet.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace tauguard::cloth {
 
-// Both are exact for the doubles given. `exact` uses exact arithmetic throughout and is ab2pf's
-// reference. Only ab2pf has a minimum distance, where it is conservative.
+// Both methods are exact for the doubles given. `exact` uses exact arithmetic throughout and is the
+// reference of ab2pf. Only ab2pf has a minimum distance, for which it is conservative.
 enum class Method : int { ab2pf = 0, exact };
 
 // How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its
@@ -36,10 +36,10 @@ struct Stats {
   }
 };
 
-// How ab2pf first leaves out queries that an axis keeps apart at both ends of the step: by
-// comparing x, y and z; by `points` of the same positions on `seven_axes` (apart.hpp), which pays
-// from a few queries a vertex on; or not at all, where the broad phase has. What is left is
-// answered the same whichever it is.
+// The filter by which ab2pf rejects queries that an axis separates at both ends of the step. It
+// compares x, y and z; or `points`, the projections of the positions onto `seven_axes` (apart.hpp),
+// which pays off from a few queries per vertex; or nothing, if the broad phase has compared
+// already. The answers do not depend on the filter.
 struct AxisFilter {
   bool look = true;
   const Projection* points = nullptr;

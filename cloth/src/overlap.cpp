@@ -18,12 +18,13 @@ struct RowStride {
 RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
 RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
-// The lanes that a row is compared with: all lanes in use, or those after it in its own leaf.
+// The lanes that a row is compared with: all lanes in use, or those after the row if both leaves
+// are the same.
 TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
   return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
 }
 
-// Rows that still have lanes after x, y and z.
+// Rows with lanes that x, y and z did not reject.
 struct Remaining {
   int rows[lanes], count = 0;
   TAUGUARD_INLINE void add(int row, Mask near, Mask shared, Overlaps& out) {
@@ -84,7 +85,7 @@ void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, 
 }
 
 #if defined(__x86_64__)
-// Eight lanes on one axis.
+// Compares eight lanes on one axis.
 template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b) {
   __m256 below[times], above[times];
@@ -97,7 +98,7 @@ TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const
                       _mm256_and_ps(above[0], above[times - 1]));
 }
 
-// Every axis is compared, whatever the result of the others: no branch to mispredict.
+// Every axis is compared, without a branch, which would be mispredicted.
 template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
                                                 int axes, Mask wanted) {
@@ -150,7 +151,7 @@ TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, i
   }
 }
 
-// Of 16 volumes on one axis.
+// Compares 16 volumes on one axis.
 template <int times>
 struct Axis16 {
   __m512 low[times], high[times];

@@ -1,4 +1,4 @@
-// Which of 16 bounding volumes a volume overlaps: the inner loop of the broad phase.
+// Finds which of 16 bounding volumes a volume overlaps. This is the inner loop of the broad phase.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ using Mask = std::uint32_t;  // a bit per lane
 // one, axis by axis: [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf)
 // everywhere.
 
-// The 16 features of a leaf: their volumes, their vertices as [vertex of the feature][lane], the
+// The 16 features of a leaf: their volumes, their vertices [vertex of the feature][lane], and the
 // lanes in use.
 struct LeafLanes {
   const float* block;
@@ -24,7 +24,7 @@ struct LeafLanes {
   int arity;
   Mask occupied;
 };
-// For every i in `rows`, a lane of one leaf: the lanes of another leaf that it meets, at least one.
+// For every lane of one leaf in `rows`, the lanes of the other leaf that it meets, at least one.
 struct Overlaps {
   Mask rows = 0;
   unsigned adjacent = 0;  // lanes left out because a vertex is shared
@@ -37,19 +37,20 @@ struct Overlaps {
 };
 
 struct OverlapKernels {
-  // Of `candidates`, the lanes of `block` that `node` does not stand apart from.
+  // The lanes of `block`, among `candidates`, that `node` overlaps.
   Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
                         Mask candidates);
-  // Volumes that are not apart, of features that share no vertex. same: b is a; each unordered pair
-  // once. A shared vertex lies in both volumes, so that it does not matter which is looked at
-  // first.
+  // Finds pairs of features whose volumes overlap and that share no vertex. same: b is a, and each
+  // unordered pair is found once. Features that share a vertex overlap in it, so both tests may
+  // come in any order.
   void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
                     Overlaps& out);
 };
 
-// The fastest that this processor runs. Comparisons only: every variant gives the same bits.
+// The fastest kernels that this processor runs. They only compare, so every variant gives the same
+// bits.
 const OverlapKernels& overlap_kernels();
-// By name, for tests: "portable", "avx2", "avx512"; null where the processor lacks it.
+// For tests: the kernels named "portable", "avx2" or "avx512"; null if the processor lacks them.
 const OverlapKernels* overlap_kernels(const char* name);
 
 // Two nodes: no axis separates them on the same side at every end.

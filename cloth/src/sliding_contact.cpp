@@ -1,6 +1,6 @@
-// Two features are apart in a plane. At first contact a vertex of one reaches an edge of the other.
-// The line of the edge passes through the vertex at a root of a quadratic; then the vertex is
-// between the ends of the edge, or not.
+// For two features in one plane that are apart at the start. At the first contact a vertex of one
+// reaches an edge of the other. The line of the edge passes through the vertex at a root of a
+// quadratic. At that time the vertex is between the ends of the edge, or there is no contact.
 #include "sliding_contact.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ constexpr double none = std::numeric_limits<double>::infinity(),
 constexpr int reaches_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 constexpr int reaches_of_ee[][3] = {{0, 2, 3}, {1, 2, 3}, {2, 0, 1}, {3, 0, 1}};
 
-// The root lies within this of its estimate, or is not accepted.
+// A root is accepted only if it lies within this distance of its estimate.
 constexpr double around = 0x1p-40;
 
 struct Flat {
@@ -27,10 +27,10 @@ double dot(Flat a, Flat b) { return a.x * b.x + a.y * b.y; }
 Flat mix(Flat a, Flat b, double t) { return {(1 - t) * a.x + t * b.x, (1 - t) * a.y + t * b.y}; }
 double largest(Flat a) { return std::max(std::fabs(a.x), std::fabs(a.y)); }
 
-// u and v are the edge's ends as seen from the point, M the product of their largest coordinates.
-// A difference carries a relative error of eps (2^-53), so a cross or dot product of two at most
-// 8 eps M, the middle coefficient 12 eps M, a value between, by three products of positive weights,
-// 32 eps M: `error` is 2^-45 M, eight times that.
+// u and v are the edge's ends as seen from the point, M the product of their largest coordinates. A
+// difference has a relative error of eps (2^-53). A cross or dot product of two differences is then
+// off by at most 8 eps M, the middle coefficient by 12 eps M, and a value between, a sum of three
+// products with positive weights, by 32 eps M. `error` is 2^-45 M, eight times that.
 double reach(const Flat (&u)[2], const Flat (&v)[2]) {
   const auto apart = [](double a, double b, double c, double d) {
     return (a > 0 && b > 0 && c > 0 && d > 0) || (a < 0 && b < 0 && c < 0 && d < 0);

@@ -1,5 +1,5 @@
-// Memory of arrays that were handed out, used again once they are freed: fresh pages cost more than
-// what is written into them.
+// Reuses the memory of arrays that were returned to the caller and freed, because fresh pages cost
+// more than writing the arrays.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,8 @@ class SpareMemory {
     void* at;
     std::size_t bytes;
   };
-  // At least so many bytes, not zeroed: the smallest block that has them, if none is wasteful.
+  // A block of at least `bytes`, not zeroed: the smallest kept block that suffices, unless it is
+  // much too large.
   Block take(std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -64,7 +65,7 @@ class SpareMemory {
   std::vector<Block> blocks_;
 };
 
-// An array of numbers in such memory, given back with its last owner.
+// An array of numbers in such memory, which its last owner gives back.
 template <class T>
 class SpareArray {
  public:

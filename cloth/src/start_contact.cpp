@@ -1,7 +1,7 @@
-// Contact is the origin in the hull of the features' differences, as in exact.cpp, at one time. In
-// most pairs that touch, one coordinate is the same in all four vertices. Then two dimensions are
-// left, in which signs of differences or a filtered determinant decide. Other pairs are decided in
-// integers.
+// As in exact.cpp, the features touch if the hull of their differences contains the origin,
+// here at one time. In most pairs that touch, one coordinate is the same in all four vertices. Then
+// two dimensions are left, in which signs of differences or a filtered determinant decide. Other
+// pairs are decided in integers.
 #include "start_contact.hpp"
 
 #include <array>
@@ -16,19 +16,20 @@ namespace {
 
 using geometry::FixedInt;
 
-// The hull's corners in order around it: the first vertex as seen from the second.
+// The corners in order around the hull: the first vertex as seen from the second.
 constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
-// Neighbouring corners share a vertex: their cross product is of the others, as seen from it.
+// Neighbouring corners share a vertex. Their cross product is that of the two other vertices
+// relative to it.
 constexpr int sides_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 constexpr int sides_of_ee[][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
 
-// If one coordinate is the same in all, the other two, i and j, decide: on which sides of the
+// If one coordinate is the same in all vertices, the other two, i and j, tell on which sides of the
 // hull's edges the origin lies. With u = 2^-53 a product of two differences has an error of 3 u,
-// and the difference of two products of one u more: 2^-51 is in use. Faces that lie on one another
-// share lines along the axes: there differences are zero, which no rounding hides. The loop has no
-// branches because its outcome changes from query to query.
+// and the difference of two products one of 4 u = 2^-51. Faces that lie on one another often share
+// lines along the axes. Their differences are exactly zero there. The loop has no branches because
+// its outcome changes from query to query.
 template <bool vf>
 AtStart in_plane(const double* const* p, int i, int j) {
   constexpr int corners = vf ? 3 : 4;
@@ -56,7 +57,7 @@ AtStart in_plane(const double* const* p, int i, int j) {
   }
   if (left & right) return AtStart::apart;
   if (left | right) return AtStart::touching;
-  // All corners on one line through the origin: the way around them covers their hull.
+  // All corners are on one line through the origin. The polygon through them covers their hull.
   for (int c = 0; c < corners; ++c) {
     const int *a = vf ? of_vf[c] : of_ee[c],
               *b = vf ? of_vf[(c + 1) % corners] : of_ee[(c + 1) % corners];

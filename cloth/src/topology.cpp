@@ -36,7 +36,8 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
   vertices.vertices = used_vertices(faces.vertices);
   const VertexTable numbers(vertices.vertices);
   const std::size_t count = vertices.size();
-  std::vector<std::int32_t> f(faces.vertices.size());  // by their place among the vertices in use
+  std::vector<std::int32_t> f(
+      faces.vertices.size());  // indexed by position among the vertices in use
   std::transform(faces.vertices.begin(), faces.vertices.end(), f.begin(),
                  [&](std::int32_t v) { return numbers.place(v); });
   triangles = 0;
@@ -89,7 +90,7 @@ std::vector<std::int32_t> match_sorted(const Features& before, const Features& a
 
 std::vector<std::int32_t> match_faces(const Features& before, const Features& after) {
   std::vector<std::int32_t> match(before.size(), -1), old_order, new_order;
-  // Long stretches are the same rows shifted by those that left: take them without sorting.
+  // Most rows are the old ones, shifted by those that left. They are copied without sorting.
   std::size_t i = 0, j = 0;
   while (i < before.size() && j < after.size()) {
     if (compare(before, i, after, j) == 0) {

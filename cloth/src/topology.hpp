@@ -1,5 +1,4 @@
-// What a list of faces implies: the vertices in use, the unique edges, and what changed since
-// another list.
+// The vertices and unique edges of a list of faces, and the changes since another list.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +8,12 @@
 
 namespace tauguard::cloth {
 
-// An isolated edge belongs to no face, an isolated vertex to no face and no edge. They stand behind
-// all triangles in `faces`, as (a, b, b) and (p, p, p): a vertex-face query of such a row is one of
-// a point and an edge, or of two points.
+// An isolated edge belongs to no face, an isolated vertex to no face and no edge. They follow all
+// triangles in `faces`, as (a, b, b) and (p, p, p). A vertex-face query of such a row tests a point
+// against an edge, or two points.
 struct Topology {
   Features vertices{1, {}}, edges{2, {}}, faces{3, {}};
-  // Positions must have at least so many rows.
+  // The least number of rows that positions must have.
   std::size_t rows() const {
     return vertices.vertices.empty() ? 0 : std::size_t(vertices.vertices.back()) + 1;
   }

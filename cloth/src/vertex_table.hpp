@@ -8,10 +8,10 @@
 
 namespace tauguard::cloth {
 
-// Is a table of all numbers up to the largest short enough beside a list of `size`?
+// Whether a table of all numbers up to the largest is short enough, compared with a list of `size`.
 inline bool dense(std::size_t largest, std::size_t size) { return largest <= 8 * size + 1024; }
 
-// In order, each once.
+// The vertices in use, sorted and unique.
 inline std::vector<std::int32_t> used_vertices(const std::vector<std::int32_t>& list) {
   std::vector<std::int32_t> used;
   if (list.empty()) return used;
@@ -31,13 +31,13 @@ inline std::vector<std::int32_t> used_vertices(const std::vector<std::int32_t>& 
 
 class VertexTable {
  public:
-  // used: in order, each once; must outlive the table.
+  // used: sorted and unique; must outlive the table.
   explicit VertexTable(const std::vector<std::int32_t>& used) : used_(used) {
     if (used.empty() || !dense(used.back(), used.size())) return;
     place_.assign(std::size_t(used.back()) + 1, -1);
     for (std::size_t i = 0; i < used.size(); ++i) place_[used[i]] = static_cast<std::int32_t>(i);
   }
-  // Of a vertex in use.
+  // The position of a vertex that is in use.
   std::int32_t place(std::int32_t v) const {
     if (!place_.empty()) return place_[v];
     return static_cast<std::int32_t>(std::lower_bound(used_.begin(), used_.end(), v) -

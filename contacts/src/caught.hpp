@@ -10,7 +10,7 @@
 
 namespace tauguard::contacts {
 
-// What mju_error said.
+// The message of mju_error.
 struct MujocoError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -18,13 +18,13 @@ struct MujocoError : std::runtime_error {
 // MuJoCo's functions for handlers, and its layout of a message, as far as they are needed.
 struct Logging {
   using Handler = void (*)(const void*);
-  Handler (*set)(Handler) = nullptr;  // of this thread; returns the one before
+  Handler (*set)(Handler) = nullptr;  // sets this thread's handler and returns the previous one
   Handler (*global)() = nullptr;      // of all threads
   int error = 0;                      // the level of an error
   int at_subject = 0;                 // offset of the text; the level is the first field, an int
 };
 
-// The thread's errors are caught while this lives.
+// Catches the errors of the thread during its lifetime.
 class Catching {
  public:
   explicit Catching(const Logging& logging);
@@ -38,11 +38,12 @@ class Catching {
   Logging::Handler before_, outer_before_;
 };
 
-// Where an error of the thread jumps to; nullptr outside of calls.
+// The jump target of an error of the thread; nullptr outside of calls.
 std::jmp_buf*& landing();
 [[noreturn]] void throw_error();
 
-// A function of MuJoCo's that may end in an error: a MujocoError while a Catching lives.
+// A function of MuJoCo that may fail. During the lifetime of a Catching an error is thrown as
+// MujocoError.
 template <class... A>
 class Call {
  public:

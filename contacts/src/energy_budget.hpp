@@ -10,8 +10,8 @@ namespace tauguard::contacts {
 // change of the squared lengths, the energy of an element is e K e / 4, whose gradient is MuJoCo's
 // spring force.
 struct Sheet {
-  std::vector<std::int32_t> ends;        // 6 an element
-  std::vector<double> rest, stiffness;   // 3 and 9 an element
+  std::vector<std::int32_t> ends;        // 6 for each element
+  std::vector<double> rest, stiffness;   // 3 and 9 for each element
   double energy(const double* x) const;  // at vertices x (n, 3) [J]
 };
 
@@ -32,8 +32,8 @@ class EnergyBudget {
         fraction_(share),
         momentum_(engine.nv) {}
 
-  // Starts a new budget: a share of the kinetic energy at `velocity` (nv), the velocity at the
-  // start of the step that was just made.
+  // Starts a new budget: a fraction of the kinetic energy at the start of the last step, when the
+  // velocity was `velocity` (nv).
   void open(const double* velocity) {
     gained_ = 0, allowed_ = fraction_ * kinetic(e_.data, velocity);
   }

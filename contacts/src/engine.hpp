@@ -1,5 +1,6 @@
-// MuJoCo as the guard sees it: functions and fields of one model and its data, by address. Python
-// finds the addresses (contacts/guard/engine.py); nothing here depends on MuJoCo's headers.
+// The parts of MuJoCo that the guard uses: functions and fields of one model and its data, by
+// address. Python finds the addresses (contacts/guard/engine.py); nothing here depends on MuJoCo's
+// headers.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 
 namespace tauguard::contacts {
 
-// Parts of a state that are saved, restored and copied: MuJoCo's mjtState.
+// Which parts of a state are saved, restored and copied (MuJoCo's mjtState).
 struct Signatures {
   int integration, pose;
 };
@@ -26,8 +27,8 @@ struct Contact {
 struct Engine {
   using Step = void (*)(const void*, void*);
   const void* model;
-  void *data, *end;  // what is stepped; the kinematics of a step's end
-  void* other;       // with mocap bodies: data of the same joints with other mocap poses
+  void *data, *end;  // the data that is stepped; data for the kinematics at a step's end
+  void* other;       // only with mocap bodies: data with the same joints and other mocap poses
 
   Logging logging;
   Call<const void*, void*> step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m,
@@ -42,12 +43,12 @@ struct Engine {
   int nq, nv, nbody, nmocap, ngeom, nflex, nflexvert, ntendon;
   Signatures signature;
   int state_size;
-  bool interpolated;  // some flex's vertices do not hang on bodies of their own
+  bool interpolated;  // some flex has vertices without bodies of their own
 
-  // Of the model; timestep, flags, margins and parameters are changed within a step.
+  // Fields of the model. Timestep, flags, margins and parameters are changed within a step.
   double* timestep;
   int *disableflags, *enableflags, *integrator, *cone, *solver, *iterations;
-  double *o_margin, *o_solref;                // of all contacts, where the flag `override` is set
+  double *o_margin, *o_solref;                // of all contacts, if the flag `override` is set
   double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
   double* friction[3];
   int* priority[3];
@@ -55,7 +56,7 @@ struct Engine {
   const int *flex_vertbodyid, *geom_bodyid, *body_rootid, *body_mocapid;
   const double* flex_vert;
 
-  // Of the data.
+  // Fields of `data`.
   double *time, *qpos, *qvel, *energy, *mocap_pos, *mocap_quat;
   const double *actuator, *applied, *wrench;
   const double *xpos, *xmat, *flexvert;
@@ -66,11 +67,11 @@ struct Engine {
   double *const *efc_vel, *const *efc_pos, *const *efc_force;
   int *const *efc_type, *const *efc_id;
 
-  // Of `end`.
+  // Fields of `end`.
   double *end_qvel, *end_energy;
   const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
 
-  // Of `other`.
+  // Fields of `other`.
   double *other_energy, *other_mocap_pos, *other_mocap_quat;
   const double *other_xpos, *other_xmat, *other_flexvert;
 
@@ -91,7 +92,7 @@ struct Engine {
             reinterpret_cast<const double*>(p + at_pos),
             reinterpret_cast<const double*>(p + at_frame)};
   }
-  // How many rows of a contact, from its first one on, act along its normal.
+  // The number of rows of a contact that act along its normal, counted from its first row.
   int normal_rows(const Contact& c) const {
     return *cone == pyramidal && c.dim > 1 ? 2 * (c.dim - 1) : 1;
   }

@@ -1,4 +1,4 @@
-// Fields of a model that a guard has copied or derived something from: were they changed?
+// Detects changes of the model's fields that a guard has copied or derived something from.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace tauguard::contacts {
 class FollowedFields {
  public:
   void clear() { fields_.clear(), copy_.clear(); }
-  // So many bytes from here on, as they are now.
+  // Follows `size` bytes from `from` on; their present values are the reference.
   void add(const char* from, std::size_t size) {
     if (!fields_.empty() && fields_.back().from + fields_.back().size == from)
       fields_.back().size += size;

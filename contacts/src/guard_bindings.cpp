@@ -1,4 +1,4 @@
-// The guarded stepper: what of a model it covers, and its steps.
+// Binding of the guarded stepper: the pairs that it covers, and its steps.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
@@ -151,8 +151,9 @@ class Guard {
     verdict_.add_flex_pair(list<std::int32_t>(a), list<double>(radii), list<std::int32_t>(elements),
                            static_cast<int>(elements.shape(1)), list<std::uint8_t>(skip));
   }
-  // Partners of every pair, in the order they were added, flexes against flexes last: rows (kind,
-  // number) of the first, the second and what carries their parameters, and the last level.
+  // Partners of every pair, in the order in which pairs were added; flexes against flexes come
+  // last. A row holds (kind, number) of the first partner, of the second and of the carrier of
+  // their parameters, and the last level.
   void partners(IntRows rows) {
     for (std::size_t i = 0; i < rows.shape(0); ++i) {
       const std::int32_t* r = rows.data() + 7 * i;
@@ -164,21 +165,21 @@ class Guard {
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
-  // Bytes of the model that all this was made from, as they are now.
+  // The fields of the model that the guard depends on; their present values are the reference.
   void follow(const std::vector<std::pair<std::uintptr_t, std::size_t>>& fields) {
     fields_.clear();
     for (const auto& [from, size] : fields) fields_.add(reinterpret_cast<const char*>(from), size);
   }
-  // Whether the model's fields differ from then.
+  // Whether the model's fields have changed since follow().
   bool changed() const { return fields_.changed(); }
-  // Takes back what was added since the last start.
+  // Removes all that was added since the last start.
   void clear() {
     verdict_ = Verdict{}, pairs_.clear(), last_.clear(), sheets_.clear(), spins_.clear();
     pulled_.clear();
   }
 
-  // All was added. Whether flexes are covered against flexes: the owner's `_tunnelling_events`
-  // finds them.
+  // Call this after all was added. `sheets`: whether flexes are covered against flexes, which the
+  // owner's `_tunnelling_events` finds.
   void start(bool sheets) {
     if (stepper_)
       stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),
@@ -194,8 +195,8 @@ class Guard {
                                          double length) { return joined(hits, qpos, length); });
   }
 
-  // The number of contacts where nothing else is to be said, or -1. `owner` is not held beyond the
-  // call: it holds this.
+  // The number of contacts, or -1 if there is more to report. `owner` holds this object, so it is
+  // referenced during the call only.
   int step(nb::handle owner, nb::object each) {
     refuse_within_step();
     const Stepping stepping(this);
@@ -216,7 +217,7 @@ class Guard {
       quiet = stepper_->step(call);
     } catch (const MujocoError& error) {
       undo(stacks);
-      // An exception in one of MuJoCo's Python callbacks comes as an error of MuJoCo's.
+      // An exception in a Python callback of MuJoCo arrives here as an error of MuJoCo.
       if (!PyErr_Occurred())
         PyErr_SetString(nb::module_::import_("mujoco").attr("FatalError").ptr(), error.what());
       throw nb::python_error();
@@ -257,7 +258,7 @@ class Guard {
                           r.rolled_back ? array_of(stepper_->first()) : nb::none());
   }
 
-  // What passes on the way to where the data is now.
+  // The pairs that pass through each other between the start and the present state of the data.
   nb::typed<nb::list, nb::any> passing() {
     std::vector<PairHit> through;
     for (PairHit& hit : stepper_->judge())
@@ -274,7 +275,7 @@ class Guard {
   void reset() { refuse_within_step(), stepper_->reset(); }
 
  private:
-  // While a step is made. The flag is read and written with the GIL held.
+  // Marks that a step is in progress. The flag is read and written with the GIL held.
   struct Stepping {
     explicit Stepping(Guard* guard) : guard(guard) {
       guard->stepping_ = std::this_thread::get_id();
@@ -289,7 +290,7 @@ class Guard {
           "its end, or use a guard and an MjData for each thread");
   }
 
-  // MuJoCo's stacks, which an error leaves as they were when it came.
+  // MuJoCo's stack pointers. An error does not reset them, so they are saved and restored.
   struct Stacks {
     explicit Stacks(const Engine& engine) : e(engine) {
       for (int k = 0; k < 3; ++k)
@@ -347,7 +348,7 @@ class Guard {
   std::vector<char> pulled_;
   std::vector<Sheet> sheets_;
   std::unique_ptr<Stepper> stepper_;
-  std::thread::id stepping_;  // that makes a step now, or none
+  std::thread::id stepping_;  // that is making a step, or none
 };
 
 }  // namespace

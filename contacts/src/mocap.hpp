@@ -15,55 +15,60 @@ using namespace rigid;  // the convex kernel
 
 class Mocap {
  public:
-  // `pulled`: by equality, whether something that mocap carries takes part in it.
+  // `pulled`: for each equality, whether a mocap body or something attached to one takes part in
+  // it.
   Mocap(const Engine& engine, std::vector<char> pulled);
 
   void set_pulled(std::vector<char> pulled) { pulled_ = std::move(pulled); }
-  // Whether every number of the poses is finite.
+  // Whether all poses are finite.
   bool finite() const;
   template <class Archive>
   void archive(Archive& a) {
     a(start_), a(time_);
   }
 
-  // The present poses begin the way of the next step.
+  // Takes the present poses as the start of the next step's motion.
   void remember();
-  // A step begins at the present state; false if something else set it since the last one ended.
+  // Begins a step at the present state. False if the state was changed from outside since the last
+  // step.
   bool begin();
-  bool moves() const { return moves_; }  // whether the way of this step has a length
+  bool moves() const { return moves_; }  // whether some mocap body moves in this step
 
-  // The next attempt goes from one fraction of the motion to another; the data is at its start.
+  // Sets the fractions of the motion between which the next attempt runs. The data is at the
+  // attempt's start.
   void sub_step(double from, double to);
-  // Poses of a sub-step's start, end, and of the step's end as the user wrote them.
+  // Write the poses of a sub-step's start, of its end, and of the step's end as the user gave them.
   void depart() { write(from_); }
   void arrive() { write(to_); }
   void command() { write(commanded_); }
 
-  // Where everything is at the start: whole steps are computed with the poses of their end.
+  // Positions at the start. Whole steps are computed with the poses of their end, so the data
+  // itself does not have them.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
   const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
   const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }
-  // Adds how far each body is turned by what carries it (nbody, 3) [rad].
+  // Adds the rotation of each body that its mocap body causes (nbody, 3) [rad].
   void add_turns(double* turn) const;
 
-  // Of a sub-step: potential energy of the start's joint positions with the poses of its end [J],
-  // and the vertices there. False if nothing moves or the data has these poses anyway.
+  // For a sub-step: computes the potential energy of the start's joint positions with the end's
+  // mocap poses [J], and the vertices. False if nothing moves or the data already has these poses.
   bool shifted();
   double potential() const { return e_.other_energy[0]; }
   const double* vertices() const { return e_.other_flexvert; }
 
-  // Whether one of the partners is a geom that hangs on a mocap body, and some mocap body moves.
+  // Whether some mocap body moves and one of the partners is a geom attached to a mocap body.
   bool carries(const Partners& pair) const;
-  // How far the carriers separate both partners along the contact's normal [m].
+  // The distance by which mocap bodies separate the partners along the contact's normal [m].
   double parting(const Contact& contact) const;
-  // What was done on everything else, by contacts and equalities; `velocity` is the mean [J].
+  // Work that mocap bodies did on all others, by contacts and equalities [J]. `velocity` is the
+  // mean velocity.
   double work(const double* velocity, double length);
 
  private:
   struct Pose {
     double pos[3], quat[4];
   };
-  using Poses = std::vector<Pose>;  // by mocap number
+  using Poses = std::vector<Pose>;  // indexed indexed by mocap number
 
   bool jumps() const { return moves_ && jumps_; }
   void read(Poses* poses) const;

@@ -1,4 +1,4 @@
-// A step that was not accepted: rolled back and taken again in sub-steps.
+// Rolls a step back that was not accepted, and takes it again in sub-steps.
 #include <algorithm>
 
 #include "stepper.hpp"
@@ -6,7 +6,8 @@
 namespace tauguard::contacts {
 namespace {
 
-// Fractions of its path tried until the sub-step is within its energy budget.
+// Fractions of the sub-step's path. They are tried in turn until the sub-step is within the energy
+// budget.
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
 // If only an impact zone helps, shorter sub-steps are useless: each zone makes the shortest
@@ -24,7 +25,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
   push_ = s_.push / whole_;
-  if (hits.empty()) {  // only pushed out too fast
+  if (hits.empty()) {  // the pair was the pair was only pushed out too fast
     push_ = 0;
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
@@ -46,7 +47,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   }
 }
 
-// Advances by `length` or less, in as many attempts as that takes; returns how far it went [s].
+// Advances by at most `length`, in as many attempts as needed. Returns the time advanced [s].
 double Stepper::sub_step(double length, const std::function<void()>& each) {
   const double share = 1 - rest_ / whole_;
   mocap_.sub_step(share, 1), mocap_.depart();
@@ -97,7 +98,8 @@ std::vector<Held> Stepper::held(double length) const {
   return out;
 }
 
-// Whether no pair passes through, and none becomes deeper unless a shorter sub-step was tried.
+// Whether no pair passes through, and none becomes deeper. Deeper pairs are accepted once a shorter
+// sub-step was tried.
 bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
@@ -106,8 +108,8 @@ bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   });
 }
 
-// The budget of attempts is spent: joins what passes through in impact zones, then slows down what
-// exceeds the energy budget.
+// Ends a step whose attempts are used up. Joins pairs that pass through in impact zones, then slows
+// the motion down until it is within the energy budget.
 EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hits,
                                   EnergyChange change) {
   std::vector<PairHit> through;
@@ -139,8 +141,8 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     again();
   }
   if (!mocap_.moves()) return change;
-  // A mocap body may pass through a body that stands still; too much energy is then the smaller
-  // error.
+  // If the bodies are slowed down, a mocap body may pass through one of them. Too much energy is
+  // then the smaller error.
   if (passes()) go(1), note_passed(), again();
   return change;
 }
@@ -156,7 +158,7 @@ bool Stepper::passes() {
   return std::any_of(hits.begin(), hits.end(), [](const PairHit& h) { return h.passed; });
 }
 
-// How long the next attempt is; its pairs join those that are held.
+// The length of the next attempt. The pairs in `hits` are held from now on.
 double Stepper::shorter(const std::vector<PairHit>& hits, double length) {
   double share = 1;
   bool fresh = false;

@@ -5,17 +5,17 @@
 namespace tauguard::contacts {
 namespace {
 
-// Time constant of a row that the integrator `discrete` is to resolve within the step [s].
+// Time constant of a row under the integrator `discrete`, short enough to act within the step [s].
 constexpr double rigid = 1e-6;
 
 constexpr int least_iterations = 100;
 
-// Numbers of friction by place (an explicit pair, a geom, a flex), how many of them are sliding
-// friction, and the least that MuJoCo takes (mjMINMU).
+// The number of friction coefficients of an explicit pair, a geom and a flex; how many of them are
+// sliding friction; and MuJoCo's smallest coefficient (mjMINMU).
 constexpr int frictions[] = {5, 3, 3}, tangents[] = {2, 1, 1};
 constexpr double least_friction = 1e-5;
 
-// Puts margins, parameters and flags back, whatever happens within the step.
+// Restores margins, parameters and flags at the end, also after an exception.
 class Borrowed {
  public:
   explicit Borrowed(const Engine& e)
@@ -43,8 +43,8 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
-  // Other solvers do not converge on stiff rows within their iterations, and pairs would then pass
-  // through.
+  // Newton's solver is used because others do not converge on stiff rows within their iterations,
+  // so that pairs would pass through.
   *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {
@@ -65,7 +65,7 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
     else
       geoms_[e_.pair_geom1[at.number]] = geoms_[e_.pair_geom2[at.number]] = 1;
   }
-  if (*e_.enableflags & e_.override_flag) {  // the parameters of all contacts instead
+  if (*e_.enableflags & e_.override_flag) {  // the override replaces the parameters of all contacts
     for (const Held& h : held) borrowed.set(e_.o_margin, std::max(*e_.o_margin, h.margin));
     if (discrete && !held.empty())
       borrowed.set(e_.o_solref, rigid), borrowed.set(e_.o_solref + 1, 1.0);
@@ -92,13 +92,14 @@ void Rows::aim_contact(const Contact& contact, double length, double push) {
   const int first = contact.row, count = e_.normal_rows(contact);
   const bool discrete = e_.is_discrete();
   const double* now = *e_.efc_vel;
-  // Both edges of a pyramid's first direction have the normal speed in their middle.
+  // The normal speed is the mean over the two edges of a pyramid's first direction.
   const double normal = count > 1 ? 0.5 * (now[first] + now[first + 1]) : now[first];
   const double apart =
       contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
   const double speed = apart - mocap_.parting(contact) / length;
   for (int row = first; row < first + count; ++row) {
-    // Friction acts where bodies touch; across a gap only the motion along the normal is stopped.
+    // Friction acts only between bodies that touch. Across a gap only the motion along the normal
+    // is stopped.
     const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);
     if (discrete)
       (*e_.efc_margin)[row] = (*e_.efc_pos)[row] + length * aim;

@@ -1,15 +1,15 @@
 // A sub-step in which the solver stops the approach of chosen pairs before they are deep.
 //
 // The margins of the chosen pairs are as wide as the pair may travel, so that MuJoCo lists every
-// place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets the
-// velocity that it is to have at the end: for a signed distance d > 0 and a sub-step of length h no
-// faster than d / h towards each other, and in overlap none. The solver then finds the least change
-// of velocity (in the metric of the inertia) that satisfies these rows. All of them allow standing
-// still, so the change removes energy and adds none, except to push an overlap out. Mocap bodies
-// carry others along by their own velocity, which MuJoCo's rows do not contain. They push without
-// friction: with MuJoCo's friction, bodies that slide at a speed v separate at mu v. A ball between
-// a paddle and a table, which must slide on one of them, would then leave at many times the
-// paddle's speed.
+// place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets a
+// target velocity for the end of the sub-step. At a signed distance d > 0 and a length h of the
+// sub-step the bodies approach at most at d / h; in overlap they do not approach. The solver then
+// finds the least change of velocity (in the metric of the inertia) that satisfies these rows. All
+// of them allow standing still, so the change removes energy and adds none, except to push an
+// overlap out. Mocap bodies carry others along by their own velocity, which MuJoCo's rows do not
+// contain. They push without friction: with MuJoCo's friction, bodies that slide at a speed v
+// separate at mu v. A ball between a paddle and a table, which must slide on one of them, would
+// then leave at many times the paddle's speed.
 #pragma once
 
 #include "mocap.hpp"
@@ -17,7 +17,7 @@
 
 namespace tauguard::contacts {
 
-// A pair that is held, and how far it may travel in the sub-step [m].
+// A pair whose approach is stopped, and how far it may travel in the sub-step [m].
 struct Held {
   int pair;
   double margin;

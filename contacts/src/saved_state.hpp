@@ -1,4 +1,5 @@
-// A guard's memory of earlier steps, as bytes: a copy that reads them continues with the same bits.
+// Saves a guard's memory of earlier steps as bytes. A copy that reads them continues with the same
+// bits.
 #pragma once
 
 #include <cstring>
@@ -36,7 +37,7 @@ class Reader {
     if (static_cast<std::size_t>(end_ - at_) < sizeof value) fail();
     std::memcpy(&value, at_, sizeof value), at_ += sizeof value;
   }
-  // A list of the same length.
+  // Reads or writes a list whose length both sides know.
   template <class T>
   void operator()(std::vector<T>& values) {
     std::size_t count = 0;

@@ -13,7 +13,7 @@ std::uint64_t key(const Place& first, const Place& second) {
   return one(first) << 32 | one(second);
 }
 
-// Both partners of a contact, in the order of pairs: flexes first, then by number.
+// A key of both partners of a contact. As in pairs, flexes come first, then the lower number.
 std::uint64_t key(const Contact& contact) {
   Place p[2];
   for (int i = 0; i < 2; ++i)
@@ -158,7 +158,7 @@ bool Stepper::step(const std::function<void()>& each) {
   return false;
 }
 
-// Accepts the step as mj_step made it; true if the parameters of some pair were restored.
+// Accepts the step that mj_step made. True if the parameters of some pair were restored.
 bool Stepper::stands() {
   watched_ = std::max(watched_ - 1, 0);
   if (!guarded_count_) return false;
@@ -196,7 +196,8 @@ std::vector<PairHit> Stepper::judge() {
   return hits;
 }
 
-// Rotation vectors of bodies over the step by their speed at its end, where something turns fast.
+// Rotation vectors of the bodies over the step, estimated from their speed at its end. nullptr if
+// nothing turns fast.
 const double* Stepper::turns() {
   double most = 0;
   const double h = *e_.timestep;
@@ -236,8 +237,8 @@ void Stepper::note_lost(const std::vector<PairHit>& hits) {
     if (hit.lost) passed_[hit.pair] = 1;
 }
 
-// Without pairs that are no longer tracked, and without those that touched only briefly and whose
-// contact MuJoCo listed.
+// Removes pairs that are no longer tracked, and pairs that touched only briefly if MuJoCo listed
+// the contact.
 std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
   hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
@@ -257,7 +258,7 @@ bool Stepper::within_budget() {
   return true;
 }
 
-// By pair: whether MuJoCo lists a contact of it.
+// For each pair, whether MuJoCo lists a contact of it.
 std::vector<char> Stepper::listed() const {
   std::vector<char> seen(pairs_.size(), 0);
   for (int k = 0; k < *e_.ncon; ++k) {
@@ -273,8 +274,8 @@ std::vector<int> Stepper::release() {
   if (!guarded_count_) return out;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
-    // A moving mocap body sinks into others within a whole step, and a stiff contact would throw
-    // them away.
+    // Pairs with a moving mocap body are left out: it sinks into others within a whole step, and a
+    // stiff contact would throw them away.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

@@ -12,7 +12,8 @@
 
 namespace tauguard::contacts {
 
-// What a step would do to a pair; of the simplices of a flex the earliest and the deepest count.
+// What a step would do to a pair. For a flex, the earliest contact and the deepest level over its
+// simplices.
 struct PairHit {
   int pair, deepest;
   bool passed;   // its last eroded shapes met: the pair would have passed through itself
@@ -21,7 +22,7 @@ struct PairHit {
   double time;   // of the first touch, as a fraction of the step; 0 if it touched at the start
   double way;    // no two of its points approach each other further in the step [m]
   std::vector<std::int32_t> features;  // simplices of the flex that came deepest
-  std::vector<std::int32_t> corners;   // of flexes against flexes: vertices that did
+  std::vector<std::int32_t> corners;   // flexes against flexes: vertices that crossed
 };
 
 // One sub-step that was rolled back: when the next attempt ends [s], the pair that caused it, and
@@ -56,13 +57,13 @@ struct Settings {
 
 class Stepper {
  public:
-  // Flexes against flexes: what crosses between two sets of vertices.
+  // Finds what crosses between two flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
   // Joins the partners of each pair that passed in the last sub-step in an impact zone, from `qpos`
   // on.
   struct Stopped {
     std::vector<int> pairs;
-    double work;  // that mocap bodies did by it [J]
+    double work;  // of mocap bodies [J]
   };
   using ImpactZone = std::function<Stopped(const std::vector<PairHit>&, const double*, double)>;
 
@@ -88,11 +89,11 @@ class Stepper {
   // kept.
   void follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
               std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled);
-  // Whether the model and the data can be stepped at all.
+  // Whether the guard can step the model and the data.
   bool acceptable() const;
-  // A step ended in an exception: the state is that of its start.
+  // Restores the state at the start after an exception in a step.
   void abandon();
-  // All that is known of earlier steps, written or read.
+  // Writes or reads all that is known of earlier steps.
   template <class Archive>
   void archive(Archive& a) {
     verdict_.archive(a), mocap_.archive(a), budget_.archive(a), stiffening_.archive(a);
@@ -132,20 +133,21 @@ class Stepper {
   Rows rows_;
   TunnellingEvents tunnelling_;
   ImpactZone impact_zone_;
-  std::unordered_map<std::uint64_t, int> number_;  // of a pair, by its partners
-  std::vector<int> spins_;                         // degrees of freedom that turn something
+  std::unordered_map<std::uint64_t, int>
+      number_;              // the number the number of a pair, by its partners
+  std::vector<int> spins_;  // rotational degrees of freedom
 
   bool stepping_ = false;  // the state of the start is in first_
   std::vector<double> first_, saved_, velocity_, qpos_, x_t1_, turn_;
   std::vector<char> guarded_;
   int guarded_count_ = 0, watched_ = 0, since_ = 0, contacts_ = 0;
 
-  // Of the step that is rolled back.
+  // State of the step that is rolled back.
   Report report_;
-  double whole_ = 0, rest_ = 0, push_ = 0;  // of time [s]; of depth [1/s]
-  double least_ = 0;                        // fraction of the step that is not cut
-  int stops_ = 0;                           // of partners, in the last step that was rolled back
-  std::map<int, double> speeds_;            // of the pairs that are held [m/s]
+  double whole_ = 0, rest_ = 0, push_ = 0;  // whole and remaining time [s]; push-out rate [1/s]
+  double least_ = 0;                        // sub-steps of this fraction are not cut further
+  int stops_ = 0;                 // number of impact zones in the last step that was rolled back
+  std::map<int, double> speeds_;  // of the pairs that are held [m/s]
   std::vector<char> passed_, in_zone_;
 };
 

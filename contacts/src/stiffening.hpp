@@ -8,7 +8,7 @@
 
 namespace tauguard::contacts {
 
-// What carries the parameters of a contact: an explicit pair, a geom or a flex, and its number.
+// The carrier of a contact's parameters: an explicit pair, a geom or a flex, and its number.
 struct Place {
   enum Kind { pair, geom, flex } kind;
   int number;
@@ -18,7 +18,7 @@ struct Place {
   bool operator==(const Place& o) const { return kind == o.kind && number == o.number; }
 };
 
-// Both partners of a contact, in order (flexes first), and what carries its parameters.
+// Both partners of a contact (flexes first), and the carrier of its parameters.
 struct Partners {
   Place first, second, carrier;
 };
@@ -32,15 +32,15 @@ class Stiffening {
   Stiffening(const Engine& engine, const std::vector<Partners>& pairs)
       : e_(engine), pairs_(pairs), stiff_(pairs.size(), 0) {}
 
-  // Make a pair stiff, its carrier with a priority above the partner's so that no averaging
-  // softens it; false if it was already.
+  // Makes a pair stiff. Its carrier gets a priority above the partner's, so that averaging does not
+  // soften the contact. False if the pair was stiff already.
   bool stiffen(int pair);
-  // Undo that, once no other pair needs it; false if it was not stiff.
+  // Restores the parameters once no other pair needs them stiff. False if the pair was not stiff.
   bool restore(int pair);
   bool is_stiff(int pair) const { return stiff_[pair]; }
-  // Values that others have written since then become the pair's own.
+  // Takes over values that the user has written meanwhile; they are restored later.
   void follow();
-  // Another list of pairs, none of them stiff.
+  // Follows a new list of pairs, none of them stiff.
   void resize() { stiff_.assign(pairs_.size(), 0), saved_.clear(); }
   template <class Archive>
   void archive(Archive& a) {

@@ -43,8 +43,8 @@ rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const R
 
 }  // namespace
 
-// The box of both ends holds the chord of every point's way; the arc leaves its chord by at most
-// rho (1 - cos(angle / 2)). The last term covers rounding.
+// The box of both ends contains the chord of every point's path. The path leaves its chord by at
+// most rho (1 - cos(angle / 2)). The last term covers rounding.
 Aabb swept(SupportShape m, const RigidMotion& motion) {
   if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
   m.move_to(0);
@@ -97,7 +97,7 @@ void Geoms::update(const Poses& p) {
 
 namespace {
 
-// For polytopes without a threshold the kernel of rigid/ is used, which follows their features.
+// Polytopes without a threshold use the kernel of rigid/ that follows their features.
 Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& origin, SupportShape& a,
                       SupportShape& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);
@@ -109,7 +109,8 @@ Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& orig
                   impact.t);
 }
 
-// The first triangle of b's surface that a touches; of several at one time the deepest.
+// The first triangle of b's surface that a touches; the deepest one if several are touched at the
+// same time.
 Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec3& origin,
                     std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);

@@ -12,7 +12,7 @@ namespace tauguard::contacts {
 using namespace rigid;  // the convex kernel
 using geometry::Aabb;
 
-// The distance up to which contacts are listed: up to `reach`, even if the surfaces do not touch.
+// Two geoms. Contacts are listed up to the distance `reach` of the surfaces.
 struct GeomPair {
   std::int32_t a, b;
   double reach;
@@ -27,8 +27,9 @@ struct Row {
 // The box of all places of a moving shape in the step; `motion` is its body's.
 Aabb swept(SupportShape mover, const RigidMotion& motion);
 
-// Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9). `turn`, if given, is
-// about how far each turns between them (nbody, 3) [rad]: it decides how many whole turns are made.
+// Poses of the bodies at both ends of a step, (nbody, 3) and (nbody, 9). `turn`, if given, is an
+// estimate of each body's rotation between them (nbody, 3) [rad]; it decides how many whole turns
+// are made.
 struct Poses {
   const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;
   const double* turn = nullptr;
@@ -38,7 +39,7 @@ struct Counts {
   std::int64_t moved = 0, reused = 0, candidates = 0;
 };
 
-// The triangles of a mesh, for pairs in which its surface counts and not its hull.
+// The triangles of a mesh, for pairs that test its surface instead of its hull.
 struct Surface {
   std::vector<Shape> triangles;
   std::vector<Vec3> centre;  // of a ball around each, in the geom's frame
@@ -52,13 +53,10 @@ class Geoms {
   void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
-  // Brings motions and swept boxes up to date, of bodies that moved in this step or since the last
-  // one.
+  // Updates motions and swept boxes of bodies that moved in this step or since the last one.
   void update(const Poses& poses);
-  bool still(int geom) const { return still_[body_[geom]]; }  // unmoved in this step
-  bool as_before(int geom) const {
-    return same_[body_[geom]];
-  }  // and where it was throughout the last one
+  bool still(int geom) const { return still_[body_[geom]]; }     // unmoved in this step
+  bool as_before(int geom) const { return same_[body_[geom]]; }  // and unmoved in the last step too
   const Aabb& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
   const Surface& surface(int geom) const { return surfaces_[geom]; }
@@ -72,11 +70,11 @@ class Geoms {
   std::vector<Surface> surfaces_;
   std::vector<LocalFrame> in_body_;
   std::vector<int> body_;
-  std::vector<int> bodies_;           // those that have geoms
-  std::vector<RigidMotion> motions_;  // by body, as the rest
+  std::vector<int> bodies_;           // bodies with geoms
+  std::vector<RigidMotion> motions_;  // indexed by body, like the lists below
   std::vector<char> still_, same_, seen_;
   std::vector<Aabb> boxes_;
-  std::vector<double> last_;  // 24 a body: both poses of the last step
+  std::vector<double> last_;  // 24 numbers for each body: both poses of the last step
   std::int64_t moved_ = 0;
 };
 
@@ -95,19 +93,19 @@ class RigidPairs {
   std::vector<Cached> cache_;
 };
 
-// The simplices of a flex against geoms; `skip` leaves out a simplex that hangs on the geom's own
-// body.
+// A geom that the simplices of a flex are tested against. `skip` leaves out simplices attached to
+// the geom's own body.
 struct FlexPair {
   std::int32_t geom;
   double reach;
-  const std::uint8_t* skip;  // one a simplex
+  const std::uint8_t* skip;  // one for each simplex
 };
 
 Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
                  const std::int32_t* elements, std::size_t count, int corners, double radius,
                  const std::vector<FlexPair>& pairs, std::vector<Row>* rows);
 
-// Two simplices of linearly moving vertices; true where they come within `distance` of one another.
+// Two simplices of linearly moving vertices. True if they come within `distance` of each other.
 bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a,
                      const std::int32_t* b, int corners, double distance, Touch* touch);
 

@@ -6,12 +6,13 @@
 namespace tauguard::contacts {
 namespace {
 
-// Shapes nearer than this fraction of their size count as touching at the start: above what
-// first_touch takes for a touch, so that a pair that parts from there is no hit.
+// Shapes nearer than this fraction of their size count as touching at the start. It is above the
+// fraction `touching` of the sweeps, so that a pair that parts from there is no hit.
 constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
-// In roundings of the positions: the margin that such a distance needs above that, and the least
-// distance that a sweep of the last eroded shapes leaves (advance.cpp leaves 128).
+// Distances in roundings of the positions. `rounded` is the margin by which pairs must be apart at
+// the start. `left_over` is the least distance that a sweep of the last eroded shapes leaves
+// (first_contact leaves 128).
 constexpr double rounded = 512, left_over = 64;
 
 bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
@@ -23,7 +24,8 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
   return !d.overlap && d.lower > needed;
 }
 
-// What is known of a pair from earlier steps: nothing, that some eroded shapes were apart, or none.
+// What is known of a pair from earlier steps: nothing, that some of its eroded shapes were apart,
+// or that none were.
 enum : char { unknown, apart, sunk };
 
 // `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never
@@ -39,8 +41,8 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
     SupportShape a = a_at(level), b = b_at(level);
     return apart_at(a, b, t, resting, rounded);
   };
-  // Last eroded shapes that did not meet so far may be as near as rounding lets them, and must not
-  // meet now.
+  // If the last eroded shapes have not met so far, they may be as near as rounding allows, but must
+  // not meet now.
   const auto hardly = [&] {
     SupportShape a = a_at(levels - 1), b = b_at(levels - 1);
     return apart_at(a, b, 0, 0, left_over);
@@ -123,7 +125,8 @@ void Verdict::update(const Poses& p) {
     std::copy_n(now, 24, last_.begin() + 24 * b);
     motions_[b] = motion_between(now, now + 3, now + 12, now + 15, turn);
     still_[b] = motions_[b].speed == 0 && std::equal(now, now + 12, now + 12);
-    if (turn && motions_[b].speed > M_PI) last_[24 * b] = NAN;  // poses alone do not tell it
+    if (turn && motions_[b].speed > M_PI)
+      last_[24 * b] = NAN;  // poses alone do not tell the number of turns
   }
   for (std::size_t e = 0; e < entries_.size(); ++e)
     if (whole_[e] && fresh_[entries_[e].body])

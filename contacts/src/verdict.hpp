@@ -11,7 +11,7 @@
 namespace tauguard::contacts {
 
 struct Hit {
-  std::int32_t pair;     // rigid pairs first, then those with a flex
+  std::int32_t pair;     // pairs of geoms come first, then those with a flex
   std::int32_t feature;  // the simplex of a flex, -1 for geoms
   std::int32_t level;    // 0: touched and parted again; otherwise the level whose shapes met
   std::int32_t deepest;  // the deepest level that met; the number of levels: all shapes meet at
@@ -26,20 +26,20 @@ class Verdict {
   int add(Shape shape, int body, const LocalFrame& in_body);
   // Both partners' shapes, level by level.
   void add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b);
-  // A geom's shapes and the flex's radii, level by level; elements (count, corners) of all
+  // A geom's shapes and the flex's radii, level by level. elements: (count, corners), numbers of
   // vertices. `skip` leaves out a simplex.
   void add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
                      std::vector<std::int32_t> elements, int corners,
                      std::vector<std::uint8_t> skip);
 
-  // Nothing is known of the steps before.
+  // Forgets the steps before.
   void forget();
   void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
   std::size_t rigid_pairs() const { return pairs_.size(); }
-  // What is known of a pair from the steps before: one entry, or one a simplex.
+  // What is known of a pair from the steps before: one entry, or one for each simplex.
   std::vector<char> known(std::size_t pair) const;
-  // Sets that, unless the number of entries differs.
+  // Sets what is known of a pair. Ignored if the number of entries differs.
   void set_known(std::size_t pair, const std::vector<char>& known);
   template <class Archive>
   void archive(Archive& a) {
@@ -76,12 +76,13 @@ class Verdict {
   std::vector<Entry> entries_;
   std::vector<Pair> pairs_;
   std::vector<FlexPair> flex_pairs_;
-  std::vector<char> whole_;           // by entry: a shape of level 0
-  std::vector<Aabb> boxes_;           // by entry, of those
-  std::vector<int> bodies_;           // those that have shapes
+  std::vector<char> whole_;           // for each entry: whether it is a shape of level 0
+  std::vector<Aabb> boxes_;           // for each entry; only those of level 0 are used
+  std::vector<int> bodies_;           // bodies with shapes
   std::vector<RigidMotion> motions_;  // by body
-  std::vector<char> still_, fresh_;   // by body: unmoved in this step; boxes are out of date
-  std::vector<double> last_;          // 24 a body: both poses of the last step
+  std::vector<char> still_,
+      fresh_;                 // for each body: unmoved in this step; its boxes are out of date
+  std::vector<double> last_;  // 24 numbers for each body: both poses of the last step
 };
 
 }  // namespace tauguard::contacts

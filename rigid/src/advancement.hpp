@@ -1,15 +1,16 @@
 // Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) along separating directions that
 // turn with the bodies.
 //
-// Take a time t, a unit n and any rate r, and let the direction be n(h) = n + h r. With
-// s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever
-// n and r are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K
-// h^2 / 2, where K bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b
-// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and can be computed. A
-// step ends just before its root, so the bodies are certainly apart during the step.
+// Take a time t, a unit vector n and any rate r, and let the direction be n(h) = n + h r. Let s(h)
+// = min_b n(h).x_b - max_a n(h).x_a at time t + h. The bodies are apart while s > 0, whatever n and
+// r are. Let c be the centre of a. The projection of x - c differs from its tangent at h = 0 by at
+// most K h^2 / 2, where K bounds the second derivative |2 r.(x - c)' + n(h).x''|. So s(h) >= G(h) =
+// min_b (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and can be
+// computed. A step ends just before the root of G, so the bodies are certainly apart during the
+// step.
 //
-// Bodies grown by balls of radii R in all are apart while s(h) > R |n(h)|, and |n(h)| is at most
-// 1 + (h |r|)^2 / 2 for r across n: R and R |r|^2 join the constant and K.
+// Bodies grown by balls, whose radii add up to R, are apart while s(h) > R |n(h)|. For r across n,
+// |n(h)| is at most 1 + (h |r|)^2 / 2. So R is subtracted from G, and R |r|^2 is added to K.
 #pragma once
 
 #include <algorithm>
@@ -47,7 +48,7 @@ class VertexTangents {
   std::vector<std::array<double, 2>> lines_;
 };
 
-// The same of a shape: one call of its support function.
+// The same for a shape, by one call of its support function.
 class SupportTangent {
  public:
   SupportTangent(const SupportShape& shape, const Vec3& n, const Vec3& rate, const Vec3& centre,
@@ -71,8 +72,8 @@ inline SupportTangent tangents(const SupportShape& shape, const Vec3& n, const V
   return SupportTangent(shape, n, rate, centre, drift);
 }
 
-// G and its slope at h, for surfaces at the distance `offset` from the cores; `radius` is the part
-// of it that turns.
+// G and its slope at h. The surfaces have the distance `offset` from the cores; `radius` is the
+// part of `offset` that turns with the direction.
 template <class Body>
 class SeparationBound {
  public:
@@ -99,9 +100,10 @@ class SeparationBound {
   double offset_, half_k_;
 };
 
-// The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays
-// right of the root of a concave function; the chord from (0, G(0)) to a point right of the root
-// crosses zero left of it. Newton ends when G is below zero by less than the fraction `accuracy`.
+// A large step with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton's method from the right stays
+// to the right of the root of a concave function, and ends when G is negative by less than the
+// fraction `accuracy` of G(0). The chord from (0, G(0)) to that point crosses zero to the left of
+// the root.
 template <class Bound>
 double safe_step(const Bound& g, double at_zero, double limit, double accuracy) {
   double slope, h = limit, value = g(h, &slope);
@@ -116,8 +118,8 @@ double safe_step(const Bound& g, double at_zero, double limit, double accuracy) 
 }
 
 // Advances both bodies from `start` until `close(t)`, in steps `certified(left)` during which they
-// stay apart. True if they came close, at the time *t, which is never late; false if they stay
-// apart in all of [start, end].
+// stay apart. True if they came close; the time *t is never late. False if they stay apart on all
+// of [start, end].
 template <class Body, class Close, class Certified>
 bool advance(Body& a, Body& b, double start, double end, double most_steps, const Close& close,
              const Certified& certified, double* t) {

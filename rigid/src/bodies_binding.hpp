@@ -35,12 +35,12 @@ inline Bodies view(int kind, const Packed& data, const Offsets& offsets) {
           cloud ? offsets.shape(0) - 1 : data.shape(0)};
 }
 
-// One radius a row, or one for all.
+// One radius for each row, or one for all.
 inline double at(const Radii& radii, std::size_t i) {
   return radii.data()[radii.shape(0) == 1 ? 0 : i];
 }
 
-// A batch of motions, one row or as many as the query has.
+// A batch of motions: one for all rows of the query, or one for each.
 struct Motions {
   Poses pose;
   Vectors linear, angular;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double world[3] = {0, 0, 0};
 
-// The bounds along fixed directions of corners under a pose.
+// A volume with fixed directions, computed from the posed corners.
 template <class Volume>
 Volume refitted(const Cluster& body, const Pose& pose) {
   static thread_local std::vector<Triangle> posed;
@@ -99,7 +99,7 @@ struct KDopVolume : KDop {
   }
 };
 
-// Bodies as runs of triangles, a volume each, one row a body.
+// Bodies as runs of triangles, each with one volume.
 template <class Volume>
 class Volumes {
  public:
@@ -121,7 +121,7 @@ class Volumes {
     for (std::size_t i = 0; i < pairs.shape(0); ++i)
       out.data()[i] = Volume::meet(placed_[pairs.data()[2 * i]], placed_[pairs.data()[2 * i + 1]]);
   }
-  // The numbers of every volume, in the world.
+  // The numbers that describe every volume in the world.
   void write(Bounds out) const {
     for (std::size_t i = 0; i < placed_.size(); ++i)
       placed_[i].write(out.data() + Volume::numbers * i);

@@ -11,7 +11,7 @@ namespace tauguard::rigid {
 struct Frame {
   double r[3][3], t[3], pad;
   Frame(const Tree& a, const Tree& b, const Pose& pose);
-  // Both in one frame already.
+  // Both trees are in one frame already.
   static const Frame& same() {
     static const Frame frame;
     return frame;
@@ -24,7 +24,7 @@ struct Frame {
   Frame() : r{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, t{0, 0, 0}, pad(0) {}
 };
 
-// A run of triangles whose corners a volume must hold, seen from the tree's centre.
+// A run of triangles whose corners a volume must contain, relative to the tree's centre.
 struct Cluster {
   const Triangle* begin;
   const Triangle* end;
@@ -54,9 +54,9 @@ struct KDop {
   double lo[directions], hi[directions], centre[3];
   static KDop fit(const Cluster& c);
 
-  // A direction d as a non-negative sum of three of the 18 half-space normals: by duality
-  // max d.x <= sum of weight * bound, and the three adjacent normals give the least such bound
-  // known without solving a linear program.
+  // A direction d as a non-negative sum of three of the 18 half-space normals. By duality max d.x
+  // <= sum of weight * bound. The three adjacent normals give the least bound known without solving
+  // a linear program.
   struct Cone {
     int index[3];
     double weight[3];  // negative: the opposite normal with weight -weight
@@ -71,8 +71,8 @@ struct KDop {
   static bool meet(const KDop& a, const KDop& b, const Relation& at);
 };
 
-// The volumes of every child of a tree: entry 0 is the whole mesh, entry 1 + 8 node + slot that
-// child.
+// The volumes of every child of a tree. Entry 0 is the whole mesh; entry 1 + 8 node + slot is the
+// child in that slot.
 template <class Volume>
 std::vector<Volume> fit_all(const Tree& tree);
 

@@ -1,19 +1,20 @@
-// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes: the
-// batch path of eight floats, and the double-precision look at boxes with parallel edges.
+// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes. It
+// serves the batch path (eight floats) and, in double precision, boxes with parallel edges.
 //
-// C_ik = r_Ai . r_Bk, t_i = r_Ai . (c_B - c_A); 15 gaps, negative where the axis does not separate.
-// Error, u the unit roundoff of the lanes, w = |d|_1 + sum h_A + sum h_B: rounding inputs costs u
-// each, C is off by 5 u, t by 5 u |d|; an edge's gap by 24 u |d| and 2 * 12 u of the half extents,
-// that of a facet of B by 36 u |d| + 12 u: 64 u w covers all. The boxes are the sets of the given
-// rotations R; using R^T R = I where entries are off by `skew` moves a gap by at most 16 skew w.
+// Let C_ik = r_Ai . r_Bk, t_i = r_Ai . (c_B - c_A), and d = c_B - c_A. Each of the 15 axes has a
+// gap, which is negative if the axis does not separate. Let u be the unit roundoff of the lanes and
+// w = |d|_1 + sum h_A + sum h_B. Rounding an input costs u; C is off by 5 u and t by 5 u |d|. The
+// gap of an edge pair is off by 24 u |d| and 2 * 12 u of the half extents, that of a facet of B by
+// 36 u |d| + 12 u. 64 u w covers all of them. The boxes are those of the given rotations R. Using
+// R^T R = I, although entries differ by `skew`, moves a gap by at most 16 skew w.
 //
-// Overlap needs every facet of the zonotope A - B on the right side. The axis of nearly parallel
-// edges has no certain sign, but may be left out. Tilting the shorter edge by the angle between
-// them makes the facet vanish and moves the body by at most tau h. So a margin of that size at all
-// other axes is enough (a ball of that radius about the offset is inside the tilted body). Edges
-// count as parallel where 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most
-// three pairs can be parallel, each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more
-// than they all move.
+// The boxes overlap if the offset is on the inner side of every facet of the zonotope A - B. The
+// axis of nearly parallel edges has no certain sign, but may be left out: tilting the shorter edge
+// by the angle between them removes its facet and moves the body by at most tau h. So a margin of
+// that size at all other axes is enough (a ball of that radius about the offset is inside the
+// tilted body). Edges count as parallel if 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 -
+// C^2. At most three pairs can be parallel, with each edge in one of them, so they move the body by
+// less than 2 tau min(sum h_A, sum h_B).
 #pragma once
 
 #include "convex_abfme.hpp"
@@ -30,7 +31,7 @@ struct BoxLanes {
 
 template <class V>
 struct BoxBounds {
-  double unit, tau_squared, tau, low, high;  // w outside [low, high] is left undecided
+  double unit, tau_squared, tau, low, high;  // pairs with w outside [low, high] stay undecided
 };
 template <>
 struct BoxBounds<Float8> {
@@ -43,7 +44,8 @@ struct BoxBounds<double> {
                           high = 1e250;
 };
 
-// out: masks (bool for scalars) of lanes that are certainly separated and certainly common.
+// out: masks of the lanes that certainly separate and of those that certainly meet (bool for
+// scalars).
 template <class V, class Mask, class Scalar>
 TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const V* d, Scalar skew,
                               Mask& apart, Mask& together) {
@@ -68,7 +70,7 @@ TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const 
     worst = max(worst, abs(t[0] * c[0][k] + t[1] * c[1][k] + t[2] * c[2][k]) - b.h[k] -
                            (a.h[0] * ac[0][k] + a.h[1] * ac[1][k] + a.h[2] * ac[2][k]));
 
-  V straight = worst;  // the worst over the axes that overlap needs
+  V straight = worst;  // the largest gap over the axes that decide overlap
   Mask any_parallel = worst != worst;
   for (int i = 0; i < 3; ++i) {
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
@@ -108,8 +110,8 @@ TAUGUARD_INLINE Verdict box_pair(const double* pa, const double* pb, double skew
   return apart ? separated : together ? common : undecided;
 }
 
-// Eight boxes as the batch path reads them: centres in double, so that far pairs of near boxes lose
-// nothing, the rest in single precision, coordinate by coordinate.
+// Eight boxes as the batch path reads them, coordinate by coordinate. Centres are doubles, so that
+// pairs far from the origin lose no accuracy; the rest is in single precision.
 struct BoxBlock {
   double center[3][8];
   float half_extents[3][8];

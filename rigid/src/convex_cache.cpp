@@ -15,7 +15,8 @@ struct Extent {
   double low, high, reach;
 };
 
-// Projections of a body on n, from `base`, and the 1-norm that bounds its points.
+// The range of a body's projections on n, relative to `base`, and a bound on the 1-norm of its
+// points.
 TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const double* base,
                                     const double* n) {
   const double* p = bodies.row(row);
@@ -45,8 +46,8 @@ TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const
   return out;
 }
 
-// Is a certainly below and b above a plane with normal n? A point is off by 8 u reach, a product
-// sum by 4 u.
+// Whether a plane with normal n certainly has a below and b above it. A point is off by 8 u reach,
+// a dot product by 4 u.
 TAUGUARD_INLINE bool plane_holds(const Bodies& a, const Bodies& b, std::size_t row,
                                  const double* n) {
   const double* base = a.row(row);

@@ -1,5 +1,5 @@
-// A common point of two bodies that touch along a known normal: the features of both that lie in
-// the contact plane (vertices within `tolerance` of it), cut with each other in that plane.
+// A common point of two bodies that touch along a known normal. The features of both bodies in the
+// contact plane (vertices within `tolerance` of it) are intersected in that plane.
 #pragma once
 
 #include <algorithm>
@@ -69,7 +69,7 @@ class ContactFeature {
     return out;
   }
 
-  // What lies left of the line o -> e, or within `tolerance` of it.
+  // The part of the polygon that is left of the line o -> e or within `tolerance` of it.
   static std::vector<Point2> cut(const std::vector<Point2>& p, const Point2& o, const Point2& e,
                                  double tolerance) {
     const double length = std::hypot(e[0] - o[0], e[1] - o[1]);

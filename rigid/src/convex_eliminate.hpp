@@ -3,14 +3,14 @@
 // are the barycentric coordinates of that simplex, scaled by its determinant. A vertex of B asks
 // sum p_i F_i(b) < 0, any other vertex of A asks -sum p_i F_i(a) <= 0. Eliminating p_k keeps the
 // rows with a positive entry (with p_k >= 0 that entry drops out) and combines them with the rows
-// of the opposite sign; every row is a point of B less a point of A. After s eliminations a row
-// made of more than s + 1 inequalities is redundant (Chernikov 1960), and so is one whose
-// inequalities include those of another (Kohler 1967).
-//   * A row of positive entries: no plane exists, the bodies share a point.
-//   * No such row: back-substitution gives a plane, which is then checked against all vertices.
-// Combinations leave an entry of 2 E instead of 0 (E bounds every entry's error), so that the
-// entries of a positive row are positive beyond rounding in the eliminated columns too; rows too
-// small for that, and planes that the check rejects, leave the pair undecided.
+// of the opposite sign; every row is the difference of a point of B and a point of A. After s
+// eliminations a row made of more than s + 1 inequalities is redundant (Chernikov 1960), and so is
+// one whose inequalities include those of another (Kohler 1967).
+//   * If a row has positive entries only, no plane exists, and the bodies share a point.
+//   * Otherwise back-substitution gives a plane, which is then checked against all vertices.
+// Combinations leave an entry of 2 E instead of 0 in the eliminated column (E bounds every entry's
+// error), so that a positive row is positive beyond rounding there too. If rows are too small for
+// that, or the check rejects the plane, the pair stays undecided.
 #pragma once
 
 #include <algorithm>
@@ -70,7 +70,7 @@ class HullElimination {
     return cross(u, q - o);
   }
 
-  // Far vertices of A, one after the other the farthest from the span of those before.
+  // Chooses vertices of A, each the farthest from the span of those before it.
   bool choose_simplex() {
     chosen_[0] = 0;
     Vec3 along{}, across{};
@@ -163,7 +163,7 @@ class HullElimination {
     return out;
   }
 
-  // Values p_D = 1 and then p_k in the middle of what the rows of its stage leave.
+  // Sets p_D = 1, then each p_k to the middle of the interval that the rows of its stage leave.
   bool plane_separates(const std::array<std::vector<Row>, D>& stages) const {
     std::array<double, D + 1> p{};
     p[D] = 1.0;

@@ -28,9 +28,9 @@ Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d,
 double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
                        double* normal);
 
-// A common point, or the unit normal (from a to b) and offset of a separating plane, of row `row`,
-// to rounding; the rest is NaN. `known` is the verdict, as far as the caller knows. out: point 3,
-// normal 3, offset 1.
+// Writes a common point of row `row`, or the unit normal (from a to b) and offset of a separating
+// plane, to rounding. The other numbers are NaN. `known` is the verdict if the caller knows it.
+// out: point 3, normal 3, offset 1.
 void find_witness(const Bodies& a, const Bodies& b, std::size_t row, Verdict known, double* out);
 
 }  // namespace tauguard::rigid

@@ -1,7 +1,7 @@
 // Separating axes, tuned: normals and edge products are shared by all projections, only vertices
 // that can be extreme are projected, four axes are tested at once, and every test has an error
-// bound, as in convex_abfme.hpp. For an edge e of A and an edge f of B, the axis e x f gives a
-// point x the value f . (x cross e), so the products with e serve all edges of B.
+// bound, as in convex_abfme.hpp. For an edge e of A and an edge f of B, the projection of a point x
+// on the axis e x f is f . (x cross e), so the products with e serve all edges of B.
 #pragma once
 
 #include "convex_abfme.hpp"
@@ -25,8 +25,8 @@ struct TetrahedronEdges {
   TAUGUARD_INLINE Double4 dot(int group, const double* x) const {
     return f[group][0] * x[0] + f[group][1] * x[1] + f[group][2] * x[2];
   }
-  // The range of the four vertices on the group's axes; c[k] holds component k of x cross e, by
-  // vertex.
+  // The range of the four vertices on the group's axes. c[k] holds component k of x cross e for
+  // each vertex.
   TAUGUARD_INLINE void range(int group, const Double4* c, Double4& low, Double4& high) const {
     Double4 p, q, r;
     if (group == 0) {

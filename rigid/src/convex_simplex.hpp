@@ -18,8 +18,8 @@ namespace tauguard::rigid {
 inline int sign_of(const Dyadic& x) { return x.sign(); }
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Is x - y positive, for a sum of terms of size `scale`? In doubles a basic column's price is
-// rounding noise about zero, which must not bring it in again.
+// Is x - y positive, for a sum of terms of size `scale`? In doubles the price of a basic column is
+// rounding noise about zero, which must not let the column enter again.
 inline bool exceeds(const Dyadic& x, const Dyadic& y, const Dyadic&) { return y < x; }
 inline bool exceeds(double x, double y, double scale) { return x - y > 0x1p-46 * scale; }
 inline void grow(Dyadic&, const Dyadic&) {}
@@ -112,7 +112,7 @@ class HullSimplex {
       for (auto& x : r) x = -x;
   }
 
-  // The cofactor built from row r of a half belongs to the other row of that half.
+  // The row of a half whose cofactor is built from row r.
   static int other(int r) { return r ^ 1; }
 
   void multipliers() {
@@ -127,7 +127,8 @@ class HullSimplex {
     return y_[0] * p[0] + y_[1] * p[1] + y_[2] * p[2];
   }
 
-  // The column a_i - b_j that lowers the artificial weight: the steepest, or the first (Bland).
+  // Finds a column a_i - b_j that lowers the artificial weight: the steepest one, or the first one
+  // (Bland's rule).
   bool price(bool first, std::size_t& i, std::size_t& j) {
     std::vector<Number>& pa = project_a_;
     std::vector<Number>& pb = project_b_;

@@ -18,7 +18,7 @@ struct SlabBody {
   double reach = 0.0;  // largest 1-norm of a vertex
 };
 
-// Vertices from `base`, so that a far base costs no accuracy.
+// Vertices relative to `base`, so that bodies far from the origin lose no accuracy.
 TAUGUARD_INLINE void load(Kind, const double* p, const double* base, SlabBody<4, 6>& body) {
   constexpr int pairs[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
   body.reach = offsets_from(p, base, body.v);
@@ -44,12 +44,13 @@ TAUGUARD_INLINE void load(Kind kind, const double* p, const double* base, SlabBo
 }
 
 struct Entry {
-  double enter = -std::numeric_limits<double>::infinity();  // apart before this time, for certain
-  double leave = std::numeric_limits<double>::infinity();   // and after this one
-  double surely_in = enter, surely_out = leave;             // together between them on every axis
-  bool certain = true;                                      // no axis was too short to tell
-  double reliable = enter;                                  // `enter` plus twice its error
-  double normal[3] = {0, 0, 0};                             // of the axis of `enter`, from a to b
+  double enter =
+      -std::numeric_limits<double>::infinity();  // the bodies are certainly apart before this time
+  double leave = std::numeric_limits<double>::infinity();  // and after this time
+  double surely_in = enter, surely_out = leave;  // between these times they overlap on every axis
+  bool certain = true;                           // false if some axis was too short to decide
+  double reliable = enter;                       // `enter` plus twice its error
+  double normal[3] = {0, 0, 0};                  // of the axis of `enter`, from a to b
 
   bool usable = true;  // sizes are in range
 
@@ -59,9 +60,10 @@ struct Entry {
   }
 };
 
-// Errors, with `length` >= |axis|_1 the product of the sizes of its edges: the axis is off by 4 u
-// length (this matters to `hit` only), a vertex by 8 u reach, a projection by 4 u length reach
-// more: 64 u length reach for the difference of two. The speed is off by 8 u length |d|.
+// Errors: let `length` >= |axis|_1 be the product of the sizes of the axis's edges. The axis is off
+// by 4 u length, which matters to `hit` only; a vertex is off by 8 u reach, and a projection by 4 u
+// length reach more. The difference of two projections is off by less than 64 u length reach. The
+// speed is off by 8 u length |d|.
 template <class A, class B>
 TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, double length,
                                const double* d, Entry& out) {
@@ -101,7 +103,7 @@ TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, doubl
   for (int k = 0; k < 3; ++k) out.normal[k] = speed > 0 ? -axis[k] : axis[k];
 }
 
-// All face normals, then all edge pairs; exit once a miss is certain.
+// Tests all face normals, then all edge pairs, and ends once a miss is certain.
 template <class A, class B>
 TAUGUARD_INLINE Entry cast(const A& a, const B& b, const double* d) {
   constexpr int faces[4][2] = {{0, 1}, {0, 2}, {1, 2}, {3, 4}};

@@ -37,7 +37,7 @@ TAUGUARD_INLINE Entry cast_row(const Chunk& c, std::size_t i) {
   return cast(a, b, c.d + 3 * i);
 }
 
-// Elimination: is there a hit at all?
+// Whether there is a hit at all, by elimination.
 template <class A, class B>
 TAUGUARD_INLINE Verdict eliminate_row(const Chunk& c, std::size_t i) {
   const double *pa = c.a.row(i), *pb = c.b.row(i), *d = c.d + 3 * i;

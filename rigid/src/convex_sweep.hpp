@@ -1,7 +1,7 @@
-// Does a moving body meet another within the step? Body B moves by t d, 0 <= t <= 1. With t as one
-// more unknown, every vertex of B gives two rows, one for each end of the motion (t is eliminated
-// first: the rows of t = 0 and t = 1 span all others), and the hull of both ends has the facets f x
-// d besides B's own. The rest is the elimination of convex_abfme.hpp.
+// Does a moving body meet another within the step? Body B moves by t d, 0 <= t <= 1. The time t is
+// one more unknown. It is eliminated first: the rows of t = 0 and t = 1 span all others, so every
+// vertex of B gives two rows, one for each end of the motion. The hull of both ends has the facets
+// f x d in addition to those of B. The rest is the elimination of convex_abfme.hpp.
 #pragma once
 
 #include "convex_sat.hpp"

@@ -8,19 +8,19 @@
 //
 // The surface S of all faces is closed, convex or not: a step replaces faces by the cone over their
 // rim. Let c be the centre of the first tetrahedron.
-// 1. n . c < m for every face ever made. `side` is 4 (n . c - n . y) for one corner y, off by 142
-//    u |n| s at most (twice 42 by its products, 27 by their difference, 31 by the rounding of c);
-//    four times the largest |n . y - n . y'| of the corners is off by 112. More than 512 are asked
-//    for (unsure). So the centre is in no face of the first tetrahedron, that is in its inside.
-// 2. A corner w that replaces a face is further along n than y, but for 28 u |n| s of rounding,
-//    four times which the 512 cover too. So c is not in the tetrahedron of w and that face, and the
+// 1. n . c < m for every face ever made. `side` is 4 (n . c - n . y) for one corner y. It is off by
+//    at most 142 u |n| s: twice 42 by its products, 27 by their difference, 31 by the rounding of
+//    c. Four times the largest |n . y - n . y'| of the corners is off by 112. More than 512 is
+//    required (unsure). So the centre is in no face of the first tetrahedron, and thus inside it.
+// 2. A corner w that replaces a face is further along n than y, except for 28 u |n| s of rounding;
+//    the 512 cover four times that too. So c is not in the tetrahedron of w and that face, and the
 //    number of times that S winds around c stays odd.
-// 3. Where 0 < m for all faces of the final S, no face meets the way from c to the origin, and S
+// 3. If 0 < m for all faces of the final S, no face meets the segment from c to the origin, and S
 //    winds around the origin an odd number of times. No face is nearer to the origin than
-//    L = m / |n|, so the same holds around every point of the ball of radius L. Around a point
-//    outside the hull of its corners a closed surface winds no times: the ball is in the hull.
+//    L = m / |n|, so the same holds around every point of the ball of radius L. A closed surface
+//    does not wind around a point outside the hull of its corners, so the ball is in the hull.
 // L is off by 23 u s. The stored corners are off by 16 u s (two coordinates, two differences and a
-// sum of that size); S keeps its winding where they move by less than L, so that costs 16 u s.
+// sum of that size); S keeps its winding if they move by less than L, so this costs 16 u s.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,8 @@
 
 namespace tauguard::rigid {
 
-// A lower bound of the depth to 39 u of the size; 0 or less: none.
+// A lower bound of the depth, off by at most 39 u of the size. If it is 0 or less, nothing is
+// known.
 template <class Polytope>
 double least_depth(const Polytope& polytope) {
   double least = INFINITY;

@@ -21,7 +21,7 @@ std::size_t extreme(const PointList& points, const Vec3& n) {
   return best;
 }
 
-// Ends where no difference is nearer, to rounding.
+// Ends the descent when no difference is nearer, to rounding.
 struct ToRounding {
   void visit(const Simplex<Rows>&) {}
   bool enough(const Vec3& v, const Vec3& next) const {
@@ -39,7 +39,7 @@ Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch
   return descend(Corner<Rows>{b[0] - a[0], {0, 0}, 1.0}, support, watch, 0.0);
 }
 
-// Close to contact cancellation destroys the nearest point. So the normals of the last simplex's
+// Close to contact, cancellation destroys the nearest point. So the normals of the last simplex's
 // triangles are tried as well, and the best one is used.
 struct Separating : ToRounding {
   const PointList &a, &b;
@@ -70,7 +70,7 @@ struct Separating : ToRounding {
   }
 };
 
-// Keeps the best certified lower bound, and ends by it.
+// Keeps the best certified lower bound, and ends the descent when it suffices.
 struct Bounded {
   Distance& out;
   double needed;
@@ -144,12 +144,12 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& g
   first.weight = 1;
   Bounded watch{out, needed};
   watch.attempt(start, first.w);
-  // Below this length v is rounding: 64 covers the dozen operations behind each coordinate of it.
+  // A shorter v is rounding: 64 covers the dozen operations behind each of its coordinates.
   const double rounding = 64 * unit_roundoff * (a.magnitude() + b.magnitude());
   const Simplex<SourcePoints> s = descend(first, support, watch, rounding * rounding);
   const double square = dot(s.nearest(), s.nearest());
   out.overlap = s.size() == 4 || square <= rounding * rounding;
-  // Close to contact cancellation destroys the nearest point: the face of the last simplex has a
+  // Close to contact, cancellation destroys the nearest point. The face of the last simplex has a
   // better normal.
   if (!out.overlap && s.size() == 3) {
     Vec3 n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));

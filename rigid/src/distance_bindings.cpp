@@ -16,7 +16,7 @@ using DistanceRows = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::de
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// A row of distance, point of a, point of b, normal.
+// Writes a row of distance, point of a, point of b, and normal.
 void store(const SignedDistance& g, double* row) {
   row[0] = g.distance;
   for (int k = 0; k < 3; ++k)
@@ -56,7 +56,7 @@ void impacts(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b
   });
 }
 
-// body(row) for every row of the batch.
+// Calls body(row) for every row of the batch.
 template <class Body>
 void each_body(const Bodies& bodies, const Radii& radius, std::size_t rows, int threads,
                Body body) {

@@ -1,5 +1,5 @@
-// The nearest points of two hulls of points by signs of polynomials alone: with Dyadic the answer
-// is exact.
+// The nearest points of two hulls of points, decided by signs of polynomials alone. With Dyadic the
+// answer is exact.
 #pragma once
 
 #include "expanding_polytope.hpp"
@@ -7,7 +7,7 @@
 namespace tauguard::rigid {
 
 // Nearest point of the hull of differences to the origin (Wolfe 1976; Gilbert, Johnson and Keerthi
-// 1988): sum weight_k y_k / denominator, as numerator / denominator.
+// 1988): it is sum weight_k y_k / denominator, given as numerator / denominator.
 template <class Number>
 class ExactNearest {
  public:
@@ -22,7 +22,7 @@ class ExactNearest {
       geometry::poll_interrupt();
       const Pair next = y_.farthest(-numerator);
       const Vector3<Number> w = y_.at(next);
-      // numerator . (w - numerator / denominator) >= 0: no difference is nearer.
+      // If numerator . (w - numerator / denominator) >= 0, no difference is nearer.
       if (!(dot(numerator, w) * denominator < dot(numerator, numerator))) return;
       take(next);
       keep(1u << (pairs.size() - 1));

@@ -1,8 +1,8 @@
-// The facet of a convex set of differences b - a that is nearest to the origin: the expanding
-// polytope of van den Bergen 2001, without a simplex that holds the origin to start from. If the
-// origin is inside, this is the shortest translation that separates the bodies. Only signs of
-// polynomials decide. With Dyadic every answer is right. With double the answer is a proposal that
-// least_depth (depth_bound.hpp) certifies, or a rounded one for support shapes.
+// The facet of a convex set of differences b - a that is nearest to the origin, by the expanding
+// polytope of van den Bergen 2001. It needs no simplex around the origin to start from. If the
+// origin is inside, this facet gives the shortest translation that separates the bodies. Only signs
+// of polynomials decide. With Dyadic every answer is right. With double the answer is a proposal
+// that least_depth (depth_bound.hpp) certifies, or a rounded one for support shapes.
 #pragma once
 
 #include <algorithm>
@@ -27,13 +27,13 @@ bool is_zero(const Vector3<Number>& x) {
   return x == Vector3<Number>();
 }
 
-// Is x, the square of a volume, only a rounding error compared with `scale`?
+// Whether x, the square of a volume, is only a rounding error compared with `scale`.
 inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
-// Can rounding alone have put the centre on the inner side of a face? `spread` is the difference of
-// the face's corners along its normal; depth_bound.hpp derives the fraction. Outside the range of
-// the squares the answer is yes.
+// Whether rounding alone may have put the centre on the inner side of a face. `spread` is the
+// difference of the face's corners along its normal; depth_bound.hpp derives the fraction. True
+// also if a square leaves the range of doubles.
 inline bool side_is_rounding(double side, double spread, double square, double size) {
   const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
   return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);
@@ -64,8 +64,9 @@ class PointDifferences {
     return best;
   }
 
-  // Four differences that span space: the farthest from the first, from the line, from the plane.
-  // False where there are none; `normal` is then one of what they span, zero for a point.
+  // Four differences that span space: one, the farthest from it, the farthest from their line, and
+  // the farthest from their plane. False if there are none; `normal` is then a normal of the set
+  // that they span, zero for a point.
   bool span(std::array<Vector3<Number>, 4>* y, std::array<Source, 4>* from, Vector3<Number>* normal,
             bool* thin) const {
     const Vector3<Number> y0 = at({0, 0});
@@ -101,8 +102,8 @@ class PointDifferences {
     return true;
   }
 
-  // Whether a facet is one of the whole hull's, the farthest point being `excess` beyond it.
-  // Rounding alone brings a point in twice, and there are fewer points than pairs.
+  // Whether a facet belongs to the whole hull; the farthest point is `excess` beyond it. A point
+  // that comes in twice does so by rounding alone, so the facet is final then too.
   bool is_final(const Number& excess, const Number&, const Source& farthest) {
     return !positive(excess) || !taken_.insert(farthest).second;
   }
@@ -137,8 +138,9 @@ class ExpandingPolytope {
   enum class Answer { facet, flat, gave_up };
   struct Face {
     std::array<int, 3> corner;
-    Vector3<Number> normal;  // outward; where `flat` any normal of what they span, zero for a point
-    Number offset, square;   // normal . y <= offset for every difference; normal . normal
+    Vector3<Number>
+        normal;  // outward; if `flat`, a normal of the set that they span, zero for a point
+    Number offset, square;  // normal . y <= offset for every difference; normal . normal
   };
 
   explicit ExpandingPolytope(Differences differences) : differences_(std::move(differences)) {}
@@ -167,7 +169,7 @@ class ExpandingPolytope {
     return Answer::gave_up;
   }
 
-  Face nearest{};  // to the origin, as far as the polytope grew
+  Face nearest{};  // the face nearest to the origin so far
   const std::vector<Face>& faces() const { return faces_; }
   const Vector3<Number>& point(int corner) const { return points_[corner]; }
   const Source& source(int corner) const { return sources_[corner]; }

@@ -9,8 +9,8 @@
 
 namespace tauguard::rigid {
 
-// Edge directions, each off by at most 4 roundings of itself, and which pairs of them span faces,
-// of parallelepipeds and of hulls of at most four points.
+// Edge directions of a parallelepiped or of a hull of at most four points, and the pairs of edges
+// that span its faces. A direction is off by at most 4 roundings of itself.
 struct BodyEdges {
   Vec3 edge[6];
   int ends[6][2];  // the vertices between which it runs
@@ -33,7 +33,7 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
   }
   const int n = static_cast<int>(bodies.vertex_count(row));
   if (bodies.kind == Kind::polygons || n > 4) return false;
-  // Of 01, 02, 12, 03, 13, 23 those that there are; faces 012, 013, 023, 123.
+  // The edges 01, 02, 12, 03, 13, 23 between the n vertices; the faces are 012, 013, 023, 123.
   for (int j = 1; j < n; ++j)
     for (int i = 0; i < j; ++i, ++out->edges) {
       out->edge[out->edges] = geometry::load(p + 3 * j) - geometry::load(p + 3 * i);
@@ -45,21 +45,22 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
   return true;
 }
 
-// A facet's distance from the origin is at least the least height n . y of its vertices y, for any
-// unit n; and the largest height of all differences is a way out along n. A normal is computed to
-// an angle of 16 u / s, s the sine between its edges, so the facet's vertices are among those
-// within 128 u / s of the size from the top. The depth lies between the least of the former bounds
-// and the least of the latter. The former holds only where the origin is inside: the point of the
-// nearest facet's plane that is nearest to the origin is then in the facet. It is inside where
-// every facet's true plane is above it, for which a top of more than 128 u / s of the size is
-// enough: the top changes by the angle times the farthest difference, 2 sqrt(3) of the size.
+// Take any unit vector n. A facet's distance from the origin is at least the least height n . y of
+// its vertices y. The top, the largest height of all differences, is the length of a separating
+// translation along n. A normal is computed to an angle of 16 u / s, where s is the sine between
+// its edges. So the facet's vertices are among those within 128 u / s of the size below the top.
+// The depth lies between the least of the lower bounds and the least top. The lower bound requires
+// that the origin is inside: the point nearest to the origin in the nearest facet's plane is then
+// in the facet. The origin is inside if every facet's true plane is above it, for which a top of
+// more than 128 u / s of the size is enough: the top changes by at most the angle times the largest
+// difference, 2 sqrt(3) of the size.
 class FacetDepth {
  public:
   FacetDepth(const Points<double>& a, const Points<double>& b, double size)
       : a_(a), b_(b), size_(size) {}
 
-  // False where rounding leaves the depth uncertain by more than `slack`, or its sign; `apart`
-  // where the bodies are certainly apart.
+  // False if rounding leaves the sign uncertain, or the depth by more than `slack`. Sets `apart` if
+  // the bodies are certainly apart.
   bool solve(const BodyEdges& ea, const BodyEdges& eb, double slack) {
     for (const BodyEdges* e : {&ea, &eb})
       for (int f = 0; f < e->faces; ++f)

@@ -133,7 +133,7 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
 
 double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis, double margin,
                       double left) {
-  // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
+  // The tangent of the direction is useful only until it has turned by a radian.
   const double rate = norm(axis.rate), horizon = rate * left > 1 ? 1 / rate : left;
   const Turning direction{axis.n, axis.rate, rate * (1 + 0x1p-40)};
   const SeparationBound<MovingBody> g(a, b, direction, horizon, margin + rounding(a, b),
@@ -141,9 +141,9 @@ double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis
   return safe_step(g, axis.separation - margin, horizon, 1e-6);
 }
 
-// The longest step during which one fixed direction keeps the bodies apart at any of their angles;
-// `axis` becomes that direction. For bodies that turn fast and pass by each other a few such steps
-// are enough, while their true surfaces need a step for each radian.
+// The longest step during which one fixed direction separates the bodies, whatever their angles;
+// `axis` becomes that direction. Bodies that turn fast and pass by each other need only a few such
+// steps, while their true surfaces need a step for each radian.
 double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
   const Vec3 between = b.centre() - a.centre(), drift = b.linear() - a.linear();
   const auto across = [](const Vec3& v, const Vec3& n) { return v - dot(v, n) * n; };
@@ -172,9 +172,10 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
   return longest;
 }
 
-// The direction of contact: the best axis now, or the last certain one turned by `h` if that
-// separates the bodies as well. It does so to second order in h. Flat bodies in one plane leave no
-// other choice, because a normal of that plane separates them by zero, too.
+// The direction of contact: the last certain axis, turned by `h`, if it separates the bodies as
+// well as the best axis now; otherwise that axis. The turned axis is right to second order in h. It
+// is needed for flat bodies in one plane, because a normal of that plane separates them by zero,
+// too.
 Vec3 contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
                     const Axis& now) {
   if (last.separation > -INFINITY) {

@@ -36,7 +36,7 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
   const bool along = norm(impact.normal) > 0 && bottom - top - rounding >= -tolerance;
   Vec3 point;
   if (!along || (rounding > 0 && rounding < small_radii * (a.radius() + b.radius()))) {
-    point = common_point(a, b);  // the features that touch cannot be told
+    point = common_point(a, b);  // the features that touch are not known
   } else {
     point = contact_point(a.now, b.now, impact.normal, tolerance);
     if (rounding > 0) point = point + 0.5 * (a.rounding - b.rounding) * impact.normal;
@@ -51,8 +51,8 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
                          double rounding_b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b) {
-  // Positions relative to a's first vertex at the start, so that a far-away scene costs no digits
-  // twice.
+  // Positions are relative to a's first vertex at the start, so that scenes far from the origin
+  // lose no accuracy.
   const double* p = a.row(row);
   const Vec3 origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
   MovingBody x = moving_body(a, row, motion_a, origin), y = moving_body(b, row, motion_b, origin);

@@ -5,7 +5,8 @@
 
 namespace tauguard::rigid {
 
-// toi (inf: none), a common point and the normal from a to b at that time (NaN where undefined).
+// The time of impact (inf if there is none), and at that time a common point and the normal from a
+// to b (NaN if undefined).
 struct FirstTouch {
   double toi, point[3], normal[3];
 };
@@ -15,7 +16,7 @@ inline constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NA
 // point comes from the features that touch along the normal, or from the nearest points.
 FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec3& origin);
 
-// Of row `row`, each body grown by a ball of the given radius.
+// For row `row`, with each body grown by a ball of the given radius.
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
                          double rounding_b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b);

@@ -26,7 +26,8 @@ auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
   return nb::ndarray<nb::numpy, T>(held->data(), N, shape.data(), owner);
 }
 
-// All contacts of every pose: (pose row, face of a, face of b) and (point, normal, depth) a row.
+// All contacts of every pose. A contact is one row of each of two arrays: (pose, face of a, face of
+// b) and (point, normal, depth).
 using Rows = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
                        nb::ndarray<nb::numpy, double, nb::shape<-1, 7>>>;
 Rows contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {

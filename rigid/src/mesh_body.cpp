@@ -10,7 +10,8 @@ Bodies row_of(const Bodies& b, std::size_t row, std::int64_t* offsets) {
   return {b.kind, b.row(row), offsets, 1};
 }
 
-// Unit, across the unit u (and v): any such vector where x leaves no direction.
+// The unit vector across the unit u that is nearest to x; any unit vector across u if x is parallel
+// to u.
 Vec3 across(const Vec3& x, const Vec3& u) {
   const Vec3 y = x - dot(x, u) * u;
   if (norm(y) > 1e-6 * norm(x)) return (1 / norm(y)) * y;
@@ -23,8 +24,8 @@ Vec3 across(const Vec3& x, const Vec3& u) {
 
 }  // namespace
 
-// The edges' directions for a box; else towards the farthest vertex, and the one farthest from that
-// line.
+// Axes of a box around the body: the edges of a box; otherwise the direction to the farthest
+// vertex, and that to the vertex farthest from this line.
 std::array<Vec3, 3> RoundedBody::axes() const {
   const bool block = bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds;
   Vec3 far{}, wide{};
@@ -126,7 +127,7 @@ void each_near(const Mesh& mesh, const RoundedBody& body, const double& margin, 
 constexpr std::int64_t triangle_offsets[2] = {0, 3};
 Bodies as_body(const Triangle& t) { return {Kind::hulls, t.v[0], triangle_offsets, 1}; }
 
-// Is the triangle certainly more than `margin` from the body along n, or along -n?
+// Whether the triangle is certainly more than `margin` from the body along n or -n.
 bool beyond(const Triangle& t, const RoundedBody& body, const Vec3& n, double margin) {
   const Vec3& from = body.points[0];
   double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY, size = 0;
@@ -195,7 +196,7 @@ class MeshBodyImpact {
   }
 
   Impact found() const { return {until_, face_ >= 0, normal_}; }
-  std::int32_t leaf() const { return face_; }  // in leaf order, -1: none
+  std::int32_t leaf() const { return face_; }  // in leaf order; -1 if there is none
   const Vec3& origin() const { return pieces_.origin(); }
   MovingBody triangle(int i) const {
     return moving_triangle(mesh_.tree.triangles[i].v, pieces_.motion_a(), origin());
@@ -240,14 +241,14 @@ class MeshBodyImpact {
     }
   }
 
-  // `start`: they are certainly apart before.
+  // Both are certainly apart before `start`.
   void touch(int i, double start) {
     const double end = std::min(until_, pieces_.end());
     if (start > end) return;
     MovingBody x = triangle(i), y = body();
     const Impact impact = first_contact(x, y, start, end);
     if (!impact.hit) return;
-    // Ties by index, so that the answer has one order.
+    // Ties are broken by index, so that the answer is unique.
     if (face_ >= 0 && impact.t == until_ && i > face_) return;
     until_ = impact.t, face_ = i, normal_ = impact.normal;
   }

@@ -1,6 +1,6 @@
-// Boxes of one tree against a box of the other, under a pose: the separating-axis test of two boxes
-// that share one rotation, eight at a time (Gottschalk, Lin and Manocha 1996). Never a wrong
-// "clear".
+// Boxes of one tree against a box of the other, under a pose: the separating-axis test, eight boxes
+// at a time (Gottschalk, Lin and Manocha 1996). All boxes of a tree share one rotation. Boxes that
+// meet are never called clear.
 #pragma once
 
 #include "mesh_tree.hpp"
@@ -13,8 +13,8 @@ struct Relative {
   float r[3][3], abs_r[3][3], t[3], pad;
 };
 
-// A pose as given: x -> R x + t, the products summed left to right. The transformed corner of a
-// triangle is this expression rounded to doubles, once; every exact answer is about those doubles.
+// A pose as given: x -> R x + t, with products summed from left to right. This expression, in
+// doubles, defines the corner of a posed triangle; every exact answer is about these doubles.
 struct Pose {
   double r[3][3], t[3];
   explicit Pose(const double* m) {
@@ -34,7 +34,7 @@ struct Pose {
   }
 };
 
-// Both directions between tree a and tree b posed in a's frame.
+// The relative poses of two trees in both directions; b is posed in a's frame.
 struct Placement {
   Relative b_in_a, a_in_b;
   bool apart;  // the bounding balls do not meet
@@ -79,8 +79,8 @@ struct Placement {
   }
 };
 
-// Bit s is set where the box of child s of `node` may meet `box`, which lives in the frame that
-// `rel` places in the node's. `distance2` gets the squared distances of the centres.
+// Sets bit s if the box of child s of `node` may meet `box`. `rel` is the pose of the frame of
+// `box` in that of the node. `distance2` receives the squared distances of the centres.
 unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel, float* distance2);
 
 }  // namespace tauguard::rigid

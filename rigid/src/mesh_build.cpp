@@ -20,7 +20,7 @@ Four four(const float* x) {
   return v;
 }
 
-// Three coordinates and one lane that nobody reads.
+// Three coordinates and one unused lane.
 struct FloatBox {
   Four lo = (Four){} + INFINITY, hi = (Four){} - INFINITY;
   void add(Four l, Four h) {

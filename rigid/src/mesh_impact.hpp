@@ -6,8 +6,8 @@
 
 namespace tauguard::rigid {
 
-// `faces` gets the triangles that touch first, {-1, -1} where none do. Surfaces count, not what
-// they enclose.
+// `faces` receives the triangles that touch first, or {-1, -1}. Meshes are their surfaces, not the
+// volumes inside.
 FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b, FacePair* faces);
 

@@ -35,10 +35,10 @@ struct ObbTree {
 // a leaf takes its normal and its longest edge. Extents are those of all corners along the axes.
 ObbTree fit_obbs(const Tree& tree);
 
-// Bit s is set where child s of `node` may meet `box`, already in the node's frame.
+// Sets bit s if child s of `node` may meet `box`, which is in the node's frame.
 unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad, float* distance2);
 
-// `box` of one frame in the frame that `at` places it in.
+// `box` in another frame; `at` is the relative pose.
 FloatObb placed(const FloatObb& box, const Relative& at);
 
 struct ObbBounds {

@@ -3,9 +3,11 @@
 
 #include "mesh_obb.hpp"
 #include "symmetric.hpp"
-#include "wide.hpp"
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::rigid {
+
+using namespace geometry;  // lanes.hpp
 namespace {
 
 // Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T with
@@ -20,7 +22,7 @@ struct Moments {
   }
 };
 
-// The corners of all triangles in leaf order, relative to the tree's centre, one array a
+// The corners of all triangles in leaf order, relative to the tree's centre, in one array for each
 // coordinate.
 struct Corners {
   std::vector<float> x[3];
@@ -45,16 +47,16 @@ struct Span {
 // Bounds of corners [begin, end) along three axes; at least eight corners.
 TAUGUARD_CLONES Span span_wide(const float* x, const float* y, const float* z, std::size_t count,
                                const float axis[3][3]) {
-  Wide lo[3], hi[3];
-  for (int i = 0; i < 3; ++i) lo[i] = (Wide){} + INFINITY, hi[i] = (Wide){} - INFINITY;
+  Float8 lo[3], hi[3];
+  for (int i = 0; i < 3; ++i) lo[i] = (Float8){} + INFINITY, hi[i] = (Float8){} - INFINITY;
   for (std::size_t at = 0; at < count; at += 8) {
     const std::size_t from = std::min(at, count - 8);  // the last eight overlap those before
-    Wide p[3];
+    Float8 p[3];
     std::memcpy(&p[0], x + from, sizeof p[0]);
     std::memcpy(&p[1], y + from, sizeof p[1]);
     std::memcpy(&p[2], z + from, sizeof p[2]);
     for (int i = 0; i < 3; ++i) {
-      const Wide h = (axis[i][0] * p[0] + axis[i][1] * p[1]) + axis[i][2] * p[2];
+      const Float8 h = (axis[i][0] * p[0] + axis[i][1] * p[1]) + axis[i][2] * p[2];
       lo[i] = h < lo[i] ? h : lo[i];
       hi[i] = h > hi[i] ? h : hi[i];
     }
@@ -101,7 +103,7 @@ void cross(const double* a, const double* b, double* out) {
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-// Axes from a normal and a direction across it; the coordinate axes where either vanishes.
+// Axes from a normal and a direction across it; the coordinate axes if one of them is zero.
 void set_axes(const double* normal, const double* along, FloatObb* box) {
   const double nn = dot(normal, normal), part = dot(along, normal) / nn;
   const double flat[3] = {along[0] - part * normal[0], along[1] - part * normal[1],

@@ -1,5 +1,5 @@
-// The step of two moving things cut into pieces so short that they hardly turn, in order; each
-// piece places either in the other's frame along a chord.
+// Divides the step of two moving bodies into pieces so short that they hardly turn. In each piece
+// one body moves along a chord in the frame of the other.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace tauguard::rigid {
 
-// A ball in a body's own frame that holds it, rounded up, and its largest |coordinate|.
+// A ball around a body in its own frame, rounded up, and the body's largest |coordinate|.
 struct Extent {
   Vec3 centre;
   double radius, magnitude;
@@ -36,20 +36,20 @@ class Pieces {
     shift_ = 0x1p-44 * (largest + (ma.speed * arm_a + mb.speed * arm_b)) + 0x1p-140;
   }
 
-  // Calls open() for every piece in which they may meet, until a piece begins after `until`. open()
-  // may lower `until`, so the piece of the first hit is the last one opened.
+  // Calls open() for every piece in which the bodies may meet, in order, until a piece begins after
+  // `until`. open() may lower `until`, so the piece of the first hit is the last one opened.
   template <class Open>
   void each(const double& until, Open open) {
     piece(0, 1, until, open);
   }
 
-  // Of the open piece.
+  // The start of the open piece.
   double begin() const { return begin_; }
   double end() const { return begin_ + length_; }
   double length() const { return length_; }
   const Chord& in_a() const { return in_a_; }
   const Chord& in_b() const { return in_b_; }
-  // The fraction of the piece after which no contact is sought, rounded up.
+  // The fraction of the piece, rounded up, after which contacts do not matter.
   float left(double until) const {
     if (until >= end()) return 1.0f;
     return std::nextafter(static_cast<float>((until - begin_) / length_), 2.0f);
@@ -89,7 +89,7 @@ class Pieces {
     if (gap > (both + 0.5 * length * speed_ + slack) * more) return;
     const bool short_enough =
         (ma_.speed + mb_.speed) * length <= most_turn && speed_ * length <= most_move * both;
-    // Below 2^-50 of the step the ends of a piece are hardly told apart, whatever moves how fast.
+    // The ends of a piece below 2^-50 of the step hardly differ in double precision.
     if (short_enough || length < 0x1p-50) {
       place(begin, length, both);
       open();
@@ -114,10 +114,10 @@ class Pieces {
          reach);
   }
 
-  // `moved` seen from `at`, both from their centres. Seen from a frame that turns at w, a point at
-  // x from its origin that itself turns at v about an origin that drifts is accelerated by at most
-  // v^2 arm + 2 w (drift + v arm) + w^2 |x|; over a time h its path leaves its chord by an eighth
-  // of that h^2.
+  // The motion of `moved` in the frame of `at`, both relative to their centres. Take a frame that
+  // turns at w, and in it a point at x that turns at v with radius `arm` about an origin of
+  // velocity `drift`. Its acceleration is at most v^2 arm + 2 w (drift + v arm) + w^2 |x|. Over a
+  // time h its path leaves the chord by at most an eighth of that, times h^2.
   void fill(Chord& chord, const Place* at, const Place* moved, const Vec3& centre,
             const Vec3& moved_centre, double v, double w, double arm, double far, double reach) {
     Place* out[3] = {&chord.start, &chord.middle, &chord.end};
@@ -138,8 +138,8 @@ class Pieces {
   const Extent a_, b_;
   const RigidMotion &ma_, &mb_;
   const Vec3 origin_;
-  double drift_, speed_;           // of the origins and of any two points past each other, at most
-  double coarse_, fine_, shift_;   // rounding: shares of a length, and a length
+  double drift_, speed_;  // bounds on the relative speed of the origins and of any two points
+  double coarse_, fine_, shift_;   // rounding: two fractions of a length, and a length
   double begin_ = 0, length_ = 1;  // the piece that is open
   Chord in_a_, in_b_;
 };

@@ -27,14 +27,14 @@ void edge(const Triangle& t, int i, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = t.v[(i + 1) % 3][k] - t.v[i][k];
 }
 
-// The cheaper of moving b along +axis or -axis until its interval leaves a's; keeps the least
-// depth.
+// Finds the shorter motion of b along +axis or -axis that separates the intervals, and keeps the
+// least depth over all axes.
 void separate(const Triangle& a, const Triangle& b, const double* axis, double size, Contact& c) {
   const double length = std::sqrt(dot(axis, axis));
   if (!(length > size)) return;
   double lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
   for (int i = 0; i < 3; ++i) {
-    // Relative to one corner of a, so that a far-away origin costs no digits.
+    // Relative to one corner of a, so that triangles far from the origin lose no accuracy.
     const double x[3] = {a.v[i][0] - a.v[0][0], a.v[i][1] - a.v[0][1], a.v[i][2] - a.v[0][2]};
     const double y[3] = {b.v[i][0] - a.v[0][0], b.v[i][1] - a.v[0][1], b.v[i][2] - a.v[0][2]};
     const double p = dot(axis, x) / length, q = dot(axis, y) / length;
@@ -73,7 +73,7 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
     for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
     return;
   }
-  // Coplanar or touching at the rim: the middle of the overlap of both boxes.
+  // Coplanar triangles or triangles that touch at an edge: the middle of the overlap of both boxes.
   for (int k = 0; k < 3; ++k) {
     lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
                      std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));

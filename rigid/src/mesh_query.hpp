@@ -37,8 +37,8 @@ struct Mesh {
 // Scratch space of one thread.
 using Scratch = std::vector<SlotPair>;
 
-// leaf(index of a triangle of a, index of a triangle of b (both in leaf order), b's triangle posed)
-// for every pair of triangles that share a point, until it returns true.
+// Calls leaf(i, j, posed) for every pair of triangles that share a point, until it returns true:
+// triangles i of a and j of b in leaf order, and the posed triangle of b.
 template <class Visit>
 bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Visit visit) {
   const Placement at(a.tree, b.tree, pose);
@@ -67,19 +67,20 @@ bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scrat
   }
 }
 
-// The first colliding pair found, as rows of the faces; {-1, -1} where the meshes are apart.
+// The first colliding pair found, as rows of the faces; {-1, -1} if the meshes are apart.
 struct FacePair {
   std::int32_t a, b;
 };
 FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch);
 
-// Where and how two overlapping triangles touch: point on both, unit normal from a to b, and how
-// far b must move along the normal to come free of a.
+// A contact of two overlapping triangles: a point on both, the unit normal from a to b, and the
+// distance by which b must move along the normal to leave a.
 struct Contact {
   std::int32_t a, b;  // rows of the faces
   double point[3], normal[3], depth;
 };
-// The number of rows that all threads of a query may list together; more are a `std::length_error`.
+// Limits the number of rows that all threads of a query list together. More rows throw
+// std::length_error.
 class ContactBudget {
  public:
   explicit ContactBudget(std::size_t most) : most_(most) {}

@@ -1,8 +1,10 @@
 #include "mesh_swept.hpp"
 
-#include "wide.hpp"
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::rigid {
+
+using namespace geometry;  // lanes.hpp
 
 Place place_at(const RigidMotion& m, double t) {
   const double c = std::cos(m.speed * t), s = std::sin(m.speed * t);
@@ -15,7 +17,8 @@ Place place_at(const RigidMotion& m, double t) {
   return out;
 }
 
-// The box turns about its centre by at most `turn` either way from the middle of the piece.
+// The box of the middle of the piece, widened for a rotation about its centre by at most `turn` in
+// either direction.
 MovingObb moving(const FloatObb& box, const Chord& chord) {
   MovingObb out;
   const Vec3 c = {box.centre[0], box.centre[1], box.centre[2]};
@@ -42,27 +45,27 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
 TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
                                     float* enter) {
   const FloatObb& box = m.box;
-  const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
-  const Wide* e = reinterpret_cast<const Wide*>(node.extent);
-  const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],
-             d2 = box.centre[2] - centre[2];
-  const Wide pad = (Wide){} + m.pad;
-  Wide d[3], v[3], r[3][3], s[3][3], first = (Wide){}, last = (Wide){} + leave;
-  const auto axis = [&](const Wide& at, const Wide& speed,
-                        const Wide& reach) __attribute__((always_inline)) {
-    const Wide size = TAUGUARD_WIDE_ABS(speed), share = 1.0f / (size < pad ? pad : size);
-    const Wide toward = speed < 0.0f ? -at : at, bound = reach + 2.0f * pad;
-    const Wide in = (-bound - toward) * share, out = (bound - toward) * share;
+  const Float8* centre = reinterpret_cast<const Float8*>(node.centre);
+  const Float8* e = reinterpret_cast<const Float8*>(node.extent);
+  const Float8 d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],
+               d2 = box.centre[2] - centre[2];
+  const Float8 pad = (Float8){} + m.pad;
+  Float8 d[3], v[3], r[3][3], s[3][3], first = (Float8){}, last = (Float8){} + leave;
+  const auto axis = [&](const Float8& at, const Float8& speed,
+                        const Float8& reach) __attribute__((always_inline)) {
+    const Float8 size = abs(speed), share = 1.0f / (size < pad ? pad : size);
+    const Float8 toward = speed < 0.0f ? -at : at, bound = reach + 2.0f * pad;
+    const Float8 in = (-bound - toward) * share, out = (bound - toward) * share;
     first = in > first ? in : first;
     last = out < last ? out : last;
   };
   for (int i = 0; i < 3; ++i) {
-    const Wide* n = reinterpret_cast<const Wide*>(node.axis[i]);
+    const Float8* n = reinterpret_cast<const Float8*>(node.axis[i]);
     d[i] = (n[0] * d0 + n[1] * d1) + n[2] * d2;
     v[i] = (n[0] * m.move[0] + n[1] * m.move[1]) + n[2] * m.move[2];
     for (int j = 0; j < 3; ++j) {
       r[i][j] = (n[0] * box.axis[j][0] + n[1] * box.axis[j][1]) + n[2] * box.axis[j][2];
-      s[i][j] = TAUGUARD_WIDE_ABS(r[i][j]);
+      s[i][j] = abs(r[i][j]);
     }
     axis(d[i], v[i],
          e[i] + ((s[i][0] * box.extent[0] + s[i][1] * box.extent[1]) + s[i][2] * box.extent[2]));
@@ -71,9 +74,7 @@ TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, flo
     axis((d[0] * r[0][j] + d[1] * r[1][j]) + d[2] * r[2][j],
          (v[0] * r[0][j] + v[1] * r[1][j]) + v[2] * r[2][j],
          ((e[0] * s[0][j] + e[1] * s[1][j]) + e[2] * s[2][j]) + box.extent[j]);
-  unsigned lanes;
-  TAUGUARD_WIDE_LANES((Bits)(first <= last), lanes);
-  if (lanes == 0) return 0;
+  if (bits8((Mask8)(first <= last)) == 0) return 0;
   for (int i = 0; i < 3; ++i) {
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
     for (int j = 0; j < 3; ++j) {
@@ -83,15 +84,15 @@ TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, flo
                (s[i][j2] * box.extent[j1] + s[i][j1] * box.extent[j2]));
     }
   }
-  TAUGUARD_WIDE_LANES((Bits)(first <= last), lanes);
+  const unsigned lanes = bits8((Mask8)(first <= last));
   std::memcpy(enter, &first, sizeof first);
   return lanes;
 }
 
 namespace {
 
-// The share of the chord up to which the axis separates b's corners from a's: every corner's height
-// above a is linear in the share, so the lowest is reached first at one of the three roots.
+// The fraction of the chord up to which the axis separates b's corners from a's. Every corner's
+// height above a is linear in the fraction, so the first contact is at one of the three roots.
 double separated_until(const Vec3& n, const Vec3* a, const Vec3* b0, const Vec3* b1, double pad) {
   const double slack = pad * norm(n) * (1 + 0x1p-40);
   double lo = INFINITY, hi = -INFINITY, p[3], q[3], p_lo = INFINITY, p_hi = -INFINITY;

@@ -1,5 +1,5 @@
-// Boxes and triangles of two meshes during a piece of the step so short that they hardly turn: how
-// long are they certainly apart? Positions are relative to one of the meshes. A point of the other
+// Tells how long boxes and triangles of two meshes are certainly apart during a piece of the step
+// so short that they hardly turn. Positions are relative to one of the meshes. A point of the other
 // moves on its chord, with an error of at most the sagitta of its path.
 #pragma once
 
@@ -22,28 +22,28 @@ Place place_at(const RigidMotion& m, double t);
 struct Chord {
   Place start, middle, end;
   double sagitta;   // of any point's path, m
-  double turn;      // half of the angle that is turned, rad
+  double turn;      // half of the rotation angle, rad
   double rounding;  // of positions in double, and of rotations that are only nearly orthonormal, m
   float float_rounding;  // the same in float
 };
 
-// A box on its chord: from its centre by `move`.
+// A box whose centre moves by `move`.
 struct MovingObb {
   FloatObb box;
   float move[3], pad;
 };
 MovingObb moving(const FloatObb& box, const Chord& chord);
 
-// Bit s is set where child s may meet the box before the share `leave` of the chord; `enter` gets
-// the share up to which they are certainly apart.
+// Sets bit s if child s may meet the box before the fraction `leave` of the chord. `enter` receives
+// the fraction up to which they are certainly apart.
 unsigned swept_mask(const ObbNode& node, const MovingObb& moving, float leave, float* enter);
 
-// The share of the chord up to which two triangles are certainly apart, inf for all of it. `b0`,
+// The fraction of the chord up to which two triangles are certainly apart; inf for all of it. `b0`,
 // `b1`: the other triangle at the chord's ends, in the frame of `a`.
 double certainly_apart(const Vec3* a, const Vec3* b0, const Vec3* b1, double pad);
 
-// The children of a node as oriented boxes, whatever the mesh bounds them by; `scratch` may hold
-// the answer.
+// The children of a node as oriented boxes, for every kind of volume of the mesh. The answer may be
+// stored in `scratch`.
 const ObbNode& oriented(const Mesh& mesh, std::int32_t node, ObbNode& scratch);
 FloatObb oriented_box(const Mesh& mesh, const Slot& slot);
 

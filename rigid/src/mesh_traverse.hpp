@@ -9,7 +9,7 @@
 
 namespace tauguard::rigid {
 
-// A child of a tree, by where its box is stored; node -1 is the whole tree.
+// A child of a tree, named by the place of its box. Node -1 means the whole tree.
 struct Slot {
   std::int32_t node, slot;
   Child child(const Tree& t) const { return node < 0 ? 0 : t.nodes[node].child[slot]; }

@@ -1,6 +1,6 @@
-// A tree over the triangles of one rigid mesh: eight children a node, their boxes side by side in
-// float so that one vector instruction tests all eight. Boxes are relative to the tree's centre and
-// rounded outward; a child is an inner node, a leaf of a few triangles, or empty.
+// A tree over the triangles of one rigid mesh. A node has eight children, whose boxes are stored
+// side by side in float so that one vector instruction tests all eight. Boxes are relative to the
+// tree's centre and rounded outward; a child is an inner node, a leaf of a few triangles, or empty.
 #pragma once
 
 #include <array>
@@ -15,9 +15,9 @@
 
 namespace tauguard::rigid {
 
-inline constexpr int width = 8;       // children a node: one AVX register of floats
-inline constexpr int leaf_size = 4;   // triangles a leaf, at most
-inline constexpr int small_leaf = 2;  // triangles that are not split while their node has room
+inline constexpr int width = 8;       // children of a node: one AVX register of floats
+inline constexpr int leaf_size = 4;   // most triangles in a leaf
+inline constexpr int small_leaf = 2;  // so few triangles are not split if their node has room
 
 // A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first +
 // count).
@@ -29,7 +29,7 @@ inline int leaf_count(Child c) { return ~c & 7; }
 
 struct alignas(32) Node {
   float centre[3][width];
-  float extent[3][width];  // half the edge, -inf where there is no child
+  float extent[3][width];  // half the edge, -inf if there is no child
   Child child[width];
 };
 
@@ -70,7 +70,7 @@ class Tree {
 
  private:
   struct alignas(16)
-      Item {  // a triangle while the tree is built: its box relative to the centre, its row
+      Item {  // a triangle during the build: its box relative to the centre, and its row
     float lo[3];
     std::int32_t row;
     float hi[3], unused;

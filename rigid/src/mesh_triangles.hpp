@@ -1,5 +1,5 @@
-// Do two closed triangles share a point? Exact for any finite doubles, degenerate triangles
-// included (a collinear triangle is a segment, three equal corners are a point).
+// Whether two closed triangles share a point. Exact for any finite doubles, also for degenerate
+// triangles (a collinear triangle is a segment, three equal corners are a point).
 //
 // General position is answered by the interval test of Guigue and Devillers ("Fast and robust
 // triangle-triangle overlap test using orientation predicates", 2003); if one orientation is zero,
@@ -33,15 +33,15 @@ inline int turn(const double* a, const double* b, const double* c, int k) {
   return orient2d(Flat(a, k).p, Flat(b, k).p, Flat(c, k).p);
 }
 
-// An axis along which a, b, c project to a proper triangle; -1 where they are collinear.
+// An axis along which a, b, c project to a proper triangle; -1 if they are collinear.
 inline int dropped_axis(const double* a, const double* b, const double* c) {
   for (int k = 0; k < 3; ++k)
     if (turn(a, b, c, k) != 0) return k;
   return -1;
 }
 
-// p on the closed segment ab, all three known to be collinear: lexicographic order is order on the
-// line.
+// Whether p is on the closed segment ab, for collinear a, b, p. On a line, lexicographic order is
+// the order of points.
 inline bool between(const double* a, const double* b, const double* p) {
   const bool forward = std::lexicographical_compare(a, a + 3, b, b + 3);
   const double *lo = forward ? a : b, *hi = forward ? b : a;
@@ -53,7 +53,7 @@ inline bool on_segment(const double* a, const double* b, const double* p) {
   return dropped_axis(a, b, p) < 0 && between(a, b, p);
 }
 
-// Closed segments pq and ab in space.
+// Whether the closed segments pq and ab meet in space.
 inline bool segments_meet(const double* p, const double* q, const double* a, const double* b) {
   if (on_segment(a, b, p) || on_segment(a, b, q) || on_segment(p, q, a) || on_segment(p, q, b))
     return true;
@@ -64,7 +64,7 @@ inline bool segments_meet(const double* p, const double* q, const double* a, con
   return turn(p, q, a, k) * turn(p, q, b, k) < 0 && turn(a, b, p, k) * turn(a, b, q, k) < 0;
 }
 
-// p and the proper triangle t in one plane, seen along axis k.
+// Whether p is in the proper triangle t of the same plane, seen along axis k.
 inline bool inside_flat(const double* p, const Triangle& t, int k) {
   const int s = turn(t.v[0], t.v[1], t.v[2], k);
   for (int i = 0; i < 3; ++i)
@@ -78,7 +78,7 @@ inline bool meets_an_edge(const double* p, const double* q, const Triangle& t) {
   return false;
 }
 
-// Closed segment pq (p == q allowed) and closed triangle t (collinear allowed).
+// Whether the closed segment pq (p == q allowed) meets the closed triangle t (collinear allowed).
 inline bool segment_meets(const double* p, const double* q, const Triangle& t) {
   const int k = dropped_axis(t.v[0], t.v[1], t.v[2]);
   if (k < 0) return meets_an_edge(p, q, t);
@@ -127,10 +127,11 @@ inline void plane_signs(const Triangle& p, const Triangle& q, int* sign) {
   }
 }
 
-// The corner that is alone on its side of the other plane (all signs non-zero, not all equal).
+// The corner that is alone on its side of the other triangle's plane. All signs are non-zero, and
+// not all are equal.
 inline int lonely(const int* s) { return s[0] == s[1] ? 2 : (s[0] == s[2] ? 1 : 0); }
 
-// Exact: do the closed triangles a and b share a point? Needs RoundToNearest.
+// Whether the closed triangles a and b share a point, exactly. Needs RoundToNearest.
 inline bool triangles_overlap(const Triangle& a, const Triangle& b) {
   int sb[3], sa[3];
   plane_signs(a, b, sb);

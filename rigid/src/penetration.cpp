@@ -55,7 +55,7 @@ class ShapeDifferences {
   bool sees(double excess, double square) const {
     return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
   }
-  // The answer is to rounding.
+  // Never: the answer is rounded anyway.
   bool unsure(double, const Vec3&, double, const std::array<const Vec3*, 3>&) const {
     return false;
   }
@@ -71,7 +71,7 @@ using Polytope = ExpandingPolytope<double, ShapeDifferences>;
 struct Barycentric {
   std::array<int, 3> corner;
   double weight[3], least;
-  // To the face, where the point lies outside.
+  // Moves the point to the face if it lies outside.
   void clamp() {
     weight[1] = std::clamp(weight[1], 0.0, 1.0);
     weight[2] = std::clamp(weight[2], 0.0, 1.0 - weight[1]);
@@ -101,7 +101,8 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
     d->lower = 0;
     return;
   }
-  // b - a moved against the outward normal by the face's distance no longer holds the origin.
+  // If the set b - a is moved against the outward normal by the face's distance, it no longer
+  // contains the origin.
   d->n = (-1 / length) * normal;
   d->lower = -std::max(0.0, polytope.nearest.offset / length);
   const Vec3 foot = d->lower * d->n;

@@ -14,10 +14,10 @@ namespace {
 
 // Largest error of a certified answer in double precision, as a fraction of the size. If the
 // distance is below the fraction `near`, exact arithmetic is used, so the sign is always certain.
-// The total error in unit roundoffs of the size, of which 2^-45 has 256: 128 between the bound from
-// below and that from above, 18 for the corners' rounding, 21 for that of the bound from above;
-// then 18 for the bound from below of bodies apart, or 21 for FacetDepth's and 48 for the facets
-// that it leaves out, or 39 for least_depth.
+// The total error stays below 2^-45 of the size, which is 256 unit roundoffs: 128 between the lower
+// and the upper bound, 18 for the rounding of the corners and 21 for that of the upper bound; then
+// for the lower bound 18 if the bodies are apart, or 21 in FacetDepth and 48 for the facets that it
+// leaves out, or 39 in least_depth.
 constexpr double certain = 0x1p-46, near = 1e-10;
 // Beyond these sizes products of four lengths leave the range of a double.
 bool in_range(double size) { return size > 1e-40 && size < 1e40; }
@@ -63,7 +63,7 @@ SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
   return {distance, point_a, point_b, (1 / distance) * between};
 }
 
-// Where overlapping bodies touch after they were separated by `depth` along n.
+// The answer for overlapping bodies: they touch after b is moved by `depth` along n.
 SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
                         double depth, double size) {
   Points<double> moved = b;
@@ -164,7 +164,7 @@ ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<doub
           (dot(nearest.numerator, nearest.numerator) - reach * reach).sign()};
 }
 
-// Of bodies that b leaves by `height` / |facet|^2 along `facet`.
+// The answer for bodies that only touch after b is moved along `facet` by `height` / |facet|^2.
 ExactDistance exact_depth(const Vector3<Dyadic>& facet, const Dyadic& height,
                           const Points<double>& a, const Points<double>& b, const Dyadic& radii,
                           double size) {
@@ -191,7 +191,7 @@ ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
   return {{0.0, point, point, (1 / norm(normal)) * normal}, radii.is_zero() ? 0 : -1};
 }
 
-// The nearest points, from those that doubles find.
+// The exact nearest points. The search starts from the corners that doubles find.
 ExactNearest<Dyadic> exact_nearest(const Points<Dyadic>& x, const Points<Dyadic>& y,
                                    const Points<double>& a, const Points<double>& b) {
   const Nearest ends = nearest(a, b);
@@ -212,7 +212,7 @@ ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std
   return exact_together(x, y, a, b, radii, size);
 }
 
-// Grown by balls; `sign`, where it is known, is the distance's.
+// The answer for bodies grown by balls. `sign` is that of the distance, if it is known.
 SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sign, bool known) {
   g.point_a = g.point_a + radius_a * g.normal;
   g.point_b = g.point_b - radius_b * g.normal;

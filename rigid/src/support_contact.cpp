@@ -56,7 +56,7 @@ Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double s
   const double radii = a.radius() + b.radius(), offset = radii + threshold;
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
   const double close = offset + 2 * margin + touching * (a.reach() + b.reach() + radii);
-  double t, seen = -1;  // `d` is of time `seen`
+  double t, seen = -1;  // `d` is the distance at time `seen`
   Vec3 n{};
   Distance d;
   // For curved cores the lower bound may be smaller than the true distance. Close to contact such a

@@ -5,7 +5,8 @@
 
 namespace tauguard::rigid {
 
-// As rows of `axis` (cyclic Jacobi); `m` is diagonal afterwards, to rounding.
+// Writes them to the rows of `axis` by cyclic Jacobi rotations. `m` is diagonal afterwards, to
+// rounding.
 inline void eigenvectors(double m[3][3], double axis[3][3]) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) axis[i][j] = i == j;

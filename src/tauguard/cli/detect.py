@@ -260,7 +260,7 @@ def summary(
 
 
 def report(result: dict[str, Any]) -> None:
-    """The figures for a reader."""
+    """The figures as text."""
     from tauguard.detectors.evaluation.card_page import printed_from, rate_text
 
     print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")

@@ -286,7 +286,7 @@ def _us(value: float | None) -> str:
 
 
 def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
-    """What was heard, with alarms, as MCAP."""
+    """Write the kept samples and their alarms as MCAP."""
     import numpy as np
 
     from tauguard.detectors import find_alarms

@@ -176,7 +176,7 @@ def labelled_motion(
 
 
 def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
-    """What the threshold aims at, and what its motion can tell of it."""
+    """The rate that the threshold aims at, and the interval that its motion supports, as text."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
 

@@ -142,7 +142,8 @@ class Dyadic {
     }
   }
 
-  // The digits of a number in units of 2^exponent (at most its own), read without being moved.
+  // The digits of a number in units of 2^exponent, where `exponent` is at most the number's own;
+  // nothing is copied.
   class Shifted {
    public:
     Shifted(const Dyadic& a, std::int64_t exponent)

@@ -81,7 +81,7 @@ struct FixedInt {
     return r;
   }
 
-  // To about 2^-52 of it.
+  // With a relative error of about 2^-52.
   double to_double() const {
     const FixedInt m = magnitude();
     double sum = 0;

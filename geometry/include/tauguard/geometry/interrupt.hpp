@@ -58,12 +58,12 @@ class InterruptScope {
   std::chrono::steady_clock::time_point next_{};
 };
 
-// In a kernel's loop, at least every few thousand operations; a few nanoseconds.
+// Call this in a kernel's loop at least every few thousand operations. It takes a few nanoseconds.
 inline void poll_interrupt() {
   if (InterruptScope* scope = InterruptScope::current()) scope->poll();
 }
 
-// As ThreadPool::parallel_for on the shared pool, with the caller's scope in every thread.
+// Like ThreadPool::parallel_for on the shared pool, with the caller's scope in every thread.
 inline void interruptible_for(
     std::size_t n, int threads, std::size_t grain,
     const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {

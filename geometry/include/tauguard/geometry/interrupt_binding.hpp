@@ -22,7 +22,7 @@ inline void bind_interrupts() {
   });
 }
 
-// Around a kernel: without the interpreter's lock, and open to Ctrl-C.
+// Use it around a kernel. It releases the interpreter's lock and lets Ctrl-C end the call.
 class LongCall {
   nanobind::gil_scoped_release release_;
   InterruptScope scope_;

@@ -1,5 +1,5 @@
-// The axes of discrete oriented polytopes (k-DOPs, Klosowski et al. 1998): k / 2 fixed axes, an
-// interval on each.
+// The axes of discrete oriented polytopes (k-DOPs, Klosowski et al. 1998). A k-DOP is an interval
+// on each of k / 2 fixed axes.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace tauguard::geometry {
 inline constexpr std::int8_t k_dop_axes[13][3] = {
     {1, 0, 0},  {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, 0, 1},  {0, 1, 1},  {1, -1, 0},
     {1, 0, -1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
-// Those of a 14-DOP: a box with cut corners.
+// The axes of a 14-DOP, a box with cut corners.
 inline constexpr std::int8_t k_dop_corner_axes[7][3] = {
     {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 

@@ -1,6 +1,6 @@
 // Several numbers side by side, by the compiler's vector types. One source is compiled for the
-// baseline and, by target attributes, for wider units; which runs is chosen when the program does.
-// No contraction and no reassociation: every variant gives the same bits.
+// baseline and, by target attributes, for wider units; the program chooses at run time. There is no
+// contraction and no reassociation, so every variant gives the same bits.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 #define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 #endif
 
-// Compiles a function for the baseline and for AVX2; the loader picks. Not under ThreadSanitizer:
-// the loader asks before that has begun.
+// Compiles a function for the baseline and for AVX2; the loader chooses. Not under ThreadSanitizer,
+// because the loader chooses before that is initialised.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
     !defined(__SANITIZE_THREAD__)
 #define TAUGUARD_CLONES __attribute__((target_clones("avx2", "default")))
@@ -24,7 +24,7 @@
 
 namespace tauguard::geometry {
 
-// Does this processor run functions of TAUGUARD_AVX2, of TAUGUARD_AVX512?
+// Whether this processor runs functions of TAUGUARD_AVX2, and of TAUGUARD_AVX512.
 inline bool has_avx2() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
@@ -67,14 +67,23 @@ TAUGUARD_INLINE Float8 abs(Float8 x) { return (Float8)((Mask8)x & INT32_MAX); }
 TAUGUARD_INLINE Float8 max(Float8 x, Float8 y) { return x > y ? x : y; }
 TAUGUARD_INLINE Float8 min(Float8 x, Float8 y) { return x < y ? x : y; }
 
-// A bit a lane.
+// One bit for each lane.
 TAUGUARD_INLINE unsigned bits(Mask4 c) {
   const Mask4 x = c & Mask4{1, 2, 4, 8};
   return unsigned(x[0] | x[1] | x[2] | x[3]);
 }
 
-// How many bits of a mask of 16 (the builtin is a call where the processor's own instruction may be
-// missing).
+// It has another name because Clang takes vectors of one size for the same type.
+TAUGUARD_INLINE unsigned bits8(Mask8 c) {
+  const Mask8 x = c & Mask8{1, 2, 4, 8, 16, 32, 64, 128};
+  std::uint64_t word[4];
+  std::memcpy(word, &x, sizeof word);
+  const std::uint64_t any = (word[0] | word[1]) | (word[2] | word[3]);
+  return static_cast<unsigned>(any | any >> 32) & 0xff;
+}
+
+// The number of bits in a mask of 16. (The builtin is a function call if the processor's
+// instruction may be missing.)
 TAUGUARD_INLINE unsigned count_of(unsigned x) {
   x -= x >> 1 & 0x5555;
   x = (x & 0x3333) + (x >> 2 & 0x3333);

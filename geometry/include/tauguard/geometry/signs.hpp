@@ -1,4 +1,4 @@
-// Signs of small determinants: a floating-point filter with a derived bound, exact behind it.
+// Signs of small determinants: a floating-point filter with a derived bound, then exact arithmetic.
 #pragma once
 
 #include <cmath>

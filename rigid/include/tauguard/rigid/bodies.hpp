@@ -19,9 +19,9 @@ enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 
 // Bodies of any number of vertices.
 inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
-// One body a row: tetrahedra 12 doubles (vertices), boxes 15 (centre, half extents, rotation by
-// rows), parallelepipeds 12 (origin, edges); hulls and polygons share one vertex array cut by
-// offsets.
+// One body per row. Tetrahedra have 12 doubles (vertices), boxes 15 (centre, half extents, rotation
+// by rows), parallelepipeds 12 (origin, edges). The vertices of all hulls or polygons are in one
+// array, divided by offsets.
 struct Bodies {
   Kind kind;
   const double* data;
@@ -84,8 +84,9 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
 }
 
 // A centrally symmetric body as the kernels use it. The centre is stored relative to the origin, so
-// that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k, |u_k|
-// <= 1. Relative errors: g and each entry of shift at most 3 u of the edges they come from.
+// that a far origin costs no accuracy. The centre is origin + shift; the body is the set of centre
+// + sum u_k g_k with |u_k| <= 1. Relative errors: g and each entry of shift at most 3 u of the
+// edges they come from.
 struct Zonotope {
   double origin[3], shift[3], g[3][3];
 };

@@ -9,8 +9,8 @@ namespace tauguard::rigid {
 // Points whose convex hull is meant.
 using PointList = std::vector<Vec3>;
 
-// The nearest points of two hulls, or a common point if they meet, and the features on which these
-// lie: rows of a and of b. Four pairs mean that the hulls meet.
+// The nearest points of two hulls, or a common point if they meet. `corner` holds the vertices
+// (rows of a and of b) that span the features of these points. Four pairs mean that the hulls meet.
 struct Nearest {
   Vec3 a, b;
   int size;
@@ -18,10 +18,10 @@ struct Nearest {
 };
 Nearest nearest(const PointList& a, const PointList& b);
 
-// A point of both hulls where they meet, otherwise the middle of their nearest points.
+// A common point of the hulls if they meet, otherwise the middle of their nearest points.
 Vec3 middle_point(const PointList& a, const PointList& b);
 
-// The unit direction from a to b along which the hulls are furthest apart; false where they meet.
+// The unit direction from a to b along which the hulls are furthest apart. False if they meet.
 bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation);
 
 struct Distance {

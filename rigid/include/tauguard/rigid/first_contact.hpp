@@ -34,8 +34,8 @@ struct Touch {
 Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double start,
                     double touching = 1e-10);
 
-// The contact at the present time t of both shapes; `n` is the last direction in which they were
-// apart, or zero.
+// Describes the contact at the present time t of both shapes. `n` is the last direction in which
+// they were apart, or zero.
 Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec3& n,
                double t);
 

@@ -1,7 +1,7 @@
-// A convex body under constant linear and angular velocity, in closed form: a vertex is
-//   x(t) = fixed + t linear + cos(speed t) swing + sin(speed t) side,
-// with `fixed` the part along the rotation axis and `swing`, `side` across it. No integration, no
-// drift.
+// A convex body under constant linear and angular velocity, in closed form, so that nothing is
+// integrated and nothing drifts. A vertex is
+//   x(t) = fixed + t linear + cos(speed t) swing + sin(speed t) side.
+// `fixed` is its part along the rotation axis; `swing` and `side` are across the axis.
 #pragma once
 
 #include <array>
@@ -70,14 +70,15 @@ class MovingBody {
     for (const Swing& e : edges_) edge.push_back(e.at(c, s));
   }
 
-  // Bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit
-  // one.
+  // A bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit
+  // vector.
   double acceleration(const Vec3& n, double drift) const {
     const Vec3 across = n - dot(n, motion_.axis) * motion_.axis;
     return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) *
            (1 + 0x1p-40);
   }
-  // Least and largest projection on the unit n, from the centre, over a full turn of the body.
+  // The least and largest projection of a vertex on the unit n, relative to the centre, over a full
+  // turn of the body.
   std::array<double, 2> spun(const Vec3& n) const {
     const double across = norm(n - dot(n, motion_.axis) * motion_.axis) + 0x1p-40;
     double low = INFINITY, high = -INFINITY;
@@ -87,9 +88,9 @@ class MovingBody {
     }
     return {low, high};
   }
-  // Bound on the speed of any vertex about the centre.
+  // A bound on the speed of any vertex relative to the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
-  // Bound on the speed of any vertex relative to a point that moves by `drift`.
+  // A bound on the speed of any vertex relative to a point of velocity `drift`.
   double speed_about(const Vec3& drift) const {
     return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
   }
@@ -106,8 +107,9 @@ class MovingBody {
   const Vec3& linear() const { return motion_.linear; }
 
   std::vector<Vec3> now, velocity, normal, edge;
-  double rounding = 0;   // the body is the hull of its vertices grown by a ball of this radius
-  bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
+  double rounding = 0;  // the body is the hull of its vertices grown by a ball of this radius
+  bool complete =
+      true;  // the normals and edge products contain a separating axis of any disjoint pair
 
  private:
   void add_direction(std::vector<Swing>& list, const Vec3& d) {

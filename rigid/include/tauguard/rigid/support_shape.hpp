@@ -21,9 +21,9 @@ struct Shape {
   double size[3];
   double radius;
   std::vector<double> x, y, z;       // the vertices of a hull, by coordinate
-  std::vector<Vec3> normals, edges;  // of a polytope, where they are few
+  std::vector<Vec3> normals, edges;  // of a polytope with few of them
 
-  Vec3 support(const Vec3& d) const;  // a point of the core that is furthest along d
+  Vec3 support(const Vec3& d) const;  // the point of the core that is furthest along d
   double extent() const;              // no point of the core is further from the frame's origin
   bool polytope() const { return core == Core::box || core == Core::hull; }
 };
@@ -54,11 +54,12 @@ class SupportShape {
 
   void move_to(double t);
   Vec3 support(const Vec3& d) const;
-  // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection
-  // on n + h r, and its slope.
+  // The maximum over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)), which is the tangent
+  // of the projection on n + h r, and its slope.
   double tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c, const Vec3& drift,
                  double* slope) const;
-  double speed_about(const Vec3& drift) const;  // no point moves faster than this against drift
+  double speed_about(
+      const Vec3& drift) const;  // bound on the speed of its points relative to `drift`
   double acceleration(const Vec3& n,
                       double drift) const;  // bound on |n.x''| for n within drift of the given one
   Vec3 angular() const { return corners_ ? Vec3{} : motion_->speed * motion_->axis; }
