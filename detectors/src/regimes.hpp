@@ -21,8 +21,9 @@
 // and soon after, nothing is judged; while it stands elsewhere, no joint in motion is.
 //
 // A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks
-// pass a bound for longer than noise does at rest. A gap between samples confirms no more than a
-// sample.
+// pass a bound for longer than noise does at rest. From a ratio of 2 on time counts for more, from
+// 3 on twice, so that a blow of some tens of ms is confirmed. A gap between samples confirms no
+// more than a sample.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +53,7 @@ class Regimes {
   static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
   static constexpr double settling = 0.3;    // of the observer at the beginning [s]
   static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
-  static constexpr double settles = 0.7;     // time constant with which motion is forgotten [s]
+  static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double after = 1.0;       // only change away counts, after a contact [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
@@ -166,7 +167,8 @@ class Regimes {
 
   double confirmed(Joint& one, double ratio, double dt) const {
     if (ratio <= 1.0 && one.above > 0.0 && one.rest) one.own = 1.0;
-    one.above = ratio > 1.0 ? one.above + std::min(dt, usual_) : 0.0;
+    one.above =
+        ratio > 1.0 ? one.above + std::clamp(ratio - 1.0, 1.0, 2.0) * std::min(dt, usual_) : 0.0;
     one.count = ratio > 1.0 ? one.count + 1 : 0;
     const double stirred = one.rest ? stirred_ : 1.0;
     const double needs = lasts_at_rest + stirred * (lasts_moving - lasts_at_rest);

@@ -21,8 +21,8 @@ from tauguard.traces import Trace
 class Push:
     """A hand's push."""
 
-    start: float  #: the sensor passes 4 N, or the residual leaves its course [s from the beginning]
-    peak: float  #: of the force, or of the residual [s]
+    start: float  #: the sensor passes 4 N, or the torque leaves its course [s from the beginning]
+    peak: float  #: of the force, or of the torque [s]
     moving: bool  #: whether the pushed joints moved
 
 
@@ -34,7 +34,8 @@ class ArmData:
     free: tuple[str, ...]  #: folders of collision-free logs
     loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, where there were any
     pushes: dict[str, tuple[Push, ...]] = field(default_factory=dict)
-    """Read off the residual, by log, where there is no sensor."""
+    """By log, where there is no sensor: the torque less that of an untouched run at the same place of
+    the program, from 3 N m to its peak."""
 
 
 def _pushes(moving: bool, *spans: tuple[float, float]) -> tuple[Push, ...]:
@@ -56,12 +57,12 @@ ARMS = (
             ),
             "no5_pushed": _pushes(
                 True,
-                *((12.5, 12.8), (18.85, 19.2), (21.3, 21.5), (21.85, 22.15)),
-                *((24.65, 25.0), (25.4, 25.7), (27.2, 27.45), (27.75, 28.0)),
+                *((12.54, 12.79), (18.9, 19.12), (21.14, 21.44), (21.8, 22.06), (24.77, 24.98)),
+                *((25.5, 25.66), (26.17, 26.3), (27.29, 27.4), (27.8, 27.95)),
             )
-            + _pushes(False, (20.3, 20.7), (26.1, 26.4)),
+            + _pushes(False, (20.5, 20.79)),
             "no7_pushed": _pushes(True, (15.55, 16.05), (18.2, 18.9))
-            + _pushes(False, (8.35, 8.65), (11.6, 11.9), (13.95, 14.15)),
+            + _pushes(False, (8.38, 8.64), (11.52, 11.83), (13.9, 14.12)),
         },
     ),
     ArmData("ur3", ("free",)),

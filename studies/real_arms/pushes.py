@@ -9,8 +9,8 @@ The rules: ``plain observer``, thresholds of 1.5 times the largest residual of a
 with the gains of the preset and no friction; ``1 A`` and ``10 N m``, a fixed threshold on what the
 same calibration as ours leaves, in amperes at the motor and in torque at the joint.
 
-What is optimistic: the constants of the bound were chosen on these logs of all three real arms, and
-pushes without a sensor were read off the residual. A fresh arm does a little worse.
+What is optimistic: the constants of the bound were chosen on these logs of all three real arms. A
+fresh arm does a little worse.
 docs/notes/2026-11-23-real-arms.md lists what was compared.
 """
 
