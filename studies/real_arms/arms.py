@@ -34,8 +34,8 @@ class ArmData:
     free: tuple[str, ...]  #: folders of collision-free logs
     loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, where there were any
     pushes: dict[str, tuple[Push, ...]] = field(default_factory=dict)
-    """By log, where there is no sensor: the torque less that of an untouched run at the same place of
-    the program, from 3 N m to its peak."""
+    """By log, where there is no sensor: the torque less that of an untouched run at the same place
+    of the program, from 3 N m to its peak."""
 
 
 def _pushes(moving: bool, *spans: tuple[float, float]) -> tuple[Push, ...]:
