@@ -15,6 +15,7 @@ from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
+from tauguard.detectors.features.motion_regimes import unseen, unseen_text
 from tauguard.traces import Trace
 
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
@@ -198,15 +199,18 @@ def _load(text: str, value: str, form: str) -> Load:
     return Load(parts[0], centre)
 
 
-def never_moved(traces: Sequence[Trace]) -> list[str]:
-    """A note on the joints that hardly move in any log."""
+def not_shown(traces: Sequence[Trace]) -> list[str]:
+    """Notes on the joints that hardly move in any log, and on regimes that no log shows."""
     seconds = motion_seconds([Recording(trace) for trace in traces])
     names = traces[0].joint_names
     still = [name for name, s in zip(names, seconds, strict=True) if s < SHOWN_SECONDS]
-    if not still:
-        return []
-    return [
-        f"{', '.join(still)}: moves in none of the logs, so its friction is not known: "
-        "while it moves nothing is watched, and at rest its bound is prior knowledge; add a log in "
-        "which it moves"
-    ]
+    notes = []
+    if still:
+        notes.append(
+            f"{', '.join(still)}: moves in none of the logs, so its friction is not known: while "
+            "it moves nothing is watched, and at rest its bound is prior knowledge; add a log in "
+            "which it moves"
+        )
+    if lacking := unseen(traces):
+        notes.append(f"the logs do not show {unseen_text(lacking, len(names))}")
+    return notes

@@ -12,6 +12,7 @@ from tauguard.detectors.alarms.monitor import Span, detect_with_faults
 from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.features.motion_regimes import motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Detection, Trace
 
@@ -69,6 +70,7 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
                 f"{', '.join(names)}: moves here, but in none of the training logs: nothing is "
                 f"watched in {seconds:.1f} s of this log"
             )
+        notes += _prior_knowledge(alarm.detector, trace)
     return LogDetection(
         detection,
         np.asarray(arm.noise),
@@ -77,6 +79,21 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
         monitored.faults,
         monitored.fault_seconds,
     )
+
+
+def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
+    """A note on the regimes that the training logs do not show."""
+    if not detector.unseen:
+        return []
+    names, here = detector.arm.robot.joint_names, motion_regimes(trace)
+    rows = np.zeros(len(trace.t), dtype=np.bool_)
+    for regime, joints in detector.unseen:
+        rows |= here[regime][:, [names.index(joint) for joint in joints]].any(axis=1)
+    seconds = float(rows.sum() * trace.dt)
+    return [
+        f"the training logs do not show {unseen_text(detector.unseen, len(names))}; in "
+        f"{seconds:.1f} s of this log some joint does that, under bounds of other arms"
+    ]
 
 
 def _near(detection: Detection) -> Bools:

@@ -23,6 +23,9 @@ from tauguard.traces.trace import Trace
 #: whose friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e.
 #: Between the two only a note is possible.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
+#: A joint's torque counts as this fraction of the arm's largest at least: a torque sensor's error
+#: does not shrink with a joint that hardly needs torque, as one about a vertical axis.
+FAINT = 0.05
 #: If the residual of a held-out log is the first multiple of the others', the arm may have carried
 #: a load. If much torque is unexplained as well, the second multiple is enough. On a UR10e the
 #: multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of eight, 1.2
@@ -79,7 +82,7 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
         moves = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
         left += (np.where(moves, residual, 0.0) ** 2).sum(axis=0)
         torque += (np.where(moves, trace.current * arm.drive_gain, 0.0) ** 2).sum(axis=0)
-    fraction = np.sqrt(left / torque)
+    fraction = np.sqrt(left / np.maximum(torque, FAINT**2 * torque.max()))
     worst = int(np.argmax(fraction))
     name = arm.robot.joint_names[worst]
     said = (

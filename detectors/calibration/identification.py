@@ -23,7 +23,13 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
+from tauguard.detectors.calibration.recording import (
+    LEAST,
+    Recording,
+    is_known,
+    known_load,
+    moving_span,
+)
 from tauguard.detectors.calibration.regression import Filtered, System, body_deviations, filtered
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.physical_consistency import solve_physically_consistent
@@ -224,7 +230,7 @@ def _fit(
             ]
         if turn == 0:
             if sum(len(d.current) for d in data) < 500:
-                raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
+                raise ValueError(f"fewer than 500 samples of motion: {LEAST:g} s are the least")
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         system = System(robot, friction.columns, len(recordings))
         loose = np.full(robot.joints, 0.0 if held else beliefs.gain)

@@ -16,6 +16,8 @@ MOVING = 0.01
 SHIFTED = 0.01
 #: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
+#: Motion without which nothing is identified [s].
+LEAST = 20.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,25 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
             "of its motion: give a longer log"
         )
     return rows
+
+
+def motion_length(recordings: Sequence[Recording]) -> float:
+    """Seconds from each recording's first motion to its last one, in all."""
+    moving = [r.trace for r in recordings if moves(r.trace)]
+    return sum(float(moving_span(trace, 0.0).sum()) * trace.dt for trace in moving)
+
+
+def check_length(recordings: Sequence[Recording]) -> None:
+    """Refuse less motion than :data:`LEAST`.
+
+    Raises:
+        ValueError: says how much there is.
+    """
+    if (seconds := motion_length(recordings)) < LEAST:
+        raise ValueError(
+            f"{seconds:.0f} s of motion, from each log's first to its last, in all: {LEAST:g} s "
+            "are the least, two minutes are good"
+        )
 
 
 def is_known(recording: Recording) -> bool:

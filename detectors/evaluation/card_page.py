@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tauguard.atomic_write import atomic_file
+from tauguard.detectors.features.motion_regimes import unseen_text
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
@@ -107,10 +108,7 @@ def _lines(card: ThresholdCard) -> list[str]:
         names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)
         lines.append(f"not learned from, since its alarms stand out: {names}")
     if card.unseen:
-        parts = "; ".join(
-            f"{name}: {'all joints' if len(joints) == len(card.joints) else ', '.join(joints)}"
-            for name, joints in card.unseen.items()
-        )
+        parts = unseen_text(tuple(card.unseen.items()), len(card.joints))
         lines.append(
             f"not in the logs, so left out, or bounded by what other arms do (in brackets): {parts}"
         )

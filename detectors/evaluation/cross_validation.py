@@ -14,7 +14,13 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
-from tauguard.detectors.calibration.recording import Recording, moves, moving_span, pieces
+from tauguard.detectors.calibration.recording import (
+    LEAST,
+    Recording,
+    motion_length,
+    moves,
+    pieces,
+)
 from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import SERIES, find_alarms
@@ -46,9 +52,6 @@ CHANCE = 0.01
 #: Median of a log's residual in motion over its bound, from which on it differs throughout, as with
 #: a load that is not given (1.1 and 0.6 on two simulated arms; up to 0.5 of three arms' free logs).
 THROUGHOUT = 0.8
-
-#: Motion that is kept at least when logs are left out [s].
-KEPT = 20.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def cross_validate(
         odd = standing_out(judged)
         worst = next((log for log in odd if log.name not in accepted), None)
         rest = [recordings[n] for n in names if worst is None or n != worst.name]
-        if worst is None or 2 * len(rest) < len(recordings) or _motion(rest) < KEPT:
+        if worst is None or 2 * len(rest) < len(recordings) or motion_length(rest) < LEAST:
             vouched = tuple(log for log in odd if log.name in accepted)
             return CrossValidation(tuple(judged), tuple(out), vouched)
         out.append(worst)
@@ -181,9 +184,3 @@ def _alarms_and_level(judged: Judged) -> tuple[tuple[Alarm, ...], float]:
     fraction: Array = np.where(judged.rest, 0.0, np.abs(judged.residual) / judged.bound).max(axis=1)
     rows = settled & ~judged.rest.all(axis=1)
     return alarms, float(np.median(fraction[rows])) if rows.any() else 0.0
-
-
-def _motion(recordings: Sequence[Recording]) -> float:
-    """Seconds from each log's first motion to its last one, in all."""
-    moving = [r.trace for r in recordings if moves(r.trace)]
-    return sum(float(moving_span(trace, 0.0).sum()) * trace.dt for trace in moving)

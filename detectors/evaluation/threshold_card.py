@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
@@ -15,8 +14,6 @@ from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
-#: A regime that all logs together show for less than this is unknown [s].
-SEEN = 3.0
 #: Fraction of a torque on a standing joint that the detector sees for long enough, if the torque
 #: rises within 0.1 s, and if it takes 1 s. The observer (30/s) follows it while the baseline (0.15
 #: s) absorbs it.
@@ -123,7 +120,7 @@ def threshold_card(
         poisson_rate(alarms, detector.seconds / 3600),
         logs,
         sifted.left_out if sifted is not None else (),
-        _unseen(traces, robot.joint_names),
+        dict(detector.unseen),
     )
 
 
@@ -149,37 +146,3 @@ def _tool(
     forces = np.concatenate(least)
     half, most = np.quantile(forces, (0.5, 0.95), method="higher")  # no means with infinity
     return float(half), float(most)
-
-
-def _unseen(traces: Sequence[Trace], names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Joints of each regime that all logs together show for less than :data:`SEEN`."""
-    shown: dict[str, Array] = {}
-    for trace in traces:
-        speed, dt = np.abs(trace.qd), trace.dt
-        moves = speed > 0.02
-        stood = _lasting(~moves, dt)
-        went = _lasting(moves, dt)
-        others = moves.sum(axis=1, keepdims=True) - moves
-        regimes = {
-            "standing for 2 s": stood > 2,
-            "just stopped": (stood > 0) & (stood < 1),
-            "starting": (went > 0) & (went < 0.3),
-            "slow (below 0.1 rad/s)": moves & (speed < 0.1),
-            "fast (above 1 rad/s)": speed > 1,
-            "moving alone": moves & (others == 0),
-            "at rest while others move": ~moves & (others > 0),
-        }
-        for name, rows in regimes.items():
-            shown[name] = shown.get(name, np.zeros(len(names))) + rows.sum(axis=0) * dt
-    lacking = {
-        name: tuple(j for j, s in zip(names, seconds, strict=True) if s < SEEN)
-        for name, seconds in shown.items()
-    }
-    return {name: joints for name, joints in lacking.items() if joints}
-
-
-def _lasting(on: NDArray[np.bool_], dt: float) -> Array:
-    """How long each column has been on [s]; 0 while it is off. Shape of ``on``."""
-    rows = np.arange(1, len(on) + 1)[:, None]
-    off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
-    return np.asarray(np.where(on, (rows - off) * dt, 0.0))

@@ -21,7 +21,14 @@ from tqdm import tqdm
 from tauguard.arrays import Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
-from tauguard.detectors.calibration.recording import Load, Recording, known_load, moves, pieces
+from tauguard.detectors.calibration.recording import (
+    Load,
+    Recording,
+    check_length,
+    known_load,
+    moves,
+    pieces,
+)
 from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals
@@ -39,6 +46,7 @@ from tauguard.detectors.features.free_bound import (
     upper_quantile,
 )
 from tauguard.detectors.features.front_end import NativeStream
+from tauguard.detectors.features.motion_regimes import Unseen, unseen
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_joints
 from tauguard.traces.trace import Trace
@@ -99,6 +107,7 @@ class FittedFreeMotion(Frozen):
     load: LoadDeviation  #: how uncertain the carried load is
     seconds: float  #: of collision-free motion that the bounds rest on
     alarms: int  #: in the training logs, each under calibration and bounds from the others
+    unseen: Unseen = ()  #: what the logs do not show
     name: str = "free-motion"
     settle: float = SETTLE  #: [s]
 
@@ -183,6 +192,7 @@ class FreeMotion:
         standing = [r for r in parts if not moves(r.trace)]
         if not moving:
             return _standing(arm, standing)
+        check_length(moving)
         models, whole = _calibrations(arm, moving)
         bound = Bound.prior(*friction_levels(whole, moving), *standing_positions(parts))
         dt = max(r.trace.dt for r in recordings)
@@ -201,7 +211,9 @@ class FreeMotion:
                 judge = with_load_of(parts[k], replace(left_out[k], bound=fresh))
                 alarms += _alarms(judge, parts[k])
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
-        return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
+        lacking = unseen([r.trace for r in recordings])
+        fresh = learned(bound, judged)
+        return replace(prior, bound=fresh, seconds=seconds, alarms=alarms, unseen=lacking)
 
 
 def _standing(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotion:
@@ -218,7 +230,8 @@ def _standing(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotio
     noise = np.maximum(noise, max(QUIETEST * float(noise.max()), 1e-6))
     bound = replace(bound, noise=noise, static=KEEPS * noise, friction=KEEPS * noise)
     seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
-    return replace(prior, bound=bound, seconds=seconds)
+    lacking = unseen([r.trace for r in recordings])
+    return replace(prior, bound=bound, seconds=seconds, unseen=lacking)
 
 
 def _recording(trace: Trace | Recording) -> Recording:

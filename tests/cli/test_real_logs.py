@@ -1,5 +1,6 @@
 """From logs of an arm to a calibrated file, and detection with it; what is refused and named."""
 
+import contextlib
 import dataclasses
 import json
 
@@ -162,8 +163,51 @@ def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     main(["train", "--free", *logs, *robot, "--model", model])
     assert "note: c: moves in none of the logs" in capsys.readouterr().out
     main(["detect", written(folder, "held.csv", held_joint(8)), *robot, "--model", model])
-    assert "0 alarms" in capsys.readouterr().out
-    assert arm_logs.never_moved([held_joint(0), record(0)]) == []
+    out = capsys.readouterr().out
+    assert "0 alarms" in out
+    assert "note: the training logs do not show" in out
+    assert "moving alone: all joints" in out
+    assert "starting: c; slow (below 0.1 rad/s): c;" in out
+    (note,) = arm_logs.not_shown([held_joint(0), record(0)])
+    assert note.startswith("the logs do not show standing for 2 s: a, b;")
+
+
+def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
+    folder, calibrated, tmp_path, capsys
+):
+    """Three pushes in each log: none stands out, and no other log explains them."""
+    logs = []
+    for seed in range(3):
+        trace = record(seed)
+        for start in (5.0, 11.0, 17.0):
+            push = Added(start + seed, 0.2, (28.0, 20.0, 10.0), "push")
+            trace = add_contact(trace, GAIN, push)
+        logs.append(written(tmp_path, f"pushed{seed}.csv", trace))
+    model = tmp_path / "model.skops"
+    asked = ["train", "--free", *logs, *flags(folder, calibrated.name), "--model", str(model)]
+    line = fails(capsys, *asked)
+    assert "an hour where 10 are accepted" in line
+    assert "say --accept alarms" in line
+    assert not model.exists()
+    main([*asked, "--accept", "alarms"])
+    assert "note: accepted as --accept alarms says" in capsys.readouterr().out
+    model.unlink()
+    main([*asked, "--false-alarms-per-hour", "1000"])
+    assert model.exists()
+
+
+def test_a_joint_that_the_other_logs_do_not_predict_is_refused_unless_accepted(folder, capsys):
+    odd = held_joint(12)  # c stands, and something holds 20 N m of its torque
+    odd.current[:, 2] += 20.0 / GAIN[2]
+    logs = [str(folder / "log0.csv"), written(folder, "odd.csv", odd)]
+    out = folder / "odd.xml"
+    asked = ["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", str(out)]
+    line = fails(capsys, *asked)
+    assert "predicted by the other logs, c in odd.csv " in line
+    assert "say --accept error" in line
+    assert not out.exists()
+    main([*asked, "--accept", "error"])
+    assert out.exists()
 
 
 def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, capsys):
@@ -201,14 +245,10 @@ def test_an_untold_load_names_its_log(folder, capsys):
     logs.append(written(folder, "laden.csv", record(20, load=3.0)))
     arguments = ["calibrate", *logs, *flags(folder), "--gains", *GAINS]
     arguments += ["--out", str(folder / "laden.xml")]
-    line = ""
-    try:
+    with contextlib.suppress(SystemExit):
         main(arguments)
-    except SystemExit:
-        line = capsys.readouterr().err
-    assert "did laden.csv carry something (then give --payload laden.csv=KG or =unknown)" in (
-        line or capsys.readouterr().out
-    )
+    said = "".join(capsys.readouterr())
+    assert "did laden.csv carry something (then give --payload laden.csv=KG or =unknown)" in said
     main([*arguments, "--payload", "laden=unknown"])
     assert "carry something" not in capsys.readouterr().out
 
@@ -220,7 +260,6 @@ def test_an_untold_load_names_its_log(folder, capsys):
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
         (("--traces", "x", "--calibration", "x"), "--calibration x: is --traces"),
         (("--free", "x", "--robot", "r", "--confidence", "0.9"), "go with --traces only"),
-        (("--free", "x", "--robot", "r", "--false-alarms-per-hour", "2"), "with --traces only"),
     ],
 )
 def test_flags_of_the_other_training(capsys, arguments, message):

@@ -31,6 +31,7 @@ def command(
     payload: tuple[str, ...] = (),
     scale: Literal["auto", "gains", "payload", "masses"] = "auto",
     torque: bool = False,
+    accept: tuple[Literal["error", "gravity"], ...] = (),
     json: Path | None = None,
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
@@ -53,25 +54,31 @@ def command(
         scale: what fixes the scale of the torques.
         torque: the logs hold joint torques in N m where they would hold currents, as ROS 2 efforts
             may; a column map says so by its field "torque".
+        accept: write the file although a joint of a log is further off what the others predict than
+            its friction (error), or gravity's torques are not those of the robot file (gravity).
         json: write the figures here as JSON.
     """
-    from tauguard.cli.free_logs import free_logs
+    from tauguard.cli.free_logs import free_logs, hold_to
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import never_moved
+    from tauguard.datasets.arm_logs import not_shown
     from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
+    from tauguard.detectors.calibration.recording import check_length
+    from tauguard.detectors.evaluation.acceptance import check_held_out
     from tauguard.report import write_json
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     given = free_logs(logs, robot, columns, gains, payload, torque, scale)
     traces, recordings, arm = given.traces, given.recordings, given.arm
+    check_length(recordings)
     found = identify(arm, recordings, scale=given.scale)
     if given.scale == "gains":
-        check_weight(given.numbers, found.arm.robot, list(traces.values()))
+        weight = (given.numbers, found.arm.robot, list(traces.values()))
+        hold_to("gravity", accept, lambda: check_weight(*weight))
         check_loads(arm, list(traces), recordings)
     elif (ratio := torque_per_ampere(found.arm, list(traces.values()))) < SMALL_GAIN:
         print(
@@ -79,8 +86,10 @@ def command(
             "they held joint torques: if they are in N m, say --torque"
         )
     held = left_out(arm, recordings, scale=given.scale) if len(recordings) > 1 else []
-    unmoved = never_moved(list(traces.values()))
-    print_notes((*calibration_notes(found.arm, traces, recordings, held), *unmoved))
+    shown = not_shown(list(given.all_traces.values()))
+    print_notes((*calibration_notes(found.arm, traces, recordings, held), *shown))
+    within = (found.arm, list(traces), recordings, held)
+    hold_to("error", accept, lambda: check_held_out(*within))
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=list(traces))
     result = summary(list(traces), found, held, target) | {"scale": given.source}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ class FreeLogs:
     """Logs in which some joint moves, and the arm that an identification begins with."""
 
     numbers: RobotNumbers  #: of the robot file
+    all_traces: dict[str, Trace]  #: those in which no joint moves, too
     traces: dict[str, Trace]  #: by file name
     recordings: list[Recording]  #: the same with their loads
     arm: ArmModel
@@ -55,4 +57,24 @@ def free_logs(
     for name, trace in traces.items():
         check_signs(arm, name, trace)
     chosen = "gains" if source in ("preset", "torques") else source
-    return FreeLogs(read.numbers, traces, recordings, arm, source, chosen)
+    return FreeLogs(read.numbers, read.traces, traces, recordings, arm, source, chosen)
+
+
+#: Checks that ``--accept`` may pass over.
+ACCEPTABLE = ("alarms", "error", "gravity")
+
+
+def hold_to(name: str, accept: Collection[str], check: Callable[[], None]) -> None:
+    """Run a check that the user may pass over by ``--accept NAME``; a note then says what is wrong.
+
+    Raises:
+        ValueError: what the check raises, and the flag.
+    """
+    from tauguard.cli.help_text import print_notes
+
+    try:
+        check()
+    except ValueError as error:
+        if name not in accept:
+            raise ValueError(f"{error}; if that is to be, say --accept {name}") from None
+        print_notes([f"accepted as --accept {name} says: {error}"])

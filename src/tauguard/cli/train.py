@@ -52,7 +52,8 @@ def command(
         calibration: folder of collision-free recordings that are not in --traces. Those with
             labelled collisions are refused; collisions without a label raise the threshold.
         false_alarms_per_hour: what the threshold aims at on motion like the training's
-            (default: 10), or guarantees with --calibration.
+            (default: 10), or guarantees with --calibration; with --free, a detector is refused
+            whose own logs show more.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
             the bounds; a log that stands out by its alarms is named and left out.
@@ -65,7 +66,10 @@ def command(
         payload: what the logs carried, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
-        accept: with --free, logs to learn from even if they stand out.
+        accept: with --free, logs to learn from even if they stand out, and what the detector may
+            fail in: alarms (more in its own logs, each judged by the others, than
+            --false-alarms-per-hour), error (beyond the bounds for half of the time), gravity (not
+            that of the robot file).
         arm: of a dataset with several arms, the one that the detector is for.
         folds: with --traces, parts of the recordings that are left out in turn, load by load, and
             so many more fits (default: 3); 1 is quicker and keeps a third of them for the
@@ -109,12 +113,9 @@ def command(
 
     if robot is None:
         raise ValueError("--free needs --robot")
-    if false_alarms_per_hour is not None:
-        raise ValueError(
-            "--false-alarms-per-hour: with --traces only; the card of --free says how many"
-        )
+    rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
     robot = bodies_file(robot)
-    free_motion(free, robot, target, columns, gains, payload, torque, card, accept)
+    free_motion(free, robot, target, columns, gains, payload, torque, card, accept, rate)
 
 
 def _target(model: Path | None) -> Path:
@@ -199,14 +200,17 @@ def free_motion(
     torque: bool,
     card: Path | None,
     accept: tuple[str, ...] = (),
+    per_hour: float = 10.0,
 ) -> None:
     """Train on logs in which nothing touched the arm, as far as that is known."""
+    from tauguard.cli.free_logs import ACCEPTABLE, hold_to
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import never_moved, read_logs, with_loads
+    from tauguard.datasets.arm_logs import not_shown, read_logs, with_loads
     from tauguard.datasets.real_arms import calibration_notes, known_arm
     from tauguard.detectors import save_model
     from tauguard.detectors.alarms.training import free_alarm
     from tauguard.detectors.calibration.checks import check_signs, check_weight
+    from tauguard.detectors.evaluation.acceptance import check_own_alarms, check_own_error
     from tauguard.detectors.scores.free_motion import FreeMotion
 
     read = read_logs(free, columns, robot, torque)
@@ -215,11 +219,19 @@ def free_motion(
     arm, _ = known_arm(robot, read.numbers, recordings, columns, gains)
     for name, trace in traces.items():
         check_signs(arm, name, trace)
-    traces, recordings, sifted = sifted_logs(traces, recordings, arm, accept)
+    logs_kept = [name for name in accept if name not in ACCEPTABLE]
+    traces, recordings, sifted = sifted_logs(traces, recordings, arm, logs_kept)
     detector = FreeMotion().fit(recordings, arm)
-    check_weight(arm.robot, detector.arm.robot, list(traces.values()))
-    unmoved = never_moved(list(traces.values()))
-    print_notes((*calibration_notes(detector.arm, traces, recordings, ()), *unmoved))
+    weight = (arm.robot, detector.arm.robot, list(traces.values()))
+    hold_to("gravity", accept, lambda: check_weight(*weight))
+    shown = not_shown(list(traces.values()))
+    print_notes((*calibration_notes(detector.arm, traces, recordings, ()), *shown))
+    held = [log for log in sifted.kept if log not in sifted.accepted]
+    hold_to("error", accept, lambda: check_own_error(held))
+    own = (sum(len(log.alarms) for log in held), sum(log.seconds for log in held))
+    counts = own if sifted.kept else (detector.alarms, detector.seconds)
+    if counts[1]:
+        hold_to("alarms", accept, lambda: check_own_alarms(*counts, per_hour, held))
     save_model(free_alarm(detector, list(traces.values())), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")

@@ -1,0 +1,90 @@
+"""What a calibration and a detector of free logs must hold to on those logs, left out in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
+from tauguard.detectors.evaluation.metrics import poisson_rate
+from tauguard.detectors.features.free_bound import friction_levels
+
+#: Held-out error over the level that a joint's bounds are measured in, at most: a detector tracks a
+#: part of it. Up to 1.3 on three real arms (a wrist that moves in one log only).
+HELD_OUT = 2.0
+
+#: False alarms an hour that are accepted of logs without a contact.
+ASKED = 10.0
+
+
+def check_own_alarms(
+    alarms: int, seconds: float, asked: float = ASKED, logs: Sequence[CrossValidatedLog] = ()
+) -> None:
+    """Refuse more alarms in the logs, each judged by the others, than ``asked`` an hour.
+
+    Args:
+        alarms: in all logs.
+        seconds: of all logs.
+        asked: false alarms an hour that are accepted.
+        logs: where they were; empty: not known.
+
+    Raises:
+        ValueError: so many that, with 97.5 % confidence, the rate is above ``asked``.
+    """
+    low = poisson_rate(alarms, seconds / 3600)["low"]
+    if low <= asked:
+        return
+    own = ", ".join(f"{len(log.alarms)} in {log.name}" for log in logs if log.alarms)
+    raise ValueError(
+        f"{alarms} alarms in {seconds / 60:.1f} min of logs without a contact, each judged by the "
+        f"others{own and f' ({own})'}: at least {low:.0f} an hour where {asked:g} are accepted; "
+        "more logs of such motion would help"
+    )
+
+
+def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
+    """Refuse a left-out log whose error is beyond the bounds for half of the time.
+
+    Raises:
+        ValueError: names the logs.
+    """
+    if beyond := [log for log in logs if log.level > 1]:
+        own = ", ".join(f"{log.name} ({log.level:.1f} times)" for log in beyond)
+        raise ValueError(
+            "judged by the other logs, the error is beyond the bound for half of the time in which "
+            f"joints move, in {own}: a load that was not given, or a motion that the others do not "
+            "show"
+        )
+
+
+def check_held_out(
+    arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording], held: Sequence[Array]
+) -> None:
+    """Refuse a calibration whose error in a left-out log exceeds what bounds are measured in.
+
+    Args:
+        arm: identified from all.
+        names: of the recordings.
+        recordings: collision-free; those with a load are not judged.
+        held: held-out residual of each without its load [N m], shape (n,) each.
+
+    Raises:
+        ValueError: names joint, log, error and level, the worst first.
+    """
+    if not len(held):
+        return
+    level = friction_levels(arm, recordings)[0]
+    laden = np.array([recording.load != Load() for recording in recordings])
+    over = np.where(laden[:, None], 0.0, np.asarray(held) / level)
+    log, joint = divmod(int(np.argmax(over)), over.shape[1])
+    if over[log, joint] > HELD_OUT:
+        raise ValueError(
+            f"predicted by the other logs, {arm.robot.joint_names[joint]} in {names[log]} is off "
+            f"by {held[log][joint]:.3g} N m (root mean square), more than {HELD_OUT:g} times "
+            f"its friction of {level[joint]:.3g} N m: other poses or loads than the others show, "
+            "or a contact; give more logs, or leave this one out"
+        )

@@ -1,0 +1,61 @@
+"""Kinds of motion of a joint, and which of them logs do not show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauguard.arrays import Array, Bools
+from tauguard.detectors.features.free_bound import SLOW
+from tauguard.traces.trace import Trace
+
+#: A regime that all logs together show for less than this is unknown [s].
+SEEN = 3.0
+
+#: Regimes and the joints that no log shows in them.
+Unseen = tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def motion_regimes(trace: Trace) -> dict[str, Bools]:
+    """Which joints are in each regime, shape (T, n) each."""
+    speed, dt = np.abs(trace.qd), trace.dt
+    moves = speed > SLOW
+    stood, went = _lasting(~moves, dt), _lasting(moves, dt)
+    others = moves.sum(axis=1, keepdims=True) - moves
+    return {
+        "standing for 2 s": stood > 2,
+        "just stopped": (stood > 0) & (stood < 1),
+        "starting": (went > 0) & (went < 0.3),
+        "slow (below 0.1 rad/s)": moves & (speed < 0.1),
+        "fast (above 1 rad/s)": speed > 1,
+        "moving alone": moves & (others == 0),
+        "at rest while others move": ~moves & (others > 0),
+    }
+
+
+def unseen(traces: Sequence[Trace]) -> Unseen:
+    """Regimes that all traces together show for less than :data:`SEEN`, with their joints."""
+    shown: dict[str, Array] = {}
+    for trace in traces:
+        for name, rows in motion_regimes(trace).items():
+            shown[name] = shown.get(name, np.zeros(rows.shape[1])) + rows.sum(axis=0) * trace.dt
+    lacking = (
+        (name, tuple(j for j, s in zip(traces[0].joint_names, seconds, strict=True) if s < SEEN))
+        for name, seconds in shown.items()
+    )
+    return tuple((name, joints) for name, joints in lacking if joints)
+
+
+def unseen_text(lacking: Unseen, joints: int) -> str:
+    """A line on them: each regime with its joints of so many."""
+    return "; ".join(
+        f"{name}: {'all joints' if len(own) == joints else ', '.join(own)}" for name, own in lacking
+    )
+
+
+def _lasting(on: Bools, dt: float) -> Array:
+    """How long each column has been on [s]; 0 while it is off. Shape of ``on``."""
+    rows = np.arange(1, len(on) + 1)[:, None]
+    off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
+    return np.asarray(np.where(on, (rows - off) * dt, 0.0))
