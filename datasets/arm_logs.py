@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tauguard.datasets.columns import column_map
+from tauguard.datasets.columns import AS_IS, Reading, column_map
 from tauguard.datasets.log_checks import saturated
 from tauguard.datasets.logs import Log, read_log
 from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
@@ -17,6 +17,7 @@ from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
 from tauguard.detectors.features.motion_regimes import unseen, unseen_text
 from tauguard.traces import Trace
+from tauguard.traces.resample import averaged
 
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
 HEAVIEST = 100.0
@@ -51,18 +52,24 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     return files
 
 
-def read_one(log: Path, columns: str | None, torque: bool = False) -> Log:
+def read_one(
+    log: Path, columns: str | None, torque: bool = False, reading: Reading | None = None
+) -> Log:
     """One log, its joints in the file's order; each note begins with the file's name.
 
     Args:
         log: CSV or MCAP.
         columns: preset or JSON file of a column map.
         torque: its currents, or efforts, are joint torques [N m].
+        reading: mends and rate (default: none).
 
     Raises:
         ValueError: as :func:`~tauguard.datasets.logs.read_log`.
     """
-    read = read_log(log, column_map(columns))
+    reading = reading or AS_IS
+    read = read_log(log, column_map(columns), mend=reading.mend)
+    if reading.resample is not None:
+        read = reduced(read, reading.resample)
     trace, notes = read.trace, read.notes
     if torque:
         notes = tuple(n.replace("taken as current [A]", "joint torque [N m]") for n in notes)
@@ -70,8 +77,30 @@ def read_one(log: Path, columns: str | None, torque: bool = False) -> Log:
     return Log(trace, tuple(f"{log.name}: {note}" for note in notes))
 
 
+def reduced(log: Log, hz: float) -> Log:
+    """The log at ``hz`` samples a second, with a note on what that costs.
+
+    Raises:
+        ValueError: a rate above the log's own.
+    """
+    own = log.trace.dt
+    try:
+        trace = averaged(log.trace, hz)
+    except ValueError as error:
+        raise ValueError(f"--resample {hz:g}: {error}") from None
+    note = (
+        f"{1 / own:.3g} Hz reduced to {hz:g} Hz by means: alarms come {500 / hz - 500 * own:.3g} "
+        f"ms later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
+    )
+    return Log(trace, (*log.notes, note))
+
+
 def read_logs(
-    logs: Sequence[Path], columns: str | None, robot: Path, torque: bool = False
+    logs: Sequence[Path],
+    columns: str | None,
+    robot: Path,
+    torque: bool = False,
+    reading: Reading | None = None,
 ) -> ArmLogs:
     """The logs of one arm to learn from.
 
@@ -80,12 +109,13 @@ def read_logs(
         columns: preset or JSON file of a column map.
         robot: URDF or MJCF file of the arm.
         torque: the logs hold joint torques [N m] in place of currents.
+        reading: mends and rate (default: none).
 
     Raises:
         ValueError: a saturated current, currents in one log and torques in another, joints that
             the robot does not have, or what reading raises.
     """
-    read = {path.name: read_one(path, columns, torque) for path in log_files(logs)}
+    read = {path.name: read_one(path, columns, torque, reading) for path in log_files(logs)}
     notes = [note for log in read.values() for note in log.notes]
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tauguard.untrusted_input import read_json, reading
 
@@ -15,6 +17,8 @@ Column = str | int
 SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
 #: What :attr:`ColumnMap.repair` may name.
 REPAIRS = ("repeat", "tail", "nan", "state", "order")
+#: Seconds in one unit of a time column, by the unit's name.
+CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 UR_JOINTS = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -32,7 +36,7 @@ class ColumnMap:
     A map with indices only reads files without a header line as well as those with one.
     """
 
-    t: Column  #: time
+    t: Column | None  #: time; None: there is none, see ``clock``
     q: tuple[Column, ...]  #: joint positions
     qd: tuple[Column, ...] = ()  #: joint velocities; none: positions are differentiated
     current: tuple[Column, ...] = ()  #: motor currents [A]
@@ -45,6 +49,7 @@ class ColumnMap:
     current_scale: float | tuple[float, ...] = 1.0  #: amperes in one unit, a number or one a joint
     torque_scale: float | tuple[float, ...] = 1.0
     """N m in one unit, a number or one a joint; -1 where the log's sign is not the robot file's."""
+    clock: float = 0.0  #: rows a second, without a column of the time [Hz]
     separator: str = ","
     joint_names: tuple[str, ...] = ()  #: empty: not known
     width: int | None = None  #: number of columns of every row; None: not known
@@ -80,7 +85,12 @@ class ColumnMap:
 
     def _check_types(self) -> None:
         """Refuse wrong types: the text "false" would count as true."""
-        columns = [self.t, *(c for name in SIGNALS for c in getattr(self, name))]
+        columns = [c for name in SIGNALS for c in getattr(self, name)]
+        columns += [] if self.t is None else [self.t]
+        if (self.t is None) != (self.clock > 0):
+            raise ValueError(
+                "columns: give t (the time's column) or clock (rows a second), not both"
+            )
         for column in columns:
             if isinstance(column, bool) or not isinstance(column, str | int):
                 raise ValueError(f"column {column!r}: expected a name or a number from 0")
@@ -99,10 +109,58 @@ class ColumnMap:
         """The columns of the signals that have any, by the trace's field."""
         return {n: getattr(self, n) for n in SIGNALS if n == "q" or getattr(self, n)}
 
+    @property
+    def times(self) -> tuple[Column, ...]:
+        """The column of the time, if there is one."""
+        return () if self.t is None else (self.t,)
 
-def numbered(prefix: str, joints: int = 6, first: int = 0) -> tuple[str, ...]:
-    """``prefix0``, ``prefix1``, ... from ``first`` on."""
-    return tuple(f"{prefix}{i}" for i in range(first, first + joints))
+    def mended(self, words: Collection[str]) -> ColumnMap:
+        """The map with other units, repairs or a clock.
+
+        Args:
+            words: "deg" (angles), "mA" (currents), "ms", "us" or "ns" (time), a repair, or
+                "clock=HZ".
+
+        Raises:
+            ValueError: another word.
+        """
+        changed: dict[str, Any] = {"repair": self.repair | (set(words) & set(REPAIRS))}
+        for word in words:
+            name, _, value = word.partition("=")
+            if word == "deg":
+                changed["degrees"] = True
+            elif word == "mA":
+                changed["current_scale"] = 1e-3
+            elif word in CLOCK_UNITS:
+                changed["time_scale"] = CLOCK_UNITS[word]
+            elif name == "clock" and re.fullmatch(r"[0-9.]+", value) and float(value) > 0:
+                changed |= {"t": None, "clock": float(value)}
+            elif word not in REPAIRS:
+                known = ", ".join(("deg", "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
+                raise ValueError(f"--mend {word}: expected some of {known}")
+        return dataclasses.replace(self, **changed)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How logs are read: flags of every command that takes logs of a real arm."""
+
+    mend: tuple[str, ...] = ()
+    """what CSV files need: deg (angles in degrees), mA, ms, us or ns (time), order (rows are
+    sorted by time), repeat, state, nan or tail (rows that repeat a time or the whole state, that
+    lack numbers, that are cut off at the end are left out), clock=HZ (no time column)"""
+    resample: float | None = None
+    """samples a second [Hz] that logs are reduced to, by means over the interval that ends at each
+    sample: half an interval late, and blurred to an interval"""
+
+
+#: Logs as they are.
+AS_IS = Reading()
+
+
+def numbered(prefix: str, joints: int = 6, first: int = 0, end: str = "") -> tuple[str, ...]:
+    """``prefix0end``, ``prefix1end``, ... from ``first`` on."""
+    return tuple(f"{prefix}{i}{end}" for i in range(first, first + joints))
 
 
 PRESETS = {
@@ -153,6 +211,24 @@ PRESETS = {
         torque=numbered("tau_J", 7),
         repair=frozenset({"repeat", "tail", "state"}),
     ),
+    # What libfranka's logToCSV writes; tau_ext_hat_filtered beside it is Franka's own estimate.
+    "libfranka": ColumnMap(
+        t="time",
+        q=numbered("state.q[", 7, end="]"),
+        qd=numbered("state.dq[", 7, end="]"),
+        torque=numbered("state.tau_J[", 7, end="]"),
+        time_scale=1e-3,
+        repair=frozenset({"repeat", "tail", "state"}),
+    ),
+    # Doosan's RobotStateRt: degrees; torques are currents times gear and torque constant.
+    "doosan": ColumnMap(
+        t="time_stamp",
+        q=numbered("actual_joint_position[", end="]"),
+        qd=numbered("actual_joint_velocity[", end="]"),
+        torque=numbered("actual_motor_torque[", end="]"),
+        degrees=True,
+        repair=frozenset({"repeat", "tail", "state"}),
+    ),
     # A KUKA LBR by sensor_msgs/JointState, with joint torque sensors [N m]. Its efforts are the
     # torques that hold the arm with the other sign: gravity's share is -0.8 to -0.95 in a Med 7's.
     "lbr": ColumnMap(
@@ -170,7 +246,7 @@ def presets_of(header: Collection[str]) -> list[str]:
     """Names of the presets whose columns a header line has."""
     found = []
     for name, preset in PRESETS.items():
-        wanted = [preset.t, *(c for group in preset.groups().values() for c in group)]
+        wanted = [*preset.times, *(c for group in preset.groups().values() for c in group)]
         if all(isinstance(c, str) and c in header for c in wanted):
             found.append(name)
     return found
@@ -198,6 +274,7 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
         raise ValueError(f"{columns}: expected an object; {fields_are}")
     if strange := sorted(set(fields) - set(known)):
         raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
+    fields.setdefault("t", None) if "clock" in fields else None
     if missing := [name for name in ("t", "q") if name not in fields]:
         raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
     with reading(columns, fields_are):

@@ -20,6 +20,8 @@ GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
 FURTHEST = 4 * np.pi
 #: Velocities are integrated over this time and compared with the change of position [s].
 SPAN = 0.1
+#: No arm's motor takes more [A].
+AMPERES = 100.0
 #: A current is saturated if it stays at its largest value for so many samples in a row, and that
 #: value is so many times the median.
 PLATEAU, ABOVE = 5, 3.0
@@ -40,6 +42,12 @@ def checked(trace: Trace, where: Where) -> tuple[str, ...]:
     _refuse_degrees(trace, where)
     notes = _timing(trace, where)
     _refuse_strange_velocities(trace)
+    most = float(np.abs(trace.current).max(initial=0.0))
+    if most > AMPERES and trace.meta.get("effort") != "torque":
+        notes.append(
+            f"currents up to {most:.0f} A: if these are milliamperes, say --mend mA; if they are "
+            "torques, --torque"
+        )
     for name, row, count, peak in saturated(trace):
         notes.append(
             f"{where(row)}: the current of {name} stays at {peak:g} A for {count} samples: "
@@ -77,7 +85,7 @@ def _refuse_degrees(trace: Trace, where: Where) -> None:
             row, joint = (int(v) for v in np.argwhere(beyond)[0])
             raise ValueError(
                 f"{where(row)}: the {what} of {trace.joint_names[joint]} is {x[row, joint]:g} "
-                f'{unit}: if these are degrees, say so in the column map ("degrees": true)'
+                f'{unit}: if these are degrees, say --mend deg ("degrees" in a column map)'
             )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -39,6 +39,7 @@ def read_log(
     path: str | Path,
     columns: ColumnMap | str | None = None,
     joint_names: Sequence[str] | None = None,
+    mend: Collection[str] = (),
 ) -> Log:
     """Read a recording of a real arm.
 
@@ -50,6 +51,7 @@ def read_log(
             and numbers suggest; without one the header line must be that of a preset.
         joint_names: what the joints are called, in the order of the columns (default: the map's
             names, the messages' names, or joint_1, joint_2, ...); for MCAP also which joints.
+        mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
 
     Returns:
         The trace, without truth, its times as they are in the log, and notes on repairs.
@@ -68,7 +70,8 @@ def read_log(
                 from tauguard.datasets.logs_mcap import read_joint_states
 
                 return read_joint_states(path, joint_names)
-            return read_csv(path, chosen(columns, path), joint_names, columns == "auto")
+            own = chosen(columns, path)
+            return read_csv(path, own.mended(mend) if mend else own, joint_names, columns == "auto")
         except UnicodeDecodeError as error:
             raise ValueError("not a text file; expected CSV or MCAP") from error
         except csv.Error as error:
@@ -94,7 +97,8 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     known = f"give a column map, or a preset: {', '.join(PRESETS)}"
     if found is None:
         raise ValueError(
-            f"no column map, and no time, positions and efforts found among the columns: {known}"
+            "no column map, and no positions, efforts and time (or velocities that tell the clock) "
+            f"found among the columns: {known}"
         )
     raise ValueError(
         f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
@@ -136,7 +140,8 @@ def read_csv(
         raise ValueError(f"{len(table)} rows of numbers, expected at least 2")
     ends = np.cumsum([len(group) for group in where.values()])[:-1]
     parts = dict(zip(where, np.split(table, ends, axis=1), strict=True))
-    t = parts.pop("t")[:, 0] * columns.time_scale
+    times = parts.pop("t")
+    t = times[:, 0] * columns.time_scale if columns.times else np.arange(len(table)) / columns.clock
     if "order" in columns.repair and (np.diff(t) < 0).any():
         order = np.argsort(t, kind="stable")
         notes.append(f"{int((np.diff(t) < 0).sum())} times a row is earlier than the last: sorted")
@@ -180,7 +185,7 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     try:
         return header, {
             name: [position(column, header, columns) for column in group]
-            for name, group in {"t": (columns.t,), **columns.groups()}.items()
+            for name, group in {"t": columns.times, **columns.groups()}.items()
         }
     except ValueError as error:
         better = presets_of(header) if header else presets_of_width(len(first))
@@ -286,7 +291,9 @@ def parse(
             if index == len(rows) - 1 and len(row) < width and "tail" in columns.repair:
                 notes.append(f"line {line}: cut off ({len(row)} of {width} columns), left out")
                 continue
-            raise ValueError(f"line {line}: {len(row)} columns, expected {width}")
+            cut = len(row) < width and index == len(rows) - 1
+            more = "; to leave the last row out, say --mend tail" if cut else ""
+            raise ValueError(f"line {line}: {len(row)} columns, expected {width}{more}")
         found = [number(row[i]) for i in wanted]
         bad = next((i for i, v in zip(wanted, found, strict=True) if v is None), None)
         if bad is not None and (row[bad].strip() or "nan" not in columns.repair):
@@ -300,7 +307,10 @@ def parse(
                 continue
             bad = wanted[int(np.flatnonzero(~np.isfinite(cells))[0])]
             cell = row[bad].strip() or "empty"
-            raise ValueError(f"line {line}, {column_text(bad, header)}: {cell}, not finite")
+            raise ValueError(
+                f"line {line}, {column_text(bad, header)}: {cell}, not finite; to "
+                "leave such rows out, say --mend nan"
+            )
         values.append(cells)
         lines.append(line)
     if dropped:
@@ -319,10 +329,16 @@ def increasing(
     back = np.flatnonzero(step < 0)
     if back.size:
         row = back[0] + 1
-        raise ValueError(f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s")
+        raise ValueError(
+            f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
+            "say --mend order"
+        )
     same = np.flatnonzero(step == 0)
     if same.size and "repeat" not in columns.repair:
-        raise ValueError(f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats")
+        raise ValueError(
+            f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
+            "--mend repeat"
+        )
     if same.size:
         notes.append(
             f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"

@@ -15,6 +15,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.datasets.columns import ColumnMap
+from tauguard.datasets.log_checks import AMPERES, FURTHEST
 
 #: Last words of a group's name, by the field of the map.
 WORDS = {
@@ -23,13 +24,21 @@ WORDS = {
     "torque": ("tau_j", "tau", "torque", "torques", "effort", "efforts", "joint_torque"),
     "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
 }
-TIMES = ("t", "time", "timestamp", "stamp", "seconds", "sec", "duration", "__time", "time_s")
-#: Positions beyond this are degrees [rad]; currents beyond this are milliamperes [A].
-TURNS, AMPERES = 4 * np.pi, 100.0
+TIMES = (
+    *("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time"),
+    "time_s",
+)
 #: Units of the time column, by the shortest usual step that they give.
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
-#: A name with such a word is of a command, not of a measurement.
-_COMMANDED = re.compile(r"(^|_)(target|desired|des|command|cmd|goal|ref|reference|control)(_|$)")
+#: A name with such a word is of a command, of an estimate or of the tool, not of joints' sensors.
+_OTHER = re.compile(
+    r"(^|_)(target|desired|des|command|commanded|cmd|goal|ref|reference|control|ext|external|"
+    r"gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
+)
+#: ROS's JointState as tables have it: a joint's name before the kind of signal.
+_NAMED = re.compile(r"^(.*?)([^/.]+)[/.](position|velocity|effort)$")
+#: The torques of KUKA's FRI hold the arm with the other sign.
+_FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
 #: Joints of an arm, at least and at most.
 FEWEST, MOST = 2, 16
@@ -38,8 +47,11 @@ FEWEST, MOST = 2, 16
 def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Columns that differ by their last number, which rises by one, by the name before it."""
     found: dict[str, list[tuple[int, str]]] = {}
+    named: dict[str, list[str]] = {}
     for name in header:
-        if match := _NUMBER.match(name):
+        if match := _NAMED.match(name):
+            named.setdefault(match.group(1) + match.group(3), []).append(name)
+        elif match := _NUMBER.match(name):
             found.setdefault(match.group(1), []).append((int(match.group(2)), name))
     out = {}
     for prefix, columns in found.items():
@@ -47,12 +59,12 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
         first = columns[0][0]
         if [n for n, _ in columns] == list(range(first, first + len(columns))):
             out[prefix] = tuple(name for _, name in columns)
-    return out
+    return out | {prefix: tuple(columns) for prefix, columns in named.items()}
 
 
 def _field(prefix: str) -> str | None:
     plain = re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_")
-    if _COMMANDED.search(plain):
+    if _OTHER.search(plain):
         return None
     for field, words in WORDS.items():
         if plain in words or any(
@@ -76,7 +88,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         if field and FEWEST <= len(columns) <= MOST and field not in groups:
             groups[field] = columns
     effort = next((f for f in ("torque", "current") if f in groups), None)
-    if time is None or "q" not in groups or effort is None:
+    if "q" not in groups or effort is None:
         return None
     joints = len(groups["q"])
     if len(groups[effort]) != joints or len(groups.get("qd", groups["q"])) != joints:
@@ -89,11 +101,17 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         values = np.abs(numbers(columns))
         return float(values[np.isfinite(values)].max(initial=0.0))
 
-    t = numbers([time])[:, 0]
-    steps = np.abs(np.diff(t[np.isfinite(t)]))
-    steps = steps[steps > 0]
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    repair = {"repeat", "tail", "state"} | ({"order"} if (np.diff(t) < 0).any() else set())
+    repair = {"repeat", "tail", "state"}
+    scale, clock = 1.0, 0.0
+    if time is not None:
+        t = numbers([time])[:, 0]
+        steps = np.diff(t[np.isfinite(t)])
+        repair |= {"order"} if (steps < 0).any() else set()
+        steps = np.abs(steps[steps != 0])
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        scale = next(scale for least, scale in CLOCKS if usual >= least)
+    elif "qd" not in groups or not (clock := rate_of(numbers(groups["q"]), numbers(groups["qd"]))):
+        return None
     milli = effort == "current" and largest(groups["current"]) > AMPERES
     return ColumnMap(
         t=time,
@@ -101,11 +119,34 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         qd=groups.get("qd", ()),
         current=groups["current"] if effort == "current" else (),
         torque=groups["torque"] if effort == "torque" else (),
-        degrees=largest(groups["q"]) > TURNS,
-        time_scale=next(scale for least, scale in CLOCKS if usual >= least),
+        degrees=largest(groups["q"]) > FURTHEST,
+        time_scale=scale,
+        clock=clock,
         current_scale=1e-3 if milli else 1.0,
+        torque_scale=-1.0 if effort == "torque" and _FRI in groups["torque"][0] else 1.0,
+        joint_names=_joints(groups["q"]),
         repair=frozenset(repair),
     )
+
+
+def _joints(columns: Sequence[str]) -> tuple[str, ...]:
+    """Joint names, where the columns' names hold them."""
+    found = [match.group(2) for name in columns if (match := _NAMED.match(name))]
+    return tuple(found) if len(found) == len(columns) else ()
+
+
+def rate_of(q: Array, qd: Array) -> float:
+    """Rows a second at which velocities are those of the positions [Hz]; 0 where nothing moves.
+
+    Args:
+        q: shape (rows, n).
+        qd: in the same unit a second, shape (rows, n).
+    """
+    change, speed = np.diff(q, axis=0), (qd[1:] + qd[:-1]) / 2
+    good = np.isfinite(change) & np.isfinite(speed)
+    both = float((change * speed)[good].sum())
+    rate = float((speed**2)[good].sum()) / both if both > 0 else 0.0
+    return round(rate, 1) if 1.0 < rate < 1e4 else 0.0
 
 
 def described(columns: ColumnMap) -> str:
@@ -113,10 +154,14 @@ def described(columns: ColumnMap) -> str:
     unit = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}[columns.time_scale]
     angle = "deg" if columns.degrees else "rad"
     ampere = "mA" if columns.current_scale == 1e-3 else "A"
-    parts = [f"time {columns.t} [{unit}]", f"positions {_span(columns.q)} [{angle}]"]
+    time = f"time {columns.t} [{unit}]"
+    if columns.t is None:
+        time = f"no time, {columns.clock:g} rows a second as velocities say"
+    other = ", other sign" if columns.torque_scale == -1 else ""
+    parts = [time, f"positions {_span(columns.q)} [{angle}]"]
     parts.append(f"velocities {_span(columns.qd)} [{angle}/s]" if columns.qd else "no velocities")
     parts.append(
-        f"joint torques {_span(columns.torque)} [N m]"
+        f"joint torques {_span(columns.torque)} [N m{other}]"
         if columns.torque
         else f"currents {_span(columns.current)} [{ampere}]"
     )

@@ -60,8 +60,9 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
     if len(trace.t) > 1 and not same_rate(trace.dt, dt):
         raise ValueError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
-            f"{1e3 * dt:g} ms: resample the recording to that, "
-            "or train a detector on recordings of its rate"
+            f"{1e3 * dt:g} ms: "
+            + (f"resample it to that (--resample {1 / dt:g}), or " if trace.dt < dt else "")
+            + "train a detector on recordings of its rate"
         )
 
 

@@ -8,7 +8,9 @@ from the compiled numbers, so that both describe the same arm, for MJCF and URDF
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -45,7 +47,7 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
         if not path.is_file():
             raise FileNotFoundError(f"{path}: no such robot file")
         if path.suffix.lower() == ".urdf" or "<robot" in _beginning(path):
-            return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(read_text(path))))
+            return _compiled_urdf(read_text(path))
         return mujoco.MjModel.from_xml_path(str(checked_robot(path)))
     except ValueError as error:
         raise ValueError(f"robot: {' '.join(str(error).split())}") from None
@@ -56,7 +58,18 @@ def _beginning(path: Path) -> str:
         return stream.read(4000).decode(errors="replace")
 
 
-def _without_shapes(urdf: str) -> str:
+def _compiled_urdf(text: str) -> mujoco.MjModel:
+    """The model of a URDF without shapes; links that move without a mass get a gram or less."""
+    try:
+        return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text)))
+    except ValueError as error:
+        if "mjMINVAL" not in str(error):
+            raise
+        light = {"boundmass": "1e-4", "boundinertia": "1e-8"}
+        return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text, light)))
+
+
+def _without_shapes(urdf: str, compiler: Mapping[str, str] = MappingProxyType({})) -> str:
     """A URDF without visual and collision elements, fixed joints kept."""
     try:
         root = ElementTree.fromstring(urdf)
@@ -71,7 +84,7 @@ def _without_shapes(urdf: str) -> str:
     ElementTree.SubElement(
         extension,
         "compiler",
-        {"fusestatic": "false", "discardvisual": "false", "strippath": "true"},
+        {"fusestatic": "false", "discardvisual": "false", "strippath": "true", **compiler},
     )
     return ElementTree.tostring(root, encoding="unicode")
 

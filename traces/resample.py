@@ -50,6 +50,31 @@ def resampled(trace: Trace, hz: float) -> Trace:
     )
 
 
+def averaged(trace: Trace, hz: float) -> Trace:
+    """The trace every 1 / ``hz`` seconds, each sample the mean over the interval that ends at it.
+
+    So nothing above half the rate is folded to below it, and nothing later than a sample is in it.
+    All signals are half an interval late.
+
+    Args:
+        trace: without truth.
+        hz: at most the trace's own rate [Hz].
+
+    Raises:
+        ValueError: as :func:`resampled`, or a trace with truth.
+    """
+    if trace.truth is not None:
+        raise ValueError("a labelled trace: averaged signals would be later than their labels")
+    thin = resampled(trace, hz)
+    names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
+    means = {
+        name: _averaged(values, trace.t, thin.t)
+        for name in names
+        if (values := getattr(trace, name)) is not None
+    }
+    return replace(thin, **means)  # type: ignore[arg-type]
+
+
 def _truth(truth: Truth, t: Array, new: Array) -> Truth:
     """Torques averaged, contacts from the row of each interval's largest force."""
     ends = np.searchsorted(t, new + 1e-9)

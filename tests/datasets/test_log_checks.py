@@ -58,7 +58,7 @@ SWAPPED = dataclasses.replace(log(), q=log().q[:, [1, 0, 2]])
 @pytest.mark.parametrize(
     ("trace", "message"),
     [
-        (changed(q=57.3, qd=57.3), r"line \d+: the velocity of . is .* say so in the column map"),
+        (changed(q=57.3, qd=57.3), r"line \d+: the velocity of . is .* say --mend deg"),
         (changed(q=57.3), r"line \d+: the position of . is .*degrees"),
         (changed(qd=8.0), "units of velocity, position and time do not fit"),
         (changed(t=1000.0), "time in ms"),

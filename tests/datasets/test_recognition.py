@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from tauguard.datasets.columns import ColumnMap, numbered
-from tauguard.datasets.logs import read_csv, read_log
+from tauguard.datasets.arm_logs import reduced
+from tauguard.datasets.columns import PRESETS, ColumnMap, numbered
+from tauguard.datasets.logs import Log, read_csv, read_log
 from tauguard.datasets.recognition import described, grouped, recognised
+from tauguard.traces import Trace
 
 
 def motion(rows=400, dt=0.01, joints=2):
@@ -161,3 +163,87 @@ def test_real_logs_of_arms_with_torque_sensors_are_recognised(data_dir, file, pr
     assert log.trace.meta["effort"] == "torque"
     assert any(f"{share} of the rows repeat the state before" in note for note in log.notes)
     assert log.trace.dt == pytest.approx(0.01, rel=0.05)
+
+
+def test_names_of_joints_before_the_kind_of_signal_are_the_joints(tmp_path):
+    """As tables of ROS's JointState have them; Franka's driver nests them in its state."""
+    t, q, qd, i = motion()
+    kinds = {"position": q, "velocity": qd, "effort": i}
+    names = [f"/state/fr3_joint{k}/{kind}" for kind in kinds for k in (1, 2)]
+    path = written(tmp_path / "log.csv", ["__time", *names], t, *kinds.values())
+    trace = read_log(path, "auto").trace
+    assert trace.joint_names == ("fr3_joint1", "fr3_joint2")
+    assert trace.meta["effort"] == "torque"
+    np.testing.assert_allclose(trace.current, i)
+
+
+def test_torques_of_kuka_s_fri_have_the_other_sign_and_estimates_are_not_taken(tmp_path):
+    t, q, _, i = motion()
+    groups = {"external_torque": 0 * i, "measured_joint_position": q, "measured_torque": -i}
+    names = [f"/lbr/state/{name}[{k}]" for name in groups for k in range(2)]
+    path = written(tmp_path / "log.csv", ["time", *names], t, *groups.values())
+    with pytest.raises(ValueError, match=r"measured_torque\[1\] \[N m, other sign\]"):
+        read_log(path)
+    np.testing.assert_allclose(read_log(path, "auto").trace.current, i)
+
+
+@pytest.mark.parametrize("preset", ["libfranka", "doosan"])
+def test_presets_of_makers_formats(tmp_path, preset):
+    columns = PRESETS[preset]
+    t, q, qd, i = motion(joints=len(columns.q))
+    angle = 180 / np.pi if columns.degrees else 1.0
+    names = [columns.t, *columns.q, *columns.qd, *columns.torque]
+    parts = (t / columns.time_scale, angle * q, angle * qd, i)
+    trace = read_log(written(tmp_path / "log.csv", names, *parts)).trace
+    assert trace.meta["columns"] == preset
+    for own, given in ((trace.t, t), (trace.q, q), (trace.qd, qd), (trace.current, i)):
+        np.testing.assert_allclose(own, given, atol=1e-7)
+
+
+def test_a_log_without_a_clock_gets_the_one_that_velocities_tell(tmp_path):
+    t, q, qd, i = motion(dt=0.008)
+    path = written(tmp_path / "log.csv", pairs("q#", "qd#", "current#"), q, qd, i)
+    with pytest.raises(ValueError, match="no time, 125 rows a second as velocities say"):
+        read_log(path)
+    np.testing.assert_allclose(read_log(path, "auto").trace.t, t, rtol=1e-3)
+    columns = ColumnMap("t", ("q0", "q1"), ("qd0", "qd1"), ("current0", "current1"))
+    trace = read_log(path, columns, mend=("clock=125",)).trace
+    np.testing.assert_allclose(trace.t, t, rtol=1e-9)
+
+
+def test_what_is_wrong_with_a_log_is_named_with_the_word_that_mends_it(tmp_path):
+    t, q, qd, i = motion()
+    names = ["t", *pairs("q#", "qd#", "current#")]
+    columns = ColumnMap("t", ("q0", "q1"), ("qd0", "qd1"), ("current0", "current1"))
+    swapped = np.arange(len(t))
+    swapped[[100, 101]] = [101, 100]
+    cases = {
+        "deg": (t, 57.3 * q + 60, 57.3 * qd, i),
+        "order": tuple(x[swapped] for x in (t, q, qd, i)),
+        "repeat": tuple(np.repeat(x, 2, axis=0) for x in (t, q, qd, i)),
+    }
+    for word, parts in cases.items():
+        path = written(tmp_path / f"{word}.csv", names, *parts)
+        with pytest.raises(ValueError, match=f"say --mend {word}"):
+            read_log(path, columns)
+        np.testing.assert_allclose(read_log(path, columns, mend=(word,)).trace.current, i)
+    path = written(tmp_path / "milli.csv", names, t, q, qd, 1000 * i)
+    assert "say --mend mA" in "".join(read_log(path, columns).notes)
+    np.testing.assert_allclose(read_log(path, columns, mend=("mA",)).trace.current, i)
+    with pytest.raises(ValueError, match="--mend grad: expected some of deg, mA"):
+        read_log(path, columns, mend=("grad",))
+
+
+def test_a_reduced_log_has_nothing_folded_in_and_says_its_cost(tmp_path):
+    """A line at 97 Hz would show at 3 Hz among samples of 100 Hz; means of 10 ms take it away."""
+    t = np.arange(0, 4, 1e-3)
+    slow, line = np.sin(2 * np.pi * 2 * t), np.sin(2 * np.pi * 97 * t)
+    q = np.column_stack([slow, slow])
+    trace = Trace(("a", "b"), t, q, 0 * q, q + np.column_stack([line, line]))
+    log = reduced(Log(trace, ()), 100.0)
+    late = np.sin(2 * np.pi * 2 * (log.trace.t - 0.005))[:, None]
+    assert np.abs(log.trace.current - late)[1:].max() < 0.05
+    np.testing.assert_allclose(log.trace.q[1:], np.hstack([late, late])[1:], atol=2e-3)
+    assert "1e+03 Hz reduced to 100 Hz by means: alarms come 4.5 ms later" in log.notes[0]
+    with pytest.raises(ValueError, match="--resample 2000: hz 2000 of one of 1000 Hz"):
+        reduced(Log(trace, ()), 2000.0)

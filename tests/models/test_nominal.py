@@ -139,3 +139,23 @@ def test_bad_robots_are_named(source, message):
 def test_missing_file_is_named():
     with pytest.raises(FileNotFoundError, match="no such robot file"):
         pin_model("nowhere/arm.xml")
+
+
+def test_a_last_link_without_a_mass_is_one_of_next_to_none(tmp_path):
+    """As many drivers' files have them; MuJoCo refuses a body that moves without a mass."""
+    inertial = (
+        '<inertial><mass value="2"/>'
+        '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    joint = (
+        '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    )
+    urdf = f'<robot name="two"><link name="base"/><link name="a">{inertial}</link>'
+    urdf += '<link name="tip"/>' + joint.format("j1", "base", "a") + joint.format("j2", "a", "tip")
+    urdf += "</robot>"
+    path = tmp_path / "two.urdf"
+    path.write_text(urdf)
+    masses = [body.mass for body in pin_model(path).inertias]
+    assert masses[1] == 2.0
+    assert 0 < masses[2] < 1e-3

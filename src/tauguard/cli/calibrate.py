@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from tauguard.datasets.columns import AS_IS, Reading
+
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
@@ -32,6 +34,7 @@ def command(
     scale: Literal["auto", "gains", "payload", "masses"] = "auto",
     torque: bool = False,
     accept: tuple[Literal["error", "gravity"], ...] = (),
+    reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
@@ -56,6 +59,7 @@ def command(
             may; a column map says so by its field "torque".
         accept: write the file although a joint of a log is further off what the others predict than
             its friction (error), or gravity's torques are not those of the robot file (gravity).
+        reading: how logs are read.
         json: write the figures here as JSON.
     """
     from tauguard.cli.free_logs import free_logs, hold_to
@@ -72,7 +76,7 @@ def command(
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
-    given = free_logs(logs, robot, columns, gains, payload, torque, scale)
+    given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
     traces, recordings, arm = given.traces, given.recordings, given.arm
     check_length(recordings)
     found = identify(arm, recordings, scale=given.scale)

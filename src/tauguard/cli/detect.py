@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from tauguard.datasets.columns import AS_IS, Reading
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -35,6 +37,7 @@ def command(
     quiet: float | None = None,
     gains: PerJoint = (),
     out: Path | None = None,
+    reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
     """Look for collisions in a log of joint positions, velocities and motor currents.
@@ -66,6 +69,7 @@ def command(
         gains: without --model, N m per ampere, one a joint (known for calibrated robot files and
             for the preset ur10e; else the masses of the robot file set the scale).
         out: folder for events.json, detect.mcap and detect.rrd.
+        reading: how logs are read.
         json: write the figures here as JSON.
     """
     from tauguard.cli.help_text import print_notes
@@ -79,7 +83,7 @@ def command(
     if model is not None and (quiet is not None or gains):
         raise ValueError("--quiet, --gains: not beside --model, which brings its own")
     robot = bodies_file(robot)
-    read = read_one(log, columns, torque)
+    read = read_one(log, columns, torque, reading)
     print_notes(read.notes)
     trace = read.trace
     if model is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tauguard.datasets.columns import Reading
     from tauguard.detectors import ArmModel, RobotNumbers
     from tauguard.detectors.calibration.recording import Recording
     from tauguard.traces import Trace
@@ -34,6 +35,7 @@ def free_logs(
     payload: tuple[str, ...],
     torque: bool,
     scale: str = "auto",
+    reading: Reading | None = None,
 ) -> FreeLogs:
     """Read, check and note; the arguments are the commands'.
 
@@ -45,7 +47,7 @@ def free_logs(
     from tauguard.datasets.real_arms import check_named, initial_arm
     from tauguard.detectors.calibration.checks import check_signs
 
-    read = read_logs(logs, columns, robot, torque)
+    read = read_logs(logs, columns, robot, torque, reading)
     print_notes(read.notes)
     known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
     traces, notes = moving(read.traces)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from tauguard.datasets.columns import AS_IS, Reading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +37,7 @@ def command(
     accept: tuple[str, ...] = (),
     arm: str | None = None,
     folds: int | None = None,
+    reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
 ) -> None:
     """Train a detector and write its model file.
 
@@ -74,6 +79,7 @@ def command(
         folds: with --traces, parts of the recordings that are left out in turn, load by load, and
             so many more fits (default: 3); 1 is quicker and keeps a third of them for the
             threshold.
+        reading: with --free, how logs are read.
     """
     if folds is not None and folds < 1:
         raise ValueError(f"--folds {folds}: expected 1 or more")
@@ -87,7 +93,7 @@ def command(
         from tauguard.cli.train_twin import twin_contacts
 
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
-        twin_contacts(twin, free, target, columns, detector, rate, torque)
+        twin_contacts(twin, free, target, columns, detector, rate, torque, reading)
         return
     if free and (calibration or confidence is not None or detector != "srq-svr"):
         raise ValueError("--detector, --calibration and --confidence go with --traces only")
@@ -115,7 +121,8 @@ def command(
         raise ValueError("--free needs --robot")
     rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
     robot = bodies_file(robot)
-    free_motion(free, robot, target, columns, gains, payload, torque, card, accept, rate)
+    args = (columns, gains, payload, torque, card, accept, rate, reading)
+    free_motion(free, robot, target, *args)
 
 
 def _target(model: Path | None) -> Path:
@@ -201,6 +208,7 @@ def free_motion(
     card: Path | None,
     accept: tuple[str, ...] = (),
     per_hour: float = 10.0,
+    reading: Reading | None = None,
 ) -> None:
     """Train on logs in which nothing touched the arm, as far as that is known."""
     from tauguard.cli.free_logs import ACCEPTABLE, hold_to
@@ -213,7 +221,7 @@ def free_motion(
     from tauguard.detectors.evaluation.acceptance import check_own_alarms, check_own_error
     from tauguard.detectors.scores.free_motion import FreeMotion
 
-    read = read_logs(free, columns, robot, torque)
+    read = read_logs(free, columns, robot, torque, reading)
     print_notes(read.notes)
     traces, recordings = read.traces, with_loads(read.traces, payload)
     arm, _ = known_arm(robot, read.numbers, recordings, columns, gains)

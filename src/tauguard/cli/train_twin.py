@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
 
 #: Episodes with contacts, contacts in each, and episodes without; each is another individual.
@@ -23,6 +24,7 @@ def twin_contacts(
     detector: str,
     per_hour: float,
     torque: bool,
+    reading: Reading | None = None,
 ) -> None:
     """Train on simulated contacts and real free logs; print what the threshold aims at.
 
@@ -34,6 +36,7 @@ def twin_contacts(
         detector: one of ``tauguard.detectors.DETECTORS``.
         per_hour: false alarms to accept in an hour of motion like the logs'.
         torque: the logs hold joint torques.
+        reading: how logs are read.
 
     Raises:
         ValueError: no twin, or logs of another rate or arm.
@@ -53,7 +56,7 @@ def twin_contacts(
     if arm is None or sensors is None or sensors.left_over is None:
         raise ValueError(f"--twin {twin}: not a file that `tauguard twin` wrote")
     method = make_detector(detector)
-    read = read_logs(free, columns, bodies_file(twin), torque)
+    read = read_logs(free, columns, bodies_file(twin), torque, reading)
     print_notes(read.notes)
     for name, trace in read.traces.items():
         if not same_rate(trace.dt, 1 / sensors.rate):

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from tauguard.datasets.columns import AS_IS, Reading
+
 if TYPE_CHECKING:
     from tauguard.arrays import Array
     from tauguard.cli.free_logs import FreeLogs
@@ -30,6 +32,7 @@ def command(
     torque: bool = False,
     judge: tuple[Path, ...] = (),
     figure: Path | None = None,
+    reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
     """Identify a twin from logs in which nothing touched the arm, and judge it on others.
@@ -47,6 +50,7 @@ def command(
         judge: free logs without a load of programs that LOGS do not have; without them, each third
             log of LOGS is left out for the judgement, and used for the twin afterwards.
         figure: a PNG of residuals, real and simulated.
+        reading: how logs are read.
         json: write the figures here as JSON.
     """
     from tauguard.cli.free_logs import free_logs
@@ -62,7 +66,9 @@ def command(
 
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
-    given, left = of_one_arm(free_logs(logs, robot, columns, gains, payload, torque))
+    given, left = of_one_arm(
+        free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
+    )
     recordings, names = given.recordings, list(given.traces)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
@@ -71,7 +77,7 @@ def command(
     twin = with_intervals(twin, [made(given, some, limit) for some in rest if some])
     judged, told, tried = twin, list[str](), list["Trace"]()
     if judge:
-        others = read_logs(judge, columns, robot, torque)
+        others = read_logs(judge, columns, robot, torque, reading)
         tried, told = list(others.traces.values()), list(others.traces)
     else:
         held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
