@@ -24,8 +24,8 @@ from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import (
-    LEAST,
     Recording,
+    check_length,
     is_known,
     known_load,
     moving_span,
@@ -153,7 +153,7 @@ def identify(
 
     Args:
         arm: what is believed; the gains are a start, or hold (``scale="gains"``).
-        recordings: collision-free logs of this arm, at least 20 s of motion in all.
+        recordings: collision-free logs of this arm, at least 10 s of motion in all.
         scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
             recording with a known load above 0 does) or "masses" (those of ``arm`` do).
         friction: its columns.
@@ -229,8 +229,6 @@ def _fit(
                 for d, r, load in zip(data, recordings, loads, strict=True)
             ]
         if turn == 0:
-            if sum(len(d.current) for d in data) < 500:
-                raise ValueError(f"fewer than 500 samples of motion: {LEAST:g} s are the least")
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         system = System(robot, friction.columns, len(recordings))
         loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
@@ -270,6 +268,7 @@ def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> 
         joints = len(recording.trace.joint_names)
         if joints != robot.joints:
             raise ValueError(f"a log of {joints} joints, the robot has {robot.joints}")
+    check_length(recordings)
 
 
 def _result(

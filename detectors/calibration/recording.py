@@ -17,7 +17,7 @@ SHIFTED = 0.01
 #: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
 #: Motion without which nothing is identified [s].
-LEAST = 20.0
+LEAST = 10.0
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,10 @@ def check_length(recordings: Sequence[Recording]) -> None:
         ValueError: says how much there is.
     """
     if (seconds := motion_length(recordings)) < LEAST:
+        still = "" if seconds else "no joint moves: "
         raise ValueError(
-            f"{seconds:.0f} s of motion, from each log's first to its last, in all: {LEAST:g} s "
-            "are the least, two minutes are good"
+            f"{still}{seconds:.0f} s of motion, from each log's first to its last, in all: "
+            f"{LEAST:g} s are the least, two minutes are good"
         )
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
-    LEAST,
     Recording,
     motion_length,
     moves,
@@ -52,6 +51,10 @@ CHANCE = 0.01
 #: Median of a log's residual in motion over its bound, from which on it differs throughout, as with
 #: a load that is not given (1.1 and 0.6 on two simulated arms; up to 0.5 of three arms' free logs).
 THROUGHOUT = 0.8
+
+
+#: Motion that is kept at least when logs are left out [s].
+KEPT = 20.0
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def cross_validate(
         odd = standing_out(judged)
         worst = next((log for log in odd if log.name not in accepted), None)
         rest = [recordings[n] for n in names if worst is None or n != worst.name]
-        if worst is None or 2 * len(rest) < len(recordings) or motion_length(rest) < LEAST:
+        if worst is None or 2 * len(rest) < len(recordings) or motion_length(rest) < KEPT:
             vouched = tuple(log for log in odd if log.name in accepted)
             return CrossValidation(tuple(judged), tuple(out), vouched)
         out.append(worst)

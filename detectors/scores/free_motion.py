@@ -24,7 +24,6 @@ from tauguard.detectors.calibration.identification import REAL_FRICTION, identif
 from tauguard.detectors.calibration.recording import (
     Load,
     Recording,
-    check_length,
     known_load,
     moves,
     pieces,
@@ -175,7 +174,7 @@ class FreeMotion:
         """Calibrate, then let left-out logs move the prior bounds.
 
         Args:
-            traces: 20 s of collision-free motion or more in all. Plain traces count as without a
+            traces: 10 s of collision-free motion or more in all. Plain traces count as without a
                 load; of labelled ones the load is unknown, and those with collisions are left out.
                 Long ones are cut, so that each part can be left out once.
             arm: nominal numbers and drive gains, whose scale holds.
@@ -192,7 +191,6 @@ class FreeMotion:
         standing = [r for r in parts if not moves(r.trace)]
         if not moving:
             return _standing(arm, standing)
-        check_length(moving)
         models, whole = _calibrations(arm, moving)
         bound = Bound.prior(*friction_levels(whole, moving), *standing_positions(parts))
         dt = max(r.trace.dt for r in recordings)

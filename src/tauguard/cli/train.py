@@ -45,7 +45,7 @@ def command(
     collision-free ones, each scored by a detector that was trained without it. With --calibration
     the threshold is guaranteed instead: no more than the false alarms per hour that you name, on
     motion like that.
-    With --free and --robot: a detector of a real arm from logs in which nothing touched it; 20 s of
+    With --free and --robot: a detector of a real arm from logs in which nothing touched it; 10 s of
     motion are the least, two minutes are good. A card says what it can find, and which regimes the
     logs do not show.
 
