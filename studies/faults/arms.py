@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned
+from studies.real_arms.arms import (
+    ARMS,
+    available,
+    nominal,
+    recordings,
+    thinned,
+    touched,
+)
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import CollisionAlarm, make_detector, train
 from tauguard.detectors.calibration.nominal import nominal_design
@@ -63,9 +70,8 @@ def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
     yield simulated(quick, seed)
     if quick:
         return
-    names = [arm.name for arm in available()]
-    for arm in ARMS:
-        if arm.name in names:
+    for arm in available():
+        if "free" in arm.free:
             yield real(arm.name)
 
 
@@ -82,12 +88,12 @@ def simulated(quick: bool, seed: int) -> ArmLogs:
 def real(name: str) -> ArmLogs:
     """A real arm, trained on two thirds of its collision-free logs and tested on all others."""
     arm = next(arm for arm in ARMS if arm.name == name)
-    free = recordings(arm, ("free",))
+    free = recordings(replace(arm, free=("free",)))
     own = [log for k, log in enumerate(free) if k % LEFT_OUT]
     training = [free[log] for log in own]
     detector = FreeMotion().fit(training, nominal(arm))
     usual = UsualInput.of([r.trace for r in training], detector.arm)
     alarm = CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual)
-    others = recordings(arm, ("contact", "jointwise", "validation"))
+    others = recordings(arm) | {log: one.recording for log, one in touched(arm).items()}
     logs = {log: r.trace for log, r in (free | others).items() if log not in own}
     return ArmLogs(name, alarm, logs)

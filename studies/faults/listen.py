@@ -11,7 +11,7 @@ import contextlib
 import multiprocessing
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,10 +26,8 @@ from tauguard.datasets import read_log
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import load_model, save_model
 from tauguard.detectors.alarms.monitor import Monitor, detect_with_faults
-from tauguard.detectors.faults.inputs import FaultCheck
-from tauguard.detectors.faults.torques import TorqueCheck
 from tauguard.envs import simulate
-from tauguard.live import UrServer, UrStream, rtde
+from tauguard.live import UrServer, UrStream
 from tauguard.live.packets import Packets
 from tauguard.live.session import listen
 from tauguard.models import Mismatch
@@ -50,8 +48,6 @@ RATES, COLLISIONS = (125.0, 500.0), (195, 3)
 #: Training: seconds and number of collision-free episodes, their speeds [%], wanted false alarms an
 #: hour.
 SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
-#: Number of samples that each stage is timed on.
-TIMED = 4000
 #: The serving process must answer within this time [s].
 ANSWERS = 120.0
 
@@ -61,21 +57,17 @@ NOTES = {
     "the same sample. silent or late: stretches of fault that begin so, as other programs of the "
     "machine ran. Times in us from the "
     "packet's arrival to the answer.",
-    "stages": "one sample, us of this thread at the median and at p99.9. native: the work is C++; "
-    "the rest is Python around it. monitor does the work of the other three in one call; packet: "
-    "RTDE bytes to arrays.",
 }
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Return a row for each sample rate, and one for each stage of processing."""
+    """Return a row for each sample rate."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_inputs(folder, quick, seed)
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(len(RATES), context) as workers:
-            rows = list(workers.map(heard, [folder] * len(RATES), RATES))
-        return rows + stages(folder, RATES[-1])
+            return list(workers.map(heard, [folder] * len(RATES), RATES))
 
 
 def write_inputs(folder: Path, quick: bool, seed: int) -> None:
@@ -176,46 +168,3 @@ def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool])
     ]
     same = [said[times[k]] and not (k and said[times[k - 1]]) for k in begins]
     return share(sum(same), len(begins))
-
-
-def stages(folder: Path, rate: float) -> list[Row]:
-    """Time each stage of processing on the first samples of the log."""
-    alarm, trace = read_inputs(folder, rate)
-    assert alarm.inputs is not None
-    usual, stream = alarm.inputs, alarm.stream()
-    check, monitor = FaultCheck(usual), Monitor(alarm, usual)
-    torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
-    recipe = rtde.Recipe(1, ("DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D"))
-    reader = rtde.PacketReader()
-    count = min(TIMED, len(trace.t))
-    t, rows = trace.t.tolist(), list(zip(trace.q, trace.qd, trace.current, strict=True))[:count]
-    sent = [recipe.pack([t[k], *np.concatenate(row)]) for k, row in enumerate(rows)]
-
-    def packet(k: int) -> None:
-        reader.feed(sent[k])
-        found = reader.next()
-        assert found is not None
-        rtde.read_doubles(found.payload)
-
-    calls: dict[str, tuple[str, Callable[[int], object]]] = {
-        "packet": ("NumPy", packet),
-        "fault check": ("yes", lambda k: check.step(t[k], *rows[k])),
-        "torque check": ("yes", lambda k: torques.step(*rows[k])),
-        "detector": ("yes", lambda k: stream.step(*rows[k])),
-        "monitor": ("these three in one call", lambda k: monitor.step(t[k], *rows[k])),
-    }
-    return [
-        {"study": "stages", "stage": name, "native": native, "samples": count} | timed(call, count)
-        for name, (native, call) in calls.items()
-    ]
-
-
-def timed(call: Callable[[int], object], count: int) -> Row:
-    """Processor time of a call [us]."""
-    spent = np.empty(count, np.int64)
-    for k in range(count):
-        begin = time.thread_time_ns()
-        call(k)
-        spent[k] = time.thread_time_ns() - begin
-    median, tail = np.percentile(spent / 1e3, (50, 99.9))
-    return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}

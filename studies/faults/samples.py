@@ -15,8 +15,6 @@ torque ratios. On simulated arms only one thing was chosen: a load of training i
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,7 +43,6 @@ NOTES = {
     "sample. silent_s: the answer is free. missed: collisions within faults with no answer but "
     "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
     "share of its later collisions that are found after the recovery.",
-    "another arm": "one arm's samples given to another's model.",
 }
 
 
@@ -148,9 +145,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     """All rows."""
     rng = np.random.default_rng([seed, 15])
     rows: list[Row] = []
-    known: list[ArmLogs] = []
     for tested in arms(quick, seed):
-        known.append(tested)
         rows += [clean(tested, name, trace) for name, trace in tested.logs.items()]
         for name in tqdm(FAULTS, desc=tested.name, disable=None, leave=False):
             tally = Tally()
@@ -158,7 +153,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
                 tally.add(tested, log, name, start)
             rows.append(tally.row(tested.name, name))
     rows.sort(key=lambda row: row["study"])
-    return rows + others(known)
+    return rows
 
 
 def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
@@ -195,18 +190,3 @@ def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
         "alarms": len(found.starts),
         "alarms_of_detect": int(np.sum(np.diff(batch.astype(int), prepend=0) > 0)),
     }
-
-
-def others(known: Sequence[ArmLogs]) -> list[Row]:
-    """One arm's samples given to another's model, if their rates differ by less than a quarter."""
-    rows: list[Row] = []
-    for model, source in itertools.permutations(known, 2):
-        if abs(source.alarm.detector.dt / model.alarm.detector.dt - 1) > 0.2:
-            continue
-        every = [heard(model, Packets.of(trace)).reasons for trace in source.logs.values()]
-        seen = [reasons[0] for reasons in every if reasons]
-        row: Row = {"study": "another arm", "model": model.name, "samples": source.name}
-        row["seen"] = rate(len(seen), len(every))
-        row["median_s"] = float(np.median(seen)) if seen else None
-        rows.append(row)
-    return rows

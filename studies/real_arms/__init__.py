@@ -1,18 +1,18 @@
-"""Logs of real arms: pushes found, delays and false alarms, beside three simple rules."""
+"""Logs of real arms: pushes found, delays and false alarms, beside public observers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from studies.framework import Part, Study, table_rows
+from studies.framework import Part, Point, Study, table_rows
 from tauguard.report import Row, cell
 
 STUDY = Study(
-    "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
+    "logs of real arms: pushes found, delays and false alarms, beside public observers",
     {
         "pushes": Part(
             "real_arms.pushes",
-            "pushes found, delays and false alarms in logs of real arms, beside three simple rules",
+            "pushes found, delays and false alarms in logs of real arms, beside public observers",
             alias="real_arm",
         ),
         "training": Part(
@@ -41,3 +41,16 @@ def detections(rows: Sequence[Row]) -> Iterator[Row]:
             "median delay": "-" if delay is None else f"{delay:.0f} ms",
             "false alarms on all arms": f"{alarms:.0f} in {minutes:.0f} min",
         }
+
+
+def points(rows: Sequence[Row]) -> Iterator[Point]:
+    """Pushes missed over the false alarms on the same arm."""
+    axes = ("false alarms an hour (none: 0.1)", "fraction of pushes missed")
+    rates = {(row["arm"], row["detector"]): row for row in table_rows(rows, "false alarms")}
+    for row in table_rows(rows, "pushes"):
+        quiet = rates.get((row["arm"], row["detector"]))
+        if quiet is not None:
+            question = f"Pushes on {row['arm']}, {row['state']}"
+            role = "" if row["detector"] == "ours" else "peer"
+            cost, missed = max(quiet["per hour"], 0.1), 1 - row["found"]["value"]
+            yield Point(question, row["detector"], cost, missed, "", role, *axes)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.datasets import read_log
 from tauguard.datasets.drives import DRIVES
 from tauguard.detectors import ArmModel, RobotNumbers
-from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.calibration.recording import Load, Recording, cut
 from tauguard.models import pin_model
+from tauguard.models.known_robots import PUBLISHED
 from tauguard.traces import Trace
+from tauguard.traces.resample import resampled
+
+#: Shortest beginning of a log that counts as free [s].
+SHORTEST = 1.2
 
 
 @dataclass(frozen=True)
@@ -22,20 +27,41 @@ class Push:
     """A hand's push."""
 
     start: float  #: the sensor passes 4 N, or the torque leaves its course [s from the beginning]
-    peak: float  #: of the force, or of the torque [s]
+    peak: float  #: of the force, or of the torque; of a touch the end [s]
     moving: bool  #: whether the pushed joints moved
+    labelled: bool = False  #: by a switch on the hand, as all contacts of the log are
+
+
+@dataclass(frozen=True)
+class Touched:
+    """A log with pushes."""
+
+    recording: Recording
+    pushes: tuple[Push, ...]
+    quiet: int = 0  #: rows before the first touch
+    own: Array | None = None  #: the robot's own estimate of the external torque [N m], (T, n)
 
 
 @dataclass(frozen=True)
 class ArmData:
     """One arm."""
 
-    name: str  #: folder, preset and URDF
+    name: str  #: folder, and preset and URDF where nothing else is said
     free: tuple[str, ...]  #: folders of collision-free logs
+    contact: str = ""  #: folder of logs with pushes, beside the arm's
+    robot: str = ""  #: file of the package
+    columns: str = ""  #: preset
+    parts: int = 1  #: that a free log is cut into
     loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, where there were any
     pushes: dict[str, tuple[Push, ...]] = field(default_factory=dict)
     """By log, where there is no sensor: the torque less that of an untouched run at the same place
     of the program, from 3 N m to its peak."""
+
+    @property
+    def file(self) -> Path:
+        """Its robot file."""
+        own = folder() / self.name / f"{self.name}.urdf"
+        return PUBLISHED / self.robot if self.robot else own
 
 
 def _pushes(moving: bool, *spans: tuple[float, float]) -> tuple[Push, ...]:
@@ -46,11 +72,20 @@ ARMS = (
     ArmData(
         "ur10e",
         ("free", "jointwise", "validation"),
-        {"ur-20_01_13-load_2600": Load(2.6), "ur-20_01_31-load": None},
+        "ur10e_pushed",
+        loads={"ur-20_01_13-load_2600": Load(2.6), "ur-20_01_31-load": None},
+        # For seconds, from the change of the currents; half a second of each.
+        pushes={
+            "ur-static": _pushes(
+                False,
+                *((3.2, 3.7), (11.6, 12.1), (17.1, 17.6), (25.4, 25.9), (38.0, 38.5), (43.9, 44.4)),
+            )
+        },
     ),
     ArmData(
         "ur5",
         ("free",),
+        "ur5/contact",
         pushes={
             "no10_standing_pushed": _pushes(
                 False, (3.22, 3.42), (5.25, 5.45), (6.15, 6.47), (7.95, 8.27), (9.7, 10.4)
@@ -66,14 +101,15 @@ ARMS = (
         },
     ),
     ArmData("ur3", ("free",)),
+    # The Med 7's own file is not there.
+    ArmData("kuka_med7", ("",), robot="iiwa14.xml", columns="lbr", parts=3),
+    ArmData("panda_touch", (), "panda_touch", robot="panda.xml", columns="franka"),
 )
 
 
 def thinned(trace: Trace, rate: float) -> Trace:
-    """The samples that are left at ``rate`` [Hz], without truth."""
-    rows = slice(None, None, round(1 / (trace.dt * rate)))
-    signals = (trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows])
-    return Trace(trace.joint_names, *signals)
+    """The trace at ``rate`` [Hz], without truth."""
+    return replace(resampled(trace, rate), truth=None)
 
 
 def folder() -> Path:
@@ -83,32 +119,62 @@ def folder() -> Path:
 
 def available() -> list[ArmData]:
     """The arms whose logs are there."""
-    return [arm for arm in ARMS if (folder() / arm.name / f"{arm.name}.urdf").is_file()]
+    return [arm for arm in ARMS if (folder() / arm.name).is_dir() and arm.file.is_file()]
 
 
 def nominal(arm: ArmData) -> ArmModel:
     """What a user knows of the arm before any calibration."""
-    robot = RobotNumbers.from_pin(pin_model(folder() / arm.name / f"{arm.name}.urdf"))
+    robot = RobotNumbers.from_pin(pin_model(arm.file))
     drive = DRIVES.get(arm.name)
     return ArmModel(robot, np.array(drive.gain) if drive else np.ones(robot.joints))
 
 
-def recordings(arm: ArmData, kinds: Sequence[str]) -> dict[str, Recording]:
-    """Logs of some folders by name."""
+def recordings(arm: ArmData) -> dict[str, Recording]:
+    """Collision-free logs by name; of an arm without any, what touched logs begin with."""
+    if not arm.free:
+        logs = {n: one for n, one in touched(arm).items() if one.pushes[0].start > SHORTEST}
+        return {n: Recording(cut(o.recording.trace, slice(None, o.quiet))) for n, o in logs.items()}
     found = {}
-    for kind in kinds:
-        for path in sorted((folder() / arm.name / kind).glob("*.csv")):
-            trace = read_log(path, arm.name).trace
-            found[path.stem] = Recording(trace, arm.loads.get(path.stem, Load()))
+    for path in [p for k in arm.free for p in sorted((folder() / arm.name / k).glob("*.csv"))]:
+        trace = read_log(path, arm.columns or arm.name).trace
+        ends = np.linspace(0, len(trace.t), arm.parts + 1).astype(int).tolist()
+        for k in range(arm.parts):
+            name = f"{path.stem} {k}" if k else path.stem
+            part = cut(trace, slice(ends[k], ends[k + 1]))
+            found[name] = Recording(part, arm.loads.get(path.stem, Load()))
     return found
 
 
-def pushes(arm: ArmData, log: str) -> tuple[Push, ...]:
-    """The pushes of a contact log: by its force sensor, if it has one."""
-    path = folder() / arm.name / "contact" / f"{log}.csv"
-    table = np.genfromtxt(path, delimiter=",", names=True)
+def touched(arm: ArmData) -> dict[str, Touched]:
+    """Logs with pushes by name."""
+    found = {}
+    for path in sorted((folder() / arm.contact).glob("*.csv")) if arm.contact else ():
+        trace = read_log(path, arm.columns or "ur5").trace
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        if "label" in (table.dtype.names or ()):
+            found[path.stem] = _labelled(Recording(trace), table)
+        elif known := _by_sensor(table) or arm.pushes.get(path.stem, ()):
+            found[path.stem] = Touched(Recording(trace), known)
+    return found
+
+
+def _labelled(recording: Recording, table: np.ndarray) -> Touched:
+    """Touches by the switch on the hand, and Franka's estimate at the trace's times."""
+    t = recording.trace.t
+    on = np.interp(t, table["time"], table["label"]) > 0.5
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    last = len(t) - 1
+    spans = zip(edges[::2], np.minimum(edges[1::2], last), strict=True)
+    pushes = tuple(Push(float(t[a] - t[0]), float(t[b] - t[0]), False, True) for a, b in spans)
+    names = [f"tau_ext{k}" for k in range(7)]
+    own = np.column_stack([np.interp(t, table["time"], table[name]) for name in names])
+    return Touched(recording, pushes, max(int(edges[0]) - 20, 0), own)
+
+
+def _by_sensor(table: np.ndarray) -> tuple[Push, ...]:
+    """The pushes that a force sensor shows; none without one."""
     if "Fx" not in (table.dtype.names or ()):
-        return arm.pushes.get(log, ())
+        return ()
     force = np.sqrt(sum(table[f"F{axis}"] ** 2 for axis in "xyz"))
     t, found = table["t"] - table["t"][0], []
     starts = np.flatnonzero((force[1:] > 4) & (force[:-1] <= 4)) + 1

@@ -96,30 +96,34 @@ PEERS: dict[str, Callable[[ArmModel, Trace, Array], Array]] = {
 }
 
 
-def threshold(values: Sequence[Array], traces: Sequence[Trace]) -> Array:
-    """Each joint's threshold of what an observer says of the training logs [N m], shape (n,)."""
-    rows = (np.abs(v[t.t - t.t[0] > SETTLE]) for v, t in zip(values, traces, strict=True))
-    level: Array = FACTOR * np.max([part.max(axis=0) for part in rows], axis=0)
-    return level
-
-
 def alarms(value: Array, limit: Array, trace: Trace) -> Bools:
     """Where any joint has been above its threshold for the confirmation, shape (T,)."""
     above = (np.abs(value) > limit).any(axis=1) & (trace.t - trace.t[0] > SETTLE)
     return confirmed(above, confirmation_samples(LASTS, trace.dt))
 
 
-def watching(
-    arm: ArmModel, training: Sequence[Trace]
+def with_thresholds(
+    arm: ArmModel, training: Sequence[Trace], baseline: bool = False
 ) -> dict[str, Callable[[ArmModel, Trace], Bools]]:
-    """Each peer with thresholds from the training logs; the arm that it judges may carry a load."""
+    """Each peer with thresholds from the training logs; the arm that it judges may carry a load.
+
+    ``baseline``: values count from their mean from :data:`SETTLE` on to twice that, as of an arm
+    that stands and whose weight is not calibrated.
+    """
     traces = [trace for trace in training if trace.t[-1] - trace.t[0] > 2 * SETTLE]
     torques = [drive_torque(arm, trace) for trace in traces]
 
     def judged(name: str) -> Callable[[ArmModel, Trace], Bools]:
         peer = PEERS[name]
+
+        def value(own: ArmModel, log: Trace, tau: Array) -> Array:
+            found, time = peer(own, log, tau), log.t - log.t[0]
+            first = (time > SETTLE) & (time < 2 * SETTLE)
+            return found - found[first].mean(axis=0) if baseline else found
+
         pairs = zip(traces, torques, strict=True)
-        limit = threshold([peer(arm, trace, tau) for trace, tau in pairs], traces)
-        return lambda own, log: alarms(peer(own, log, drive_torque(own, log)), limit, log)
+        peaks = [np.abs(value(arm, t, tau)[t.t - t.t[0] > SETTLE]).max(axis=0) for t, tau in pairs]
+        limit = FACTOR * np.max(peaks, axis=0)
+        return lambda own, log: alarms(value(own, log, drive_torque(own, log)), limit, log)
 
     return {name: judged(name) for name in PEERS}
