@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tauguard.atomic_write import atomic_file
+from tauguard.detectors.evaluation.threshold_card import UPPER
 from tauguard.detectors.features.motion_regimes import unseen_text
 
 if TYPE_CHECKING:
@@ -132,6 +133,12 @@ def _lines(card: ThresholdCard) -> list[str]:
             f"as UR's safety settings: tool force limit {card.ur['tool_force_limit_n']:.0f} N "
             f"(Franka's setCollisionBehavior is for 7 joints, this arm has {len(card.joints)})"
         )
+    contacts, collisions = card.replay
+    lines.append(
+        "the columns moving and starting as constant thresholds, as a robot has them, would have "
+        f"raised {contacts} contacts and, {UPPER:g} times as high, {collisions} collisions in "
+        "these logs; all set to 100 N m would find nothing below 100 N m"
+    )
     lines.append("These are estimates from logs; they replace no safety function.")
     return lines
 

@@ -9,8 +9,12 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
+from tauguard.detectors.estimation.estimator import Estimator, Unknowns
+from tauguard.detectors.estimation.observer import LOG_GAIN
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
 from tauguard.detectors.evaluation.metrics import poisson_rate
+from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.features.motion_regimes import motion_regimes
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
@@ -46,6 +50,9 @@ class ThresholdCard:
     logs: tuple[CrossValidatedLog, ...]  #: each judged by the others; empty: not known one by one
     left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
+    replay: tuple[int, int]
+    """Contacts and collisions that ``moving`` and ``starting``, and :data:`UPPER` times these, as
+    constant thresholds of the plain observer's residual would have raised in the logs."""
 
     @property
     def franka(self) -> dict[str, list[float]]:
@@ -99,6 +106,7 @@ def threshold_card(
     usual = np.where(bound.shown, usual, np.nan)
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
+    starting = np.maximum(usual, sliding) + bound.start
     levels = {
         "standing": bound.rest / COUNTS,
         "slowly": bound.rest / COUNTS_SLOWLY,
@@ -112,7 +120,7 @@ def threshold_card(
         levels["standing"],
         levels["stopped"],
         usual,
-        np.maximum(usual, sliding) + bound.start,
+        starting,
         {name: _tool(detector, poses, level) for name, level in levels.items()},
         _tool(detector, poses, usual, moment=True)[0],
         detector.seconds,
@@ -121,7 +129,34 @@ def threshold_card(
         logs,
         sifted.left_out if sifted is not None else (),
         dict(detector.unseen),
+        replayed(detector, traces, usual, starting),
     )
+
+
+def replayed(
+    detector: FittedFreeMotion, traces: Sequence[Trace], moving: Array, starting: Array
+) -> tuple[int, int]:
+    """Events of constant torque thresholds, and of :data:`UPPER` times these, in some logs.
+
+    A robot's own thresholds work so: on the external torque of an observer, with higher ones while
+    a joint accelerates.
+
+    Args:
+        detector: its arm explains the torques.
+        traces: logs.
+        moving: thresholds [N m], shape (n,); NaN: none.
+        starting: the same for a joint that starts.
+    """
+    lower = upper = 0
+    for trace in traces:
+        estimator = Estimator(detector.arm, LOG_GAIN, trace.dt, Unknowns.none())
+        residual = estimator.run(trace.t, trace.q, trace.qd, trace.current).residual
+        limit = np.where(motion_regimes(trace)["starting"], starting, moving)
+        ratio = (np.abs(residual) / np.where(np.isfinite(limit), limit, np.inf)).max(axis=1)
+        ratio[trace.t - trace.t[0] < detector.settle] = 0.0
+        lower += len(find_alarms(trace.t, ratio > 1, SERIES))
+        upper += len(find_alarms(trace.t, ratio > UPPER, SERIES))
+    return lower, upper
 
 
 def _tool(

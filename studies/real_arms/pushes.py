@@ -100,7 +100,7 @@ def arm_tallies(arm: ArmData, turns: int, rng: np.random.Generator) -> dict[str,
         for name in held:
             judge(by, free[name], None)
     whole = detectors(list(free.values()), start) if arm.free and contact else {}
-    for name, one in list(contact.items())[: None if arm.free else turns]:
+    for name, one in list(contact.items())[: None if arm.free or turns > 1 else 1]:
         others = [r for n, r in free.items() if n != name]
         by = whole or detectors(others, start, standing=True) | franka(one)
         judge(by, one.recording, one.pushes)

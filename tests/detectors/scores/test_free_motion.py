@@ -10,7 +10,7 @@ from tauguard.detectors._observer import REGIME_SETTLES
 from tauguard.detectors.alarms.training import carrying
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.evaluation.semi_real import Added, add_contact
-from tauguard.detectors.evaluation.threshold_card import threshold_card
+from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
@@ -245,6 +245,15 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
     assert {len(v) for k, v in seven.items() if "force" in k} == {6}
     assert card.false_alarms_per_hour["high"] > 0
+
+
+def test_the_card_s_thresholds_are_replayed_on_the_logs(fitted):
+    trace, high = record(4), np.full(3, 1e3)
+    assert replayed(fitted, [trace], high, high) == (0, 0)
+    held = add_contact(trace, GAIN, Added(8.0, 1.0, (130.0, 0.0, 0.0), "push"))
+    twice = add_contact(held, GAIN, Added(14.0, 1.0, (200.0, 0.0, 0.0), "push"))
+    level = np.array([100.0, 1e3, np.nan])
+    assert replayed(fitted, [held, twice], level, level) == (3, 1)
 
 
 def test_other_joints_are_refused(alarm):
