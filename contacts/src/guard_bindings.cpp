@@ -116,7 +116,8 @@ nb::object array_of(const std::vector<double>& values) {
   return nb::cast(owned(std::vector<double>(values), std::array<std::size_t, 1>{values.size()}));
 }
 
-// Hits as rows: pair, simplices of the flex that came deepest, vertices of flexes that crossed.
+// Converts hits to rows: the pair, whether it passed, the simplices of a flex that came deepest,
+// and the vertices of flexes that crossed.
 nb::list rows_of(const std::vector<PairHit>& hits) {
   nb::list out;
   for (const PairHit& hit : hits) {

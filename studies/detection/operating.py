@@ -112,12 +112,12 @@ def operated(
 ) -> dict[str, Operated]:
     """Detectors with their alarms at the operating points.
 
-    The network's first two thresholds are its residual current. Every other detector gets at each
-    the lowest threshold with which it is expected, at every speed, to be as specific as the
-    network: rows then compare speed by speed. The third is for a rate over all speeds, which the
-    normalised score spreads evenly. It bounds the other two, which ask for more alarms over all
-    speeds; at a single one that can leave a detector less specific than the network.
-    ``free`` is by speed [%], then by detector; without a ``network`` the third point stands alone.
+    There are three points. At the first two, the network's threshold is its residual current. Every
+    other detector gets the lowest threshold at which it is expected to be as specific as the
+    network at every speed, so that rows compare speed by speed. The third point has a rate of false
+    alarms over all speeds, which the normalised score spreads evenly. The first two get no higher
+    threshold than it, so at one speed a detector may be less specific than the network.
+    ``free`` is by speed [%], then by detector. Without a ``network`` there is the third point only.
     """
     found = {}
     for name, detector in detectors.items():

@@ -157,9 +157,9 @@ def _measured(
 
 
 def _of_our_own(error: BaseException) -> bool:
-    """Whether code of this project raised it in this process.
+    """Whether code of this project raised the error in this process, not in a worker.
 
-    Workers start after the input was checked.
+    An error of a worker is not about the input, which is checked before workers start.
     """
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
