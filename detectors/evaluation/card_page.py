@@ -62,11 +62,15 @@ REGIMES = {
 
 
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
-    """A joint's number: in brackets if no log shows its regime, "-" if nothing is watched there."""
-    value = _levels(card)[name][j]
+    """A joint's number: "-" if nothing is watched there, in brackets if it is prior knowledge.
+
+    It is where no log shows the regime, or the joint's motion while others move.
+    """
+    value, moving = _levels(card)[name][j], card.moving
     if value != value:
         return "-"
     shown = card.joints[j] not in card.unseen.get(REGIMES[name], ())
+    shown &= moving[j] == moving[j] or not (moving == moving).any()
     return f"{value:.1f}" if shown else f"({value:.1f})"
 
 
