@@ -185,10 +185,26 @@ def _with_rate(
     detector: FittedDetector, found: Sequence[FreeScores], per_hour: float, confirmation: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """Normalise the scores and choose the threshold from them."""
+    alarm, scores = normalised(detector, found, confirmation)
+    return replace(alarm, threshold=threshold_for_rate(scores, per_hour)), scores
+
+
+def normalised(
+    detector: FittedDetector, found: Sequence[FreeScores], confirmation: float = CONFIRMATION
+) -> tuple[CollisionAlarm, list[FreeScores]]:
+    """An alarm that never comes, and what a threshold for it is chosen from.
+
+    Args:
+        detector: fitted.
+        found: its scores over collision-free motion, not normalised.
+        confirmation: t_c [s].
+
+    Returns:
+        The alarm with its normalisation, and the scores after that.
+    """
     levels, floor = normalisations(found)
-    scores = [one.over(levels, floor) for one in found]
-    threshold = threshold_for_rate(scores, per_hour)
-    return CollisionAlarm(detector, threshold, confirmation, levels, floor=floor), scores
+    alarm = CollisionAlarm(detector, np.inf, confirmation, levels, floor=floor)
+    return alarm, [one.over(levels, floor) for one in found]
 
 
 def with_guarantee(

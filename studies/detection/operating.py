@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
@@ -22,9 +23,10 @@ from tauguard.detectors import (
     make_detector,
     match,
 )
+from tauguard.detectors.alarms.training import normalised
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.evaluation.matching import Matching
-from tauguard.detectors.thresholds.tail_model import normalisations, tail_level, threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.traces import Collision, Trace
 
@@ -121,12 +123,10 @@ def operated(
     """
     found = {}
     for name, detector in detectors.items():
-        levels, floor = normalisations([one for own in free.values() for one in own[name]])
-        normal = {
-            speed: [one.over(levels, floor) for one in own[name]] for speed, own in free.items()
-        }
-        hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
-        alarms, normalised = {}, CollisionAlarm(detector, 0.0, normalisation=levels, floor=floor)
+        alarm, scores = normalised(detector, [one for own in free.values() for one in own[name]])
+        rest = iter(scores)
+        normal = {speed: [*islice(rest, len(own[name]))] for speed, own in free.items()}
+        hourly, alarms = threshold_for_rate(scores, per_hour), {}
         for amperes in AMPERES if network else ():
             if name == network:
                 alarms[str(amperes)] = CollisionAlarm(detector, amperes)
@@ -136,8 +136,8 @@ def operated(
                 for speed, own in normal.items()
             )
             threshold = min(max(matched), hourly)
-            alarms[str(amperes)] = replace(normalised, threshold=threshold)
-        alarms[HOURLY] = replace(normalised, threshold=hourly)
+            alarms[str(amperes)] = replace(alarm, threshold=threshold)
+        alarms[HOURLY] = replace(alarm, threshold=hourly)
         found[name] = Operated(detector, alarms)
     return found
 

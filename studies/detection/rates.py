@@ -34,9 +34,10 @@ from studies.detection.operating import (
 from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
+from tauguard.detectors.alarms.training import normalised
 from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
 from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
-from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.report import Row, rate
 from tauguard.traces import STRATA
@@ -144,11 +145,12 @@ def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
 def _alarms(
     detector: FittedDetector, scores: Sequence[FreeScores], asked: Sequence[float]
 ) -> Iterator[tuple[str, CollisionAlarm]]:
-    levels, floor = normalisations(scores)
-    aimed = CollisionAlarm(detector, 0.0, normalisation=levels, floor=floor)
+    aimed, levels = normalised(detector, scores)
     for per_hour in asked:
-        threshold = threshold_for_rate([one.over(levels, floor) for one in scores], per_hour)
-        yield point(AIMED, per_hour), replace(aimed, threshold=threshold)
+        yield (
+            point(AIMED, per_hour),
+            replace(aimed, threshold=threshold_for_rate(levels, per_hour)),
+        )
         try:
             held = guaranteed_threshold(scores, per_hour).threshold
         except ValueError:
