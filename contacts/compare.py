@@ -28,7 +28,7 @@ from tauguard.contacts.scoring import judge, score
 
 
 def compare(
-    scene: ContactScene | str,
+    scene: ContactScene | mujoco.MjModel | str,
     checkers: Sequence[str] = ("mujoco", "cloth", "rigid"),
     timestep: float | None = None,
     seconds: float | None = None,
@@ -43,7 +43,8 @@ def compare(
     :class:`tauguard.contacts.State`.
 
     Args:
-        scene: A :class:`ContactScene`, or the name of one of ``SCENES``.
+        scene: A :class:`ContactScene`, a model (which starts at rest in ``qpos0``), or the name of
+            one of ``SCENES``.
         checkers: Names of registered checkers.
         timestep: Of MuJoCo [s]; ``None``: the scene's.
         seconds: How long [s]; ``None``: the scene's own time.
@@ -64,12 +65,14 @@ def compare(
         if scene not in SCENES:
             raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
         scene = SCENES[scene]()
+    if isinstance(scene, mujoco.MjModel):
+        scene = ContactScene("model", scene, scene.qpos0.copy(), np.zeros(scene.nv))
     duration = scene.seconds if seconds is None else seconds
     if not 0 < duration < np.inf:
         raise ValueError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
         raise ValueError(f"fine {fine}: expected 1 or more steps in one")
-    if isinstance(checkers, str):
+    if isinstance(checkers, str | mujoco.MjData):
         raise ValueError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
     for name in options or {}:
         if name not in checkers:

@@ -1,4 +1,11 @@
-"""How it runs: the simulation loop, motions, injected collisions and environments."""
+"""How it runs: the simulation loop, motions, injected collisions and environments.
+
+``gymnasium.make("tauguard/Reach-v0")`` makes an environment; ``wrappers``, ``controllers`` and
+``policies`` go with it.
+"""
+
+import importlib
+from typing import Any
 
 from tauguard.envs.episodes.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.episodes.loop import Rollout, SimulationDiverged, SimulationLoop
@@ -21,3 +28,18 @@ __all__ = [
     "random_motion",
     "simulate",
 ]
+
+#: Modules that are loaded at their first use.
+_MODULES = ("controllers", "policies", "wrappers")
+
+
+def __getattr__(name: str) -> Any:
+    """Load a module."""
+    if name in _MODULES:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """All public names, loaded or not."""
+    return sorted({*globals(), *_MODULES})

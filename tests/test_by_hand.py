@@ -5,10 +5,13 @@ import sys
 from dataclasses import replace
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 
 import tauguard
+from tauguard import contacts
+from tauguard.detectors import make_detector, train
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import (
     SceneObject,
@@ -110,3 +113,26 @@ def test_every_value_that_one_meets_prints_in_a_few_lines(trace):
         assert "\n" not in said
     assert "gain=[10, 10.7, 8.5, 9, 9.5, 10.1]" in repr(scene.drive)
     assert "point=array(120, 3)" in repr(link_surface(scene.arm_xml, points=20))
+
+
+def test_a_detector_of_simulated_traces_needs_no_arm_model():
+    motion = [simulate(Episode(seed=k, seconds=6.0)) for k in range(3)]
+    alarm = train(make_detector("residual-thresholds"), motion)
+    assert alarm.detect(motion[0]).alarms == ()
+
+
+def test_a_plain_model_can_be_compared():
+    text = (
+        '<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .2"><freejoint/>'
+        '<geom size=".05"/></body></worldbody></mujoco>'
+    )
+    report = contacts.compare(mujoco.MjModel.from_xml_string(text), ["mujoco"], seconds=0.3)
+    assert report.scores[0].checker == "mujoco"
+    model = mujoco.MjModel.from_xml_string(text)
+    with pytest.raises(ValueError, match="expected a list of names"):
+        contacts.compare(model, mujoco.MjData(model))
+
+
+def test_modules_of_envs_are_completed_and_load():
+    assert {"controllers", "policies", "wrappers"} <= set(dir(tauguard.envs))
+    assert tauguard.envs.wrappers.Reaction

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.detectors.calibration.recording import Load
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
@@ -54,8 +55,8 @@ def held_out(
 def train(
     detector: Detector,
     traces: Sequence[Trace],
-    arm: ArmModel,
-    per_hour: float,
+    arm: ArmModel | None = None,
+    per_hour: float = 10.0,
     folds: int = FOLDS,
 ) -> CollisionAlarm:
     """Fit a detector and choose its threshold by motion that it was not trained on.
@@ -63,7 +64,7 @@ def train(
     Args:
         detector: settings of a method.
         traces: with truth, of one arm at one sample rate.
-        arm: the model before training.
+        arm: the model before training; the default is what tauguard attached to simulated traces.
         per_hour: false alarms to accept in an hour of motion like the training's.
         folds: parts of the traces that are left out in turn (fewer where there are fewer
             collision-free traces). The detector is trained on all traces, and the threshold comes
@@ -75,7 +76,8 @@ def train(
     Raises:
         ValueError: traces that do not fit or lack what the method needs, or ``folds`` below 1.
     """
-    return train_and_score(detector, traces, arm, per_hour, folds)[0]
+    believed = nominal_arm(traces) if arm is None else arm
+    return train_and_score(detector, traces, believed, per_hour, folds)[0]
 
 
 def free_alarm(fitted: FittedFreeMotion, traces: Sequence[Trace]) -> CollisionAlarm:

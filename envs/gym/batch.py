@@ -187,7 +187,7 @@ class Batch:
     def send_people(self, i: int, rng: np.random.Generator) -> None:
         """Draw what the people of copy ``i`` do in the next episode."""
         for p, person in enumerate(self.people(i)):
-            reaches, walks = draw_script(person, rng)
+            reaches, walks = draw_script(person, rng, self.compiled.blocked)
             self.reaches[i, 2 * p : 2 * p + 2] = reaches
             self.walks[i, p * WALKS : (p + 1) * WALKS] = walks
 
@@ -384,7 +384,7 @@ def _surroundings(
         ],
         regions=[_region(compiled, region) for region in compiled.regions],
         people_begin=len(scene.spec.proxies),
-        people=[anatomy(person) for person in people],
+        people=[anatomy(person, compiled.blocked) for person in people],
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         arms_sensor=_sensor(model, ARMS) if labels and compiled.arms == 2 else -1,
         low=[entry.low for entry in observations],

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
-from tauguard.envs.gym.placing import Layout, Usual
+from tauguard.envs.gym.placing import Layout, Usual, blocked_ground
 from tauguard.envs.gym.randomization import check_names
 from tauguard.envs.gym.second_arm import APART, add_second_arm, both_drives
 from tauguard.envs.gym.settings import PERSON, Settings
@@ -44,6 +44,8 @@ SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
+#: At which the conjugate gradients of a cloth's edges stop; forces differ by a ten-thousandth.
+CLOTH_TOLERANCE = 1e-6
 #: Largest speed of a falling free object [m/s]: from a metre.
 FALL_SPEED = 4.5
 
@@ -110,6 +112,7 @@ class CompiledScene:
     tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
     regions: tuple[RegionInfo, ...]
     people: tuple[Person, ...]
+    blocked: Array  #: what they walk round, see :func:`tauguard.envs.gym.placing.blocked_ground`
     force_bound: ForceBound
     layout: Layout  #: the arm's reach, and how things were placed
 
@@ -191,6 +194,10 @@ def compile_scene(
     if settings.payload_g > 0:
         data = mujoco.MjData(scene.model)
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
+    if settings.cloth is not None and settings.cloth.young is None:
+        # Newton's method factors a matrix of all edges at each step, which is slower by a third.
+        scene.model.opt.solver = mujoco.mjtSolver.mjSOL_CG
+        scene.model.opt.tolerance = CLOTH_TOLERANCE
     # A diverged state must stay visible; MuJoCo would restart it at the origin.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return _known(settings, scene, bare, layout, arms)
@@ -239,6 +246,7 @@ def _known(
         tools=find_tools(scene, arms),
         regions=_regions(scene, layout.reach),
         people=scene.spec.people,
+        blocked=blocked_ground(scene),
         force_bound=_force_bound(settings, scene, bare, speed, arms),
         layout=layout,
     )

@@ -17,12 +17,20 @@ PAUSE, HOLD = (0.2, 1.5), (0.2, 1.0)
 #: Time at work and away [s]; distance of the other place, to the side and behind [m].
 STAY, AWAY = (3.0, 8.0), (1.0, 3.0)
 ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
+#: A walk keeps this distance from tables and objects, or that of the place at work [m]; it is drawn
+#: so often, and then left out. A person may step back so far [m].
+CLEAR, DRAWN, STEP_BACK = 0.3, 20, 0.3
+#: Nothing to walk round.
+NOWHERE: Array = np.zeros((0, 4))
 #: Range of a reach ahead and to the side, in units of the arm's length, and above the hips [m].
 AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
 
 
-def anatomy(person: Person) -> _plant.Anatomy:
-    """The native form."""
+def anatomy(person: Person, blocked: Array) -> _plant.Anatomy:
+    """The native form; ``blocked`` as for :func:`draw_script`."""
+    back = -np.array([np.cos(person.facing), np.sin(person.facing)])
+    far = np.linspace(0.0, STEP_BACK, 13)
+    free = [d for d in far if _clear(person, blocked, person.position + d * back)]
     names = (
         "trunk", "shoulder", "hip_half", "neck", "head", "upper_arm", "lower_arm", "hand",
         "grip", "thigh", "shank",
@@ -38,13 +46,34 @@ def anatomy(person: Person) -> _plant.Anatomy:
         seated=person.seated,
         hanging=person.motion == "still",
         reacts=person.reacts,
+        step_back=float(max(free)),
     )
 
 
-def draw_script(person: Person, rng: np.random.Generator) -> tuple[Array, Array]:
+def _clear(person: Person, blocked: Array, place: Array, begin: Array | None = None) -> bool:
+    """Whether a person on the straight way to a place keeps clear of everything."""
+    if not len(blocked):
+        return True
+    at_work = np.array(person.position)
+    begin = at_work if begin is None else begin
+    way = begin + np.linspace(0.0, 1.0, 25)[:, None] * (place - begin)
+    rows = np.concatenate([at_work[None], way])[:, None]
+    outside = np.maximum(np.maximum(blocked[:, :2] - rows, rows - blocked[:, 2:]), 0.0)
+    distance = np.linalg.norm(outside, axis=2).min(axis=1)
+    return bool(distance[1:].min() >= min(CLEAR, distance[0] - 1e-6))
+
+
+def draw_script(
+    person: Person, rng: np.random.Generator, blocked: Array = NOWHERE
+) -> tuple[Array, Array]:
     """What a person does in one episode: reaches (2, rows, 5) and walks (rows, 3).
 
     A reach: wait [s], place [m], hold [s]. A walk: stay there [s], place [m].
+
+    Args:
+        person: who.
+        rng: draws it.
+        blocked: what walks go round: least x and y, largest x and y [m], shape (k, 4).
     """
     reaches = np.zeros((2, REACHES, _plant.REACH_WIDTH))
     walks = np.zeros((WALKS, _plant.WALK_WIDTH))
@@ -60,11 +89,23 @@ def draw_script(person: Person, rng: np.random.Generator) -> tuple[Array, Array]
         reaches[hand, :, 1:3] = person.position + places
         reaches[hand, :, 3] = hips + above
     away = np.arange(WALKS) % 2 == 1
-    aside = rng.uniform(*ASIDE, WALKS) * rng.choice([-1.0, 1.0], WALKS)
-    shift = np.outer(aside, left) - np.outer(rng.uniform(*BEHIND, WALKS), forward)
-    near = rng.normal(0.0, 0.03, (WALKS, 2))
-    near[0] = 0.0
-    walks[:, 1:] = person.position + np.where(away[:, None], shift, near)
+
+    def spots(count: int) -> Array:
+        """Away and at work, shape (count, 2, 2)."""
+        aside = rng.uniform(*ASIDE, count) * rng.choice([-1.0, 1.0], count)
+        shift = np.outer(aside, left) - np.outer(rng.uniform(*BEHIND, count), forward)
+        near = rng.normal(0.0, 0.03, (count, 2))
+        return np.asarray(person.position + np.stack([near, shift], axis=1))
+
+    drawn = spots(WALKS)[np.arange(WALKS), away.astype(int)]
+    drawn[0] = person.position
+    for k in range(1, WALKS if len(blocked) else 0):
+        last = drawn[k - 1]
+        # From every place there is a way on to the first, where the script begins anew.
+        tries = [drawn[k], *spots(DRAWN)[:, int(away[k])], drawn[0]]
+        free = (p for p in tries if _clear(person, blocked, p) and _clear(person, blocked, p, last))
+        drawn[k] = next(free, last)
+    walks[:, 1:] = drawn
     walks[:, 0] = np.where(away, rng.uniform(*AWAY, WALKS), rng.uniform(*STAY, WALKS))
     if person.motion != "walk" or person.seated:
         walks[:, 1:], walks[:, 0] = walks[0, 1:], np.inf

@@ -232,12 +232,38 @@ def check_clear(
     raise StartsInContact(kind, link, name, float(depth[k]))
 
 
-def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
-    """Whether people overlap no table and no object, which they do not touch in the simulation."""
+def _around(scene: Scene, model: mujoco.MjModel) -> list[int]:
+    """The geoms of the table and of objects, which people do not touch in the simulation."""
     spec = scene.spec
     around = [model.geom("table").id] if spec.table is not None else []
     bodies = {model.body(obj.name).id for obj in spec.objects if obj.touchable}
-    around += [g for g in range(model.ngeom) if _within(model, int(model.geom_bodyid[g]), bodies)]
+    return around + [
+        g for g in range(model.ngeom) if _within(model, int(model.geom_bodyid[g]), bodies)
+    ]
+
+
+def blocked_ground(scene: Scene) -> Array:
+    """What people go round: least x and y, largest x and y of each geom [m], shape (k, 4)."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_forward(model, data)
+    paths = {model.body(o.name).id: np.array(o.path)[:, 1:3] for o in scene.spec.objects if o.path}
+    low = min((p.floor for p in scene.spec.people), default=0.0)
+    high = max((p.floor + p.stature for p in scene.spec.people), default=0.0)
+    rows = []
+    for geom in _around(scene, model):
+        body, turned = int(model.geom_bodyid[geom]), data.geom_xmat[geom].reshape(3, 3)
+        middle = data.geom_xpos[geom] + turned @ model.geom_aabb[geom, :3]
+        half = np.abs(turned) @ model.geom_aabb[geom, 3:]
+        if middle[2] - half[2] < high and middle[2] + half[2] > low:
+            here = data.xpos[body, :2]
+            places = middle[:2] + paths.get(body, here[None]) - here
+            rows.append([*(places.min(axis=0) - half[:2]), *(places.max(axis=0) + half[:2])])
+    return np.array(rows).reshape(-1, 4)
+
+
+def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
+    """Whether people overlap no table and no object."""
+    spec, around = scene.spec, _around(scene, model)
     for part in people_parts(spec) if around else ():
         own = model.geom(part.name).id
         for geom in around:

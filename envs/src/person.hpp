@@ -26,6 +26,7 @@ struct Anatomy {
   double hip_height, trunk, shoulder, hip_half, neck, head;
   double upper_arm, lower_arm, hand, grip, thigh, shank;
   double floor, facing, hand_speed, walk_speed, reaction_time;
+  double step_back;  // after a touch [m]
   bool seated, hanging, reacts;
 };
 
@@ -40,9 +41,9 @@ constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
 // After a touch the hand withdraws at this multiple of its speed and stays away for this long [s].
-// The person steps back this far [m], within this time, and stays there for this long [s].
+// The person steps back within this time, and stays there for this long [s].
 constexpr double startle = 1.6, quiet = 1.0;
-constexpr double step_back = 0.3, step_time = 0.6, step_lasts = 2.0;
+constexpr double step_time = 0.6, step_lasts = 2.0;
 // A seated person leans back instead, by this angle per metre of a step [rad/m], at most at this
 // rate [rad/s].
 constexpr double lean_back = 1.2, lean_rate = 1.2;
@@ -263,7 +264,7 @@ class Person {
         continue;
       }
       for (int h = 0; h < 2; ++h) withdraw(h, t, startle * body_.hand_speed, quiet);
-      if (back_.to < step_back) back_ = {back_.at(t), step_back, t, step_time};
+      if (back_.to < body_.step_back) back_ = {back_.at(t), body_.step_back, t, step_time};
       back_until_ = t + step_time + step_lasts;
     }
     if (back_.to > 0 && t >= back_until_) back_ = {back_.at(t), 0.0, t, 2 * step_time};

@@ -219,16 +219,17 @@ void bind_anatomy(nb::module_& m) {
           [](Anatomy* self, double hip_height, double trunk, double shoulder, double hip_half,
              double neck, double head, double upper_arm, double lower_arm, double hand, double grip,
              double thigh, double shank, double floor, double facing, double hand_speed,
-             double walk_speed, double reaction_time, bool seated, bool hanging, bool reacts) {
-            new (self)
-                Anatomy{hip_height, trunk,      shoulder,      hip_half, neck,    head,  upper_arm,
-                        lower_arm,  hand,       grip,          thigh,    shank,   floor, facing,
-                        hand_speed, walk_speed, reaction_time, seated,   hanging, reacts};
+             double walk_speed, double reaction_time, double step_back, bool seated, bool hanging,
+             bool reacts) {
+            new (self) Anatomy{
+                hip_height, trunk,      shoulder,      hip_half,  neck,   head,    upper_arm,
+                lower_arm,  hand,       grip,          thigh,     shank,  floor,   facing,
+                hand_speed, walk_speed, reaction_time, step_back, seated, hanging, reacts};
           },
           nb::kw_only(), "hip_height"_a, "trunk"_a, "shoulder"_a, "hip_half"_a, "neck"_a, "head"_a,
           "upper_arm"_a, "lower_arm"_a, "hand"_a, "grip"_a, "thigh"_a, "shank"_a, "floor"_a,
-          "facing"_a, "hand_speed"_a, "walk_speed"_a, "reaction_time"_a, "seated"_a, "hanging"_a,
-          "reacts"_a)
+          "facing"_a, "hand_speed"_a, "walk_speed"_a, "reaction_time"_a, "step_back"_a, "seated"_a,
+          "hanging"_a, "reacts"_a)
       .def(nb::init<>());
 }
 

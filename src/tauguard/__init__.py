@@ -5,6 +5,9 @@ neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, 
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``,
 ``report``, ``hard_cases``, ``twin``.
 
+``gymnasium.make("tauguard/Reach-v0")`` makes an environment once tauguard is imported; so do
+``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` has its tables.
+
 ``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` look at a recording by hand.
 
 tauguard is a research tool, not a certified safety function.

@@ -11,7 +11,7 @@ from gymnasium.vector import SyncVectorEnv
 from oracles.reaction_swings import planned
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.people import draw_script
-from tauguard.models import Person
+from tauguard.models import Person, SceneObject, Shape, Table
 from tauguard.models.person import SEGMENTS
 
 REACH = "tauguard:tauguard/Reach-v0"
@@ -232,3 +232,44 @@ def test_a_second_person_is_felt_limited_and_costed():
     assert hit[:15].max() == 0
     assert hit[15:].max() > 50
     assert env.regions[info["region"] - 1].name.startswith("person2_")
+
+
+def test_walks_go_round_tables_and_objects_and_a_step_back_ends_before_them():
+    """A table to the left, a pillar behind on the right: no leg is ever inside either."""
+    box = Shape("box", size=(0.1, 0.1, 0.8))
+    pillar = SceneObject("pillar", shapes=(box,), position=(1.9, -0.7, 0.0))
+    table = Table(position=(1.1, 1.15, 0.0), half_extents=(0.3, 0.5, 0.05))
+    env = gym.make(
+        "tauguard/Reach-v0",
+        obstacles=(Person(position=(1.4, 0.0), motion="walk"),),
+        table=table,
+        objects=(pillar,),
+        max_episode_steps=10**6,
+    ).unwrapped
+    model, data = env.model, env.data
+    legs = [model.geom(p).id for p in ("person_pelvis", "person_left_thigh", "person_right_thigh")]
+    around = [model.geom("table").id] + [
+        g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name == "pillar"
+    ]
+    walked, nearest = 0.0, np.inf
+    for seed in range(4):
+        env.reset(seed=seed)
+        for _ in range(500):
+            env.step(np.zeros(6))
+            hip = data.geom_xpos[legs[0]]
+            walked = max(walked, float(np.hypot(hip[0] - 1.4, hip[1])))
+            for leg in legs:
+                for other in around:
+                    far = mujoco.mj_geomDistance(model, data, leg, other, 1.0, None)
+                    nearest = min(nearest, far)
+    assert walked > 0.5
+    assert nearest > 0.05  # a leg of who walks straight comes within 5 mm
+
+
+def test_who_stands_between_walls_does_not_walk():
+    person = Person(position=(1.0, 0.0), motion="walk")
+    walls = np.array([[0.0, 0.35, 3.0, 0.45], [0.0, -0.45, 3.0, -0.35]])
+    _, walks = draw_script(person, np.random.default_rng(0), walls)
+    assert np.ptp(walks[:, 2]) < 0.1
+    _, free = draw_script(person, np.random.default_rng(0))
+    assert np.ptp(free[:, 2]) > 0.5
