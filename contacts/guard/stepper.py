@@ -175,6 +175,15 @@ class GuardedStepper:
         return self._uncovered
 
     @property
+    def sunk(self) -> tuple[Pair, ...]:
+        """Pairs that were deep in one another when one of them last moved.
+
+        An edit or the scene itself put them there. A pair is not followed until it has parted, so
+        it may leave on either side without a word in the report.
+        """
+        return self._named(self._guard.sunk())
+
+    @property
     def stiffened(self) -> tuple[Pair, ...]:
         """Pairs whose contact parameters differ from the scene's at present."""
         return self._named(self._guard.stiffened())

@@ -267,9 +267,16 @@ class Guard {
     return rows_of(through);
   }
   Integers stiffened() const {
+    return listed([this] { return stepper_->stiffened(); });
+  }
+  Integers sunk() const {
+    return listed([this] { return stepper_->sunk(); });
+  }
+  template <class Ask>
+  Integers listed(const Ask& ask) const {
     if (stepping_ != std::this_thread::get_id()) refuse_within_step();
     Integers out;
-    for (const int pair : stepper_->stiffened()) out.append(pair);
+    for (const int pair : ask()) out.append(pair);
     return out;
   }
   void close() { refuse_within_step(), stepper_->close(); }
@@ -380,6 +387,7 @@ void bind_guard(nb::module_& m) {
       .def("report", &Guard::report)
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
+      .def("sunk", &Guard::sunk)
       .def("follow", &Guard::follow, "fields"_a)
       .def("changed", &Guard::changed)
       .def("clear", &Guard::clear)

@@ -81,6 +81,7 @@ class Stepper {
   // says all; otherwise report() has more.
   bool step(const std::function<void()>& each);
   std::vector<PairHit> judge();
+  std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
   // Restores every contact parameter.
   void close();
   // The state was set from outside: forgets the steps before.

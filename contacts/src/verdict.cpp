@@ -214,6 +214,15 @@ void Verdict::set_known(std::size_t pair, const std::vector<char>& known) {
     flex_pairs_[pair - pairs_.size()].known = known;
 }
 
+std::vector<int> Verdict::sunk_pairs() const {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < pairs_.size() + flex_pairs_.size(); ++i) {
+    const std::vector<char> all = known(i);
+    if (std::find(all.begin(), all.end(), sunk) != all.end()) out.push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
 void Verdict::forget() {
   for (Pair& pair : pairs_) pair.known = unknown;
   for (FlexPair& pair : flex_pairs_) std::fill(pair.known.begin(), pair.known.end(), unknown);

@@ -41,6 +41,8 @@ class Verdict {
   std::vector<char> known(std::size_t pair) const;
   // Sets what is known of a pair. Ignored if the number of entries differs.
   void set_known(std::size_t pair, const std::vector<char>& known);
+  // Pairs whose shapes were too deep in one another for even the last eroded ones to be apart.
+  std::vector<int> sunk_pairs() const;
   template <class Archive>
   void archive(Archive& a) {
     for (Pair& pair : pairs_) a(pair.known);

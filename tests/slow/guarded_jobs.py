@@ -151,6 +151,8 @@ class Run:
         """Whether all is well: what passed is reported in this step or in the next."""
         assert self._judge is not None
         self._judge.observe(self.data)
+        if self.guard is not None:  # what an edit put into one another is named, and not followed
+            self._told |= {self._names(pair) for pair in self.guard.sunk}
         if report is not None and report.passed:
             assert self.guard is not None
             self._told |= {self._names(pair) for pair in report.passed}

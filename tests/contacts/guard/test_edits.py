@@ -313,3 +313,17 @@ def test_numbers_that_are_not_finite_are_reported_where_mujoco_does_not_reset():
     guard.step()
     data.qvel[0] = np.nan
     assert guard.step().passed == guard.pairs
+
+
+def test_what_an_edit_puts_into_one_another_is_named_until_it_has_parted():
+    model = model_of()
+    data, guard = falling(model, 0.0)
+    guard.step()
+    assert guard.sunk == ()
+    data.qpos[2], data.qvel[:] = -0.001, 0.0  # the ball's centre is the floor's middle plane
+    guard.step()
+    (pair,) = guard.sunk
+    assert set(guard.partners(pair)) == {"geom 'floor'", "geom 'ball'"}
+    data.qpos[2], data.qvel[2] = 1.0, -0.1
+    guard.step()
+    assert guard.sunk == ()
