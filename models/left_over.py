@@ -36,13 +36,15 @@ EVERY = 0.05
 MARGIN = 1.0
 #: A stretch has at least so much of its log before it [s].
 LEAST = 0.2
-#: A joint that stands takes one of so many nearest stretches at random: stops differ.
-STOPS = 8
-#: A joint that has stood for so long keeps what it holds [s]; once it moves that fades so fast [s].
-HELD, RELEASE = 0.3, 0.2
+#: A joint that stops takes one of so many nearest stretches at random: stops differ. One that
+#: stands takes that which holds the most similar torque, of so many.
+STOPS, STANDS = 8, 64
+#: A joint that has stood for so long keeps what it holds [s]; that fades so fast at rest, and once
+#: it moves [s].
+HELD, FORGET, RELEASE = 0.3, 1.6, 0.2
 #: Scales of speed [rad/s] and acceleration [rad/s^2]; weights of the features.
 SPEED, ACCELERATION = 0.05, 0.5
-WEIGHTS = np.array([1.0, 0.5, 0.5, 0.5, 0.3])
+WEIGHTS = np.array([1.0, 0.5, 0.5, 0.5, 0.3, 1.0])
 #: The feature that says how long ago the joint moved; its values now, and after :data:`HELD`.
 MOVED = 3
 _UNMOVED, _LONG = (float(WEIGHTS[MOVED] * np.log10(0.02 + s)) for s in (1e-3, HELD))
@@ -151,10 +153,12 @@ class LeftOver:
         mean: Array = (total[count:] - total[:-count]) / count
         return mean
 
-    def nearest(self, joint: int, motion: Array, stands: bool) -> tuple[float, NDArray[np.intp]]:
-        """Distance of the nearest stretch to a motion, and where the nearest begin."""
+    def nearest(
+        self, joint: int, motion: Array, stands: bool, count: int
+    ) -> tuple[float, NDArray[np.intp]]:
+        """Distance of the nearest stretch to a motion, and where the ``count`` nearest begin."""
         tree, rows = self._trees[joint][int(stands)]
-        distance, found = tree.query(motion, k=min(STOPS if stands else 1, len(rows)))
+        distance, found = tree.query(motion, k=min(count, len(rows)))
         places: NDArray[np.intp] = rows[np.atleast_1d(found)]
         return float(np.min(distance)), places
 
@@ -166,6 +170,7 @@ class _Motion:
         self._dt = dt
         self._filtered: list[Array] = []
         self._since: list[Array] = []
+        self._direction = np.zeros(0)
 
     def features(self, qd: Array) -> Array:
         """Of the next samples' motion, shape (T, n, features)."""
@@ -174,6 +179,7 @@ class _Motion:
         if not self._filtered:
             self._filtered = [qd[0], qd[0]]
             self._since = [np.full(qd.shape[1], 5.0)] * 2
+            self._direction = np.zeros(qd.shape[1])
         kept = [np.exp(-self._dt / constant) for constant in (FAST, SLOWER)]
         fast, slower = (
             lfilter([1 - k], [1, -k], qd, axis=0, zi=k * before[None])[0]
@@ -191,7 +197,17 @@ class _Motion:
             [np.delete(size, j, 1).max(axis=1, initial=0.0) for j in range(size.shape[1])], axis=1
         )
         times = np.log10(0.02 + np.minimum(stood, 1.0)), np.log10(0.02 + np.minimum(moved, 1.0))
-        return np.asarray(WEIGHTS * np.stack([speed, acceleration, *times, others], axis=2))
+        parts = [speed, acceleration, *times, others, self._last_direction(fast, slow)]
+        return np.asarray(WEIGHTS * np.stack(parts, axis=2))
+
+    def _last_direction(self, fast: Array, slow: Bools) -> Array:
+        """The sign of each joint's last motion, whose friction it holds at rest, shape (T, n)."""
+        row = np.arange(1, len(fast) + 1)[:, None]
+        last = np.maximum.accumulate(np.where(slow, 0, row), axis=0)
+        signs = np.take_along_axis(np.sign(fast), np.maximum(last - 1, 0), axis=0)
+        found: Array = np.where(last > 0, signs, self._direction)
+        self._direction = found[-1]
+        return found
 
     def _passed(self, mask: Bools, k: int) -> Array:
         """Time since each joint's mask was last true [s], shape (T, n)."""
@@ -223,7 +239,7 @@ class Player:
         self._before = np.full(n, -1.0)  # that is faded out
         self._held = np.zeros(n)  # added so that a joint at rest keeps its torque [A]
         self._held_before = np.zeros(n)
-        self._keep = np.exp(-dt / RELEASE)
+        self._keep = np.exp(-dt / np.array([FORGET, RELEASE]))
 
     def next(self, qd: Array) -> Array:
         """Errors [A] along the next samples' velocities [rad/s], both of shape (T, n)."""
@@ -248,19 +264,25 @@ class Player:
             if known and stands:  # a stretch that is about to move is left before
                 known = source.features[at + ahead, j, MOVED] > _UNMOVED
             here = float(np.linalg.norm(source.features[at, j] - now)) if known else np.inf
-            distance, places = source.nearest(j, now, stands)
+            stood = at >= 0 and min(now[MOVED], source.features[at, j, MOVED]) > _LONG
+            count = (STANDS if stood else STOPS) if stands else 1
+            distance, places = source.nearest(j, now, stands, count)
             self._before[j], self._held_before[j] = self._at[j], self._held[j]
             if here <= distance + MARGIN:
                 continue
             place = int(self._rng.choice(places)) if stands else int(places[0])
-            if at >= 0 and min(now[MOVED], *source.features[[at, place], j, MOVED]) > _LONG:
-                self._held[j] += source.smooth[at, j] - source.smooth[place, j]
+            if stood:
+                change = source.smooth[at, j] - source.smooth[places, j]
+                nearest = int(np.argmin(np.abs(self._held[j] + change)))
+                place = int(places[nearest])
+                if source.features[place, j, MOVED] > _LONG:
+                    self._held[j] += change[nearest]
             self._at[j] = place
 
     def _played(self, qd: Array) -> Array:
         """The errors until the next comparison; a change of stretch fades."""
         steps = self._step * np.arange(len(qd) + 1)
-        kept = self._keep ** np.cumsum(np.abs(qd) > SLOW, axis=0)
+        kept = np.cumprod(self._keep[(np.abs(qd) > SLOW).astype(int)], axis=0)
         new = self._read(self._at + steps[:-1, None]) + self._held * kept
         first = self._before < 0
         old = self._read(np.where(first, self._at, self._before) + steps[:-1, None])

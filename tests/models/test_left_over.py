@@ -92,3 +92,18 @@ def test_samples_come_at_the_rate_with_jitter():
     assert np.median(steps) == pytest.approx(8e-3)
     assert np.std(steps) == pytest.approx(np.sqrt(2) * 1e-3, rel=0.1)
     assert len(Sensors(np.zeros(1), np.zeros(1)).samples(t, np.random.default_rng(0))) == len(t)
+
+
+def test_a_joint_that_stops_holds_what_stops_of_that_direction_hold():
+    # Stops after motion in turn in either direction; what is held has the motion's sign.
+    turns = [np.r_[np.full(100, 0.5 * sign), np.zeros(200)] for sign in (1, -1) * 5]
+    qd = np.concatenate(turns)[:, None]
+    held = np.repeat((1.0, -1.0) * 5, 300)[:, None]
+    source = LeftOver(RATE, np.zeros(len(qd), int), qd, held)
+    for seed in range(4):
+        player = Sensors(np.zeros(1), np.zeros(1), left_over=source).player(
+            1 / RATE, np.random.default_rng(seed)
+        )
+        for sign in (1, -1):
+            played = player.next(np.r_[np.full(100, 0.5 * sign), np.zeros(150)][:, None])
+            np.testing.assert_allclose(played[120:], sign, atol=0.05)
