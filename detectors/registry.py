@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -68,6 +69,7 @@ FILE_TYPES: dict[str, type] = {
     kind.__qualname__: kind
     for kind in (
         ArmModel,
+        BesideFreeMotion,
         Bound,
         CollisionAlarm,
         NoiseModel,

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.detectors.calibration.recording import Load
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -254,6 +255,6 @@ def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
     Raises:
         ValueError: a detector of another kind: it takes no load.
     """
-    if not isinstance(alarm.detector, FittedFreeMotion):
+    if not isinstance(alarm.detector, FittedFreeMotion | BesideFreeMotion):
         raise ValueError(f"{alarm.detector.name}: takes no load; only free-motion detectors do")
     return replace(alarm, detector=alarm.detector.carrying(load))

@@ -15,6 +15,10 @@ STUDY = Study(
             "pushes found, delays and false alarms in logs of real arms, beside public observers",
             alias="real_arm",
         ),
+        "force": Part(
+            "real_arms.force",
+            "force, impulse and time of pushes beside a force sensor, and a twin pushed with it",
+        ),
         "training": Part(
             "real_arms.training",
             "how many seconds of training an arm needs, real and simulated",

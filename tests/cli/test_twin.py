@@ -10,6 +10,8 @@ import pytest
 from tauguard.cli import main
 from tauguard.datasets.recordings import labelled
 from tauguard.detectors import load_model
+from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.models import load_arm
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
@@ -106,12 +108,28 @@ def test_from_logs_to_detection(folder, capsys):
 def test_contacts_are_learned_on_the_twin(folder, tmp_path, monkeypatch, capsys):
     out, model = tmp_path / "twin.toml", tmp_path / "model.skops"
     run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", out)
-    for name, count in (("STRUCK", 4), ("CONTACTS", 2), ("FREE", 1)):
+    for name, count in (("STRUCK", 4), ("CONTACTS", 2)):
         monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
     run(folder, "train", "--twin", out, "--free", folder / "free", "--model", model)
     said = capsys.readouterr().out
-    assert "contacts of the twin and 3 logs" in said
-    assert load_model(model).detector.arm.robot.joint_names == ("a", "b", "c")
+    assert "free-motion and srq-svr, of 3 logs and" in said
+    alarm = load_model(model)
+    assert alarm.detector.arm.robot.joint_names == ("a", "b", "c")
+    found = alarm.detector
+    # A push on joint b that is far beyond free motion, of the log that another seed makes.
+    log = record(9)
+    push = add_contact(log, GAIN, Added(14.0, 0.4, (0.0, 40.0, 0.0), "push"))
+    score = found.scores(push)
+    assert (score >= found.free.scores(push)).all()
+    assert alarm.detect(push).alarm[1400:1440].any()
+    stream = found.stream()
+    steps = np.diff(push.t, prepend=push.t[0] - push.dt)
+    rows = zip(push.q, push.qd, push.current, steps, strict=True)
+    one = [stream.step(*row) for row in rows]
+    np.testing.assert_allclose(one, score, atol=1e-6)
+    carrying = found.carrying(Load(1.0, (0.3, 0.0, 0.05)))
+    assert carrying.learned is found.learned
+    assert (carrying.free.arm.robot.inertial != found.free.arm.robot.inertial).any()
     other = tmp_path / "plain.toml"
     other.write_text(f'file = "{folder / "arm.xml"}"')
     with pytest.raises(SystemExit):

@@ -68,3 +68,13 @@ def test_public_observers_settle_on_an_added_torque():
     )
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 4
+
+
+@pytest.mark.data
+def test_force_stands_beside_the_sensor(bench, data_dir):
+    file, _ = bench("real_arms-force")
+    force = [row for row in file["rows"] if row["study"] == "force"]
+    assert len(force) >= 4
+    assert all(row["low N"] <= row["found N"] <= row["high N"] for row in force)
+    errors = {row["of"]: row for row in file["rows"] if row["study"] == "errors"}
+    assert errors["peak"]["interval holds"] >= 0.7 * errors["peak"]["rows"]

@@ -1,4 +1,4 @@
-"""``tauguard train --twin``: contacts learned on a twin, quietness on the arm's own free logs."""
+"""``tauguard train --twin``: contacts learned on a twin, beside what the arm's free logs show."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
 
-#: Episodes with contacts, contacts in each, and episodes without; each is another individual.
-STRUCK, CONTACTS, FREE = 18, 6, 3
+#: Episodes with contacts, each of another individual, and contacts in each.
+STRUCK, CONTACTS = 24, 6
+#: Seconds that a hand's push lasts; so many of the strikes become pushes, and so many pushes find
+#: the arm standing.
+PUSH, PUSHED, STANDING = (0.1, 1.2), 0.5, 0.5
 #: Percent of the joints' largest speeds, in turn.
 SPEEDS = (10.0, 30.0, 60.0)
 
@@ -26,7 +29,7 @@ def twin_contacts(
     torque: bool,
     reading: Reading | None = None,
 ) -> None:
-    """Train on simulated contacts and real free logs; print what the threshold aims at.
+    """Train on simulated contacts and real free logs, beside free motion; print what it aims at.
 
     Args:
         twin: description that `tauguard twin` wrote.
@@ -44,10 +47,13 @@ def twin_contacts(
     from tauguard.cli.help_text import print_notes
     from tauguard.cli.train import aimed_at
     from tauguard.datasets.arm_logs import read_logs
-    from tauguard.detectors import make_detector, save_model
+    from tauguard.detectors import CollisionAlarm, make_detector, save_model
+    from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
     from tauguard.detectors.alarms.training import train_and_score
     from tauguard.detectors.calibration.arm_file import load_arm
+    from tauguard.detectors.faults.inputs import UsualInput
     from tauguard.detectors.samples import same_rate
+    from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
     from tauguard.models.robot import Robot, bodies_file
 
     robot = Robot.from_toml(twin)
@@ -63,33 +69,43 @@ def twin_contacts(
             raise ValueError(
                 f"{name}: {1 / trace.dt:.4g} samples a second, the twin has {sensors.rate:.4g}"
             )
-    names = arm.robot.joint_names
+    names, logs = arm.robot.joint_names, list(read.traces.values())
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]
-    alarm, scores = train_and_score(method, [*struck, *read.traces.values()], arm, per_hour, 1)
-    save_model(alarm, model)
+    # The twin's own motion is no measure of how quiet the arm is: thresholds come from its logs.
+    learned, scores = train_and_score(method, [*struck, *logs], arm, per_hour)
+    quiet = FreeMotion().fit(logs, arm)
+    both = BesideFreeMotion(quiet, learned)
+    usual = UsualInput.of(logs, quiet.arm)
+    save_model(CollisionAlarm(both, 1.0, CONFIRMATION, inputs=usual), model)
     count = sum(len(trace.truth.collisions) for trace in struck if trace.truth)
     print(
-        f"{model}: {detector} trained on {count} contacts of the twin and {len(read.traces)} logs, "
-        f"threshold {alarm.threshold:.3g}"
+        f"{model}: {both.name}, of {len(logs)} logs and {count} contacts of the twin; the learned "
+        f"score's threshold is {learned.threshold:.3g}"
     )
-    print(aimed_at(alarm, scores, per_hour))
+    print(f"{detector}: {aimed_at(learned, scores, per_hour)}")
 
 
 def contacts(twin: Path) -> list[Trace]:
-    """Simulated runs of individuals of the twin, with contacts and without."""
-    from tauguard.datasets import free_episodes, struck_episodes
-    from tauguard.envs import simulate
+    """Simulated runs of individuals of the twin, with contacts of all kinds."""
+    import numpy as np
+
+    from tauguard.datasets import struck_episodes
+    from tauguard.envs import CollisionPlan, simulate
     from tauguard.models import Mismatch
 
-    episodes = []
-    for seed in range(STRUCK + FREE):
+    def as_hands_do(rng: np.random.Generator, plan: CollisionPlan) -> CollisionPlan:
+        if plan.kind == "clamp" or (plan.kind == "strike" and rng.random() > PUSHED):
+            return plan
+        standing = bool(rng.random() < STANDING)
+        return replace(plan, kind="pulse", duration=float(rng.uniform(*PUSH)), at_rest=standing)
+
+    found = []
+    for seed in range(STRUCK):
         one = Mismatch(
             seed=seed, mass=0.02, com=0.002, inertia=0.05, gain=0.03, coulomb=0.1, viscous=0.1
         )
-        speed = (SPEEDS[seed % len(SPEEDS)],)
-        episodes += (
-            struck_episodes(seed, 1, CONTACTS, speed, (0.0,), one, str(twin))
-            if seed < STRUCK
-            else free_episodes(seed, 1, 15.0, speed, (0.0,), one, robot=str(twin))
-        )
-    return [simulate(episode) for episode in episodes]
+        speed, rng = (SPEEDS[seed % len(SPEEDS)],), np.random.default_rng([seed, 7])
+        for episode in struck_episodes(seed, 1, CONTACTS, speed, (0.0,), one, str(twin)):
+            plans = tuple(as_hands_do(rng, plan) for plan in episode.collisions)
+            found.append(simulate(replace(episode, collisions=plans)))
+    return found

@@ -1,0 +1,89 @@
+"""A learned alarm beside the free-motion detector of the same arm: what either finds is found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors.alarms.alarm import AlarmStream, CollisionAlarm
+from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.traces.trace import Trace
+
+
+@dataclass(frozen=True, eq=False)
+class BesideFreeMotion(Frozen):
+    """The larger of two scores: that of free motion, and a learned one over its threshold.
+
+    The threshold of both is 1. The learned score counts while its own alarm is up. So nothing that
+    free motion finds is lost; false alarms are those of both.
+    """
+
+    free: FittedFreeMotion
+    learned: CollisionAlarm  #: of the same arm
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        if self.learned.detector.arm.robot.joints != self.free.arm.robot.joints:
+            raise ValueError("free, learned: of arms with different joints")
+        if not self.learned.threshold > 0:
+            raise ValueError(f"learned.threshold {self.learned.threshold}: expected above 0")
+
+    @property
+    def name(self) -> str:
+        """Both methods."""
+        return f"{self.free.name} and {self.learned.detector.name}"
+
+    @property
+    def arm(self) -> ArmModel:
+        """As the free motion showed it."""
+        return self.free.arm
+
+    @property
+    def dt(self) -> float:
+        """Sample interval of the training traces [s]."""
+        return self.learned.detector.dt
+
+    @property
+    def settle(self) -> float:
+        """That of free motion [s]; the learned alarm waits for its own."""
+        return self.free.settle
+
+    def carrying(self, load: Load) -> BesideFreeMotion:
+        """The same detector of the arm with a load in its gripper; the learned one tracks loads."""
+        return BesideFreeMotion(self.free.carrying(load), self.learned)
+
+    def scores(self, trace: Trace) -> Array:
+        """The larger score, shape (T,).
+
+        Raises:
+            ValueError: other joints or another sample rate than the training's.
+        """
+        found = self.learned.detect(trace)
+        learned = np.where(found.alarm, found.score / self.learned.threshold, 0.0)
+        larger: Array = np.maximum(self.free.scores(trace), learned)
+        return larger
+
+    def stream(self) -> BothStreams:
+        """The same, sample by sample."""
+        return BothStreams(self)
+
+
+class BothStreams:
+    """Free motion and the learned alarm, sample by sample."""
+
+    def __init__(self, detector: BesideFreeMotion) -> None:
+        """Begin anew."""
+        self._free = detector.free.stream()
+        self._learned = AlarmStream(detector.learned)
+        self._threshold = detector.learned.threshold
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The larger score of this sample."""
+        free = self._free.step(q, qd, current, dt)
+        up = self._learned.step(q, qd, current, dt)
+        return max(free, self._learned.score / self._threshold if up else 0.0)
