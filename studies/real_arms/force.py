@@ -86,9 +86,9 @@ def pushes(t: Array, size: Array) -> list[tuple[int, int]]:
     found: list[tuple[int, int]] = []
     for row in np.flatnonzero((size[1:] > BEGINS) & (size[:-1] <= BEGINS)) + 1:
         below = np.flatnonzero(size[row:] < ENDS)
-        last = row + int(below[0]) if len(below) else len(t) - 1
-        if last > row and (not found or t[row] > t[found[-1][1]] + APART):
-            found.append((int(row), last))
+        first, last = int(row), int(row + below[0] if len(below) else len(t) - 1)
+        if last > first and (not found or t[first] > t[found[-1][1]] + APART):
+            found.append((first, last))
     return found
 
 
@@ -145,7 +145,7 @@ def pushed(
             j.T @ (p.rotation[-1] @ own @ force[top])
             for j, p, top in zip(jacobians, poses, tops, strict=True)
         ]
-        return still - np.array(torques)
+        return np.asarray(still - np.array(torques))
 
     scale = 1 + np.abs(seen).max(axis=0)
     fits = [
