@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.real_arms.arms import ARMS, available, folder, nominal, recordings
+from studies.real_arms.arms import ARMS, available, folder, nominal, recordings, touched
 from tauguard.detectors import ArmModel, Diagnoser, Diagnosis
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Load
@@ -59,9 +59,9 @@ def measure(quick: bool, seed: int) -> list[Row]:
     arm = next((a for a in ARMS if a.name == ARM), None)
     if arm is None or arm not in available():
         return [{"study": "force", "log": "no logs: set TAUGUARD_DATA to their folder"}]
-    free, start = recordings(arm, arm.free), nominal(arm)
+    free, start = recordings(arm), nominal(arm)
     fitted = FreeMotion().fit(list(free.values()), start).carrying(Load())
-    trace = recordings(arm, ("contact",))[LOG].trace
+    trace = touched(arm)[LOG].recording.trace
     force = sensor()
     found = CollisionAlarm(fitted, 1.0, CONFIRMATION).detect(trace).alarms
     surface, _ = arm_surface(folder() / ARM / f"{ARM}.urdf", fitted.arm.robot.joint_names)
@@ -167,6 +167,7 @@ def pushed(
 def _errors(rows: list[Row]) -> list[Row]:
     """A row of medians for each of peak, impulse and the pushed twin."""
     own = [row for row in rows if row["study"] == "force"]
+    force = np.array([row["sensor N"] for row in own])
     found: list[Row] = []
     for name, unit in (("peak", "N"), ("impulse", "N s")):
         truth, value, low, high = (
@@ -174,7 +175,7 @@ def _errors(rows: list[Row]) -> list[Row]:
             for what in ("sensor", "found", "low", "high")
         )
         error = np.abs(value / truth - 1)
-        row = _medians(name, error, truth) | {
+        row = _medians(name, error, force) | {
             "interval holds": int(((low <= truth) & (truth <= high)).sum()),
             "interval's width": float(np.median(high / low)),
         }
