@@ -230,12 +230,16 @@ def _part(kind: type, values: Mapping[str, Any], where: str) -> Any:
 
 
 def bodies_file(path: Path) -> Path:
-    """The URDF or MJCF file behind a robot file: that of a TOML description, else ``path``.
+    """The URDF or MJCF file of a robot: of a TOML description, of an arm by name, else ``path``.
 
     Raises:
         ValueError: a TOML file that describes no robot, or one whose ``file`` is not there.
-        FileNotFoundError: no such file.
+        FileNotFoundError: no such file, or the model of a known arm is in no installed package.
     """
+    from tauguard.models.known_robots import find_file, known_names
+
+    if not path.exists() and str(path) in known_names():
+        return find_file(str(path))
     if path.suffix.lower() != ".toml":
         return path
     bodies = Path(Robot.from_toml(path).file)

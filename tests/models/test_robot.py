@@ -1,5 +1,7 @@
 """A robot described once: what is stated is used, what is not is derived and says so."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -193,6 +195,8 @@ def test_the_bodies_of_a_description_are_its_file(tmp_path, arm):
     path.write_text(f'file = "{bodies.name}"\n')
     assert bodies_file(path) == bodies
     assert bodies_file(bodies) == bodies
+    assert bodies_file(Path("panda")).name == "panda.xml"
+    assert bodies_file(Path("no-such-arm")) == Path("no-such-arm")
     path.write_text('file = "gone.xml"\n')
     with pytest.raises(ValueError, match=r"gone\.xml.*no such file"):
         bodies_file(path)

@@ -46,7 +46,7 @@ def command(
     Args:
         logs: CSV or MCAP files, or a folder of them; 10 s of motion are the least, two minutes are
             good.
-        robot: URDF or MJCF file of the arm alone.
+        robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
         columns: of CSV files: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto, or a JSON
             file (see `tauguard detect`).
@@ -71,8 +71,11 @@ def command(
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.detectors.evaluation.acceptance import check_held_out
+    from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
+    beside = robot if robot.exists() else Path(robot.name)  # of an arm by name: the working folder
+    robot = bodies_file(robot)
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
@@ -92,7 +95,7 @@ def command(
     print_notes((*calibration_notes(found.arm, traces, recordings, held), *shown))
     within = (found.arm, list(traces), recordings, held)
     hold_to("error", accept, lambda: check_held_out(*within))
-    target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
+    target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=list(traces))
     result = summary(list(traces), found, held, target) | {"scale": given.source}
     report(result, found)

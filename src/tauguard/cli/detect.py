@@ -53,7 +53,8 @@ def command(
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
-        robot: URDF or MJCF file of the arm alone, or the TOML file of `tauguard twin`.
+        robot: URDF or MJCF file of the arm alone, a name that `tauguard robot` lists, or the TOML
+            file of `tauguard twin`.
         columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto for what the
             names and numbers suggest, or a JSON file with the fields of
             tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque": ["tau1",

@@ -46,7 +46,7 @@ def command(
 
     Args:
         model: a detector that `tauguard train` wrote, for this arm and this rate.
-        robot: URDF or MJCF file of the arm alone.
+        robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         ur: host of a Universal Robots controller, read by RTDE.
         port: of RTDE.
         play: a log (CSV or MCAP) to play at its own pace instead.
@@ -66,7 +66,9 @@ def command(
     from tauguard.detectors.alarms.monitor import Monitor
     from tauguard.live.display import BackgroundDisplay
     from tauguard.live.session import listen
+    from tauguard.models.robot import bodies_file
 
+    robot = bodies_file(robot)
     sources = (ur is not None, play is not None, stdin, ros is not None)
     if sum(sources) != 1:
         raise ValueError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")

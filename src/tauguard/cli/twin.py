@@ -41,7 +41,7 @@ def command(
 
     Args:
         logs: CSV or MCAP files, or a folder of them.
-        robot: URDF or MJCF file of the arm alone.
+        robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the twin, a TOML file; its bodies are written beside it.
         columns: as for `tauguard calibrate`.
         gains: N m per ampere, one a joint.
@@ -60,12 +60,14 @@ def command(
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.recording import pieces
     from tauguard.models import load_arm
+    from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
     from tauguard.twin import compare, with_intervals
     from tauguard.twin.description import write_twin
 
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
+    robot = bodies_file(robot)
     given, left = of_one_arm(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
     )
