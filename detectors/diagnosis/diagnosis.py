@@ -64,8 +64,13 @@ class Diagnosis:
 
     @property
     def link_identifiable(self) -> bool:
-        """Whether the most likely link is much more likely than all others."""
-        return bool(self.links[self.link - 1] >= SURE)
+        """Whether one link is much more likely than all others, and can load the leading joint.
+
+        A force on a link acts on no joint beyond it. Where the joint with the largest torque is
+        beyond the most likely link, the torques are not those of one contact that the model knows.
+        """
+        leading = int(np.abs(self.severity.torque.peak).argmax()) + 1
+        return bool(self.links[self.link - 1] >= SURE) and leading <= self.link
 
 
 def diagnose(

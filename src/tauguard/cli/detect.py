@@ -283,8 +283,8 @@ def report(result: dict[str, Any]) -> None:
         print(f"faults hide collisions in {result['fault_seconds']:.2f} s of this log")
     count, seconds = result["alarms"], result["watched_seconds"]
     print(
-        f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; in a log without "
-        "collisions each is a false one"
+        f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; where "
+        "nothing touched the arm, each is a false one"
         + rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
     )
 

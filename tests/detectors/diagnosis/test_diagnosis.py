@@ -122,6 +122,16 @@ def test_simulated_contacts_and_payload(trace):
     assert found[2].signs.mass == pytest.approx(2.0, rel=0.1)
 
 
+def test_a_link_that_the_leading_joint_lies_beyond_is_not_named(trace):
+    first = Diagnoser(ARM, link_surface(XML)).diagnose(trace, alarms(trace))[0]
+    sure = replace(first, links=np.eye(6)[first.link - 1])
+    for joint in range(6):
+        torque = replace(first.severity.torque, peak=9.0 * np.eye(6)[joint])
+        one = replace(sure, severity=replace(first.severity, torque=torque))
+        assert one.link_identifiable == (joint < first.link)
+        assert (f"link {first.link}" in one.summary) == one.link_identifiable
+
+
 def test_what_was_known_before_the_alarm_is_kept(trace):
     looked = PostAlarmWindows(ARM, None, trace).at(4.2)
     # The estimator takes the payload up within seconds; the aftermath goes on showing it.
