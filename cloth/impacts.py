@@ -124,7 +124,10 @@ def _solve_points(
 def method_number(method: str) -> int:
     """The number of a method, or a ``ValueError`` that lists the names there are."""
     if not isinstance(method, str) or method not in METHODS:
-        raise ValueError(f"method {method!r}: there are {', '.join(METHODS)}")
+        raise ValueError(
+            f"method {method!r}: there are {', '.join(METHODS)}; the methods that "
+            "tauguard.cloth.comparators has are for comparison only"
+        )
     return METHODS[method]
 
 

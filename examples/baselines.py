@@ -1,9 +1,10 @@
 """Baselines of the tasks: zero and random actions, scripted controllers, learned policies.
 
-    python examples/baselines.py [EPISODES] [FIRST_SEED] [TASK ...]
+    python examples/baselines.py [EPISODES] [FIRST_SEED] [TASK ...] [POLICY.npz ...]
 
-Prints a Markdown table: success with its 95 % interval, targets, reward, largest force over its
-limit and seconds in hard contact (force over 100 N, at most 1), a mean an episode of 5 s each.
+Prints a Markdown table: success with its 95 % interval, targets, reward, largest force divided by
+its limit and seconds in hard contact (each second counts as force / 100 N, at most 1), a mean an
+episode of 5 s each; then the episodes in which some force exceeded its limit.
 `fast` goes straight to the target. The others do so too, and differ in what they do about people:
 
 * `power and force`: at the speed at which the impact with each region, and a lasting push, keep its
@@ -102,8 +103,8 @@ def learned(file):
     return lambda env, info: policy(env.unwrapped.batch.observation[0])
 
 
-def baselines(task):
-    """By name: what acts, keywords and a wrapper of the environment."""
+def baselines(task, files=()):
+    """By name: what acts, keywords and a wrapper of the environment; policy files come last."""
     found = {
         "zero": (zero, {}, None),
         "random": (random, {}, None),
@@ -117,12 +118,12 @@ def baselines(task):
     for name, end in (("ppo", ""), ("ppo, budget", "-budget")):
         if (file := POLICIES / f"{task}{end}.npz").is_file():
             found[name] = (learned(file), {}, None)
-    return found
+    return found | {str(file): (learned(file), {}, None) for file in files}
 
 
-def play(task, name, episodes, first=0):
+def play(task, name, episodes, first=0, files=()):
     """Success, targets, reward, force over limit and hard contact [s], a row an episode."""
-    act, more, wrapper = baselines(task)[name]
+    act, more, wrapper = baselines(task, files)[name]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env = gym.make(f"tauguard:tauguard/{task}", disable_env_checker=True, **KEYWORDS, **more)
@@ -144,18 +145,26 @@ def play(task, name, episodes, first=0):
     return np.array(rows, dtype=float)
 
 
-def main(episodes=20, first=1000, *tasks):
-    print("| task | policy | success | targets | reward | force over limit | hard contact [s] |")
-    print("|---|---|---|---|---|---|---|")
+def main(episodes=20, first=1000, *names):
+    files = [name for name in names if name.endswith(".npz")]
+    tasks = [name for name in names if name not in files]
+    if unknown := sorted({*tasks} - {*TASKS}):
+        sys.exit(f"{', '.join(unknown)}: no such task; there are {', '.join(TASKS)}")
+    print(
+        "| task | policy | success | targets | reward | force / limit | hard contact [s] | "
+        "over a limit |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     for task in tasks or TASKS:
-        for name in baselines(task):
-            rows = play(task, name, int(episodes), int(first))
+        for name in baselines(task, files):
+            rows = play(task, name, int(episodes), int(first), files)
             interval = rate(int(rows[:, 0].sum()), len(rows))
             low, high = interval["low"], interval["high"]
             success, targets, reward, worst, hard = rows.mean(axis=0)
+            above = int((rows[:, 3] > 1).sum())
             print(
                 f"| {task} | {name} | {success:.2f} [{low:.2f}, {high:.2f}] | {targets:.1f} | "
-                f"{reward:.2f} | {worst:.2f} | {hard:.2f} |",
+                f"{reward:.2f} | {worst:.2f} | {hard:.2f} | {above} of {len(rows)} |",
                 flush=True,
             )
 

@@ -1,6 +1,7 @@
 """Train a policy by PPO, or by PPO with a budget of contact: the learned baselines.
 
-    uv run --extra learn python examples/learn.py TASK [--budget SECONDS] [--steps N] [--out FILE]
+    uv run --extra learn python examples/learn.py Reach-v0 --budget 0.2 --out policy.npz
+    uv run python examples/baselines.py 20 1000 Reach-v0 policy.npz    # beside the baselines
 
 With a budget it is PPO-Lagrangian (Ray, Achiam & Amodei, "Benchmarking safe exploration in deep
 reinforcement learning", 2019): each step's reward is reduced by lambda times its cost, and lambda
@@ -28,6 +29,7 @@ KEYWORDS = {
     "timestep": 2e-3,
     "max_episode_steps": 100,
 }
+TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
 #: Force that counts as hard contact [N].
 HARD = 100.0
 
@@ -60,19 +62,28 @@ class Budget(BaseCallback):
     def __init__(self, priced, budget, rate=4.0):
         super().__init__()
         self.priced, self.budget, self.rate = priced, budget, rate
+        self.found = float("nan")  # seconds in hard contact of the last episodes, a mean
 
     def _on_step(self):
         return True
 
     def _on_rollout_end(self):
-        if self.budget is not None and self.priced.episodes:
-            excess = np.mean(self.priced.episodes) - self.budget
-            self.priced.price = max(0.0, self.priced.price + self.rate * excess)
+        if self.priced.episodes:
+            self.found = float(np.mean(self.priced.episodes))
+            if self.budget is not None:
+                excess = self.found - self.budget
+                self.priced.price = max(0.0, self.priced.price + self.rate * excess)
+            print(
+                f"\r{self.num_timesteps} steps, {self.found:.2f} s in hard contact an episode, "
+                f"lambda {self.priced.price:.1f}  ",
+                end="",
+                flush=True,
+            )
         self.priced.episodes.clear()
 
 
 def train(task, budget=None, steps=200_000, seed=0, copies=16):
-    """The trained policy and its lambda."""
+    """The trained policy, its lambda, and the last episodes' seconds in hard contact."""
     torch.set_num_threads(1)
     native = NativeVecEnv(f"tauguard/{task}", copies, **KEYWORDS)
     native.seed(seed)
@@ -83,22 +94,28 @@ def train(task, budget=None, steps=200_000, seed=0, copies=16):
         ent_coef=0.0, learning_rate=lambda left: 5e-4 * left, seed=seed, device="cpu",
         policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7},
     )  # fmt: skip
-    model.learn(steps, callback=Budget(priced, budget))
-    return MlpPolicy.from_sb3(model, envs), priced.price
+    spent = Budget(priced, budget)
+    model.learn(steps, callback=spent)
+    print()
+    return MlpPolicy.from_sb3(model, envs), priced.price, spent.found
 
 
 def main():
     """Train and save."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("task")
-    parser.add_argument("--budget", type=float, default=None)
-    parser.add_argument("--steps", type=int, default=200_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("policy.npz"))
+    parser.add_argument("task", choices=TASKS)
+    parser.add_argument(
+        "--budget", type=float, help="seconds in hard contact an episode of 5 s (default: none)"
+    )
+    parser.add_argument("--steps", type=int, default=200_000, help="actions to learn from")
+    parser.add_argument("--seed", type=int, default=0, help="of everything drawn")
+    parser.add_argument("--out", type=Path, default=Path("policy.npz"), help="file to write")
     options = parser.parse_args()
-    policy, price = train(options.task, options.budget, options.steps, options.seed)
+    policy, price, hard = train(options.task, options.budget, options.steps, options.seed)
     policy.save(options.out)
-    print(f"{options.out}: {policy}, lambda {price:.2f}")
+    print(f"{options.out}: {policy}, lambda {price:.2f}, {hard:.2f} s in hard contact an episode")
+    if options.budget is not None and hard > options.budget:
+        print(f"the budget of {options.budget:g} s is not met: more --steps, or a larger budget")
 
 
 if __name__ == "__main__":
