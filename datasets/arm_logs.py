@@ -68,7 +68,7 @@ def read_one(
     """
     reading = reading or AS_IS
     read = read_log(log, column_map(columns), mend=reading.mend)
-    if reading.resample is not None:
+    if reading.resample != 0:
         read = reduced(read, reading.resample)
     trace, notes = read.trace, read.notes
     if torque:

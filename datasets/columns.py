@@ -149,9 +149,9 @@ class Reading:
     """what CSV files need: deg (angles in degrees), mA, ms, us or ns (time), order (rows are
     sorted by time), repeat, state, nan or tail (rows that repeat a time or the whole state, that
     lack numbers, that are cut off at the end are left out), clock=HZ (no time column)"""
-    resample: float | None = None
+    resample: float = 0.0
     """samples a second [Hz] that logs are reduced to, by means over the interval that ends at each
-    sample: half an interval late, and blurred to an interval"""
+    sample: half an interval late, and blurred to an interval; 0: as they are"""
 
 
 #: Logs as they are.

@@ -30,8 +30,9 @@ def test_the_cross_entropy_method_reaches_targets(tmp_path):
 def test_ppo_learns_and_its_policy_is_the_one_that_was_trained(tmp_path):
     pytest.importorskip("stable_baselines3", reason="the extra `learn` is not installed")
     example = runpy.run_path(str(SOURCE.with_name("learn.py")))
-    policy, price = example["train"]("React-v1", steps=4096, copies=4)
+    policy, price, _ = example["train"]("React-v1", steps=4096, copies=4)
     assert price == 0
     assert policy(np.zeros(30)).shape == (6,)
-    _, dear = example["train"]("TwoArms-v1", budget=-1.0, steps=4096, copies=4)
+    _, dear, hard = example["train"]("TwoArms-v1", budget=-1.0, steps=4096, copies=4)
     assert dear > 1  # no episode can keep a budget below zero
+    assert 0 <= hard <= 5
