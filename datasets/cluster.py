@@ -7,6 +7,8 @@ import logging
 from collections.abc import Callable, Generator, Iterable
 from typing import Any, TypeVar
 
+from tauguard.extras import extra
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -35,7 +37,7 @@ def on_cluster(
     try:
         import ray
     except ImportError:
-        raise ValueError("--ray needs Ray: install tauguard with the extra `distributed`") from None
+        raise ValueError(f"--ray needs {extra('distributed')}") from None
     own = not ray.is_initialized()
     if own:
         _connect(ray, address)

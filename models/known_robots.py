@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from tauguard.extras import extra
 from tauguard.models.robot import Robot, RobotDrive
 
 _READY = (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854)
@@ -190,10 +191,10 @@ def find_file(name: str) -> Path:
             return path
     installs = []
     if urdf is not None:
-        installs.append("install example-robot-data (the extra `arms`)")
+        installs.append(f"install example-robot-data: {extra('arms')}")
     if menagerie is not None:
         installs.append(
-            "install mujoco-menagerie (the extra `arms`) and run "
+            f"install mujoco-menagerie: {extra('arms')} and run "
             f"`tauguard robot {name} --download` once"
         )
     raise FileNotFoundError(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.extras import extra
 from tauguard.traces import Trace
 
 #: Endings that Pillow writes, which comes with Matplotlib.
@@ -118,7 +119,7 @@ def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) 
     try:
         from moviepy import ImageSequenceClip
     except ModuleNotFoundError:
-        raise ValueError(f"{path}: MP4 needs the extra `video`; .gif needs nothing else") from None
+        raise ValueError(f"{path}: MP4 needs {extra('video')}; .gif does not") from None
     shown = list(pictures)
     ImageSequenceClip(shown, fps=rate).write_videofile(str(path), audio=False, logger=None)
     return len(shown)

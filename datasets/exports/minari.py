@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.extras import extra
 from tauguard.traces import Trace
 
 
@@ -32,7 +33,7 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
     try:
         import minari
     except ImportError:
-        raise ValueError("Minari is not there: install tauguard with the extra `export`") from None
+        raise ValueError(f"Minari needs {extra('export')}") from None
     from gymnasium.spaces import Box
 
     if name in minari.list_local_datasets():

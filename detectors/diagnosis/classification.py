@@ -55,12 +55,12 @@ class Signs:
     along: float  #: cosine between force and velocity of the touched point, -1 to 1
     speed: float  #: of the touched point before the alarm [m/s]
 
-    def probabilities(self) -> dict[str, float]:
-        """Of each of :data:`KINDS`; they sum to 1."""
+    def probabilities(self, load_known: bool = False) -> dict[str, float]:
+        """Of each of :data:`KINDS`; they sum to 1. A load that is known does not change."""
         from scipy.special import expit
 
         lasts = float(expit((self.lasting - LASTS) / LASTS_WIDTH))
-        possible = self.reach <= REACH and abs(self.mass) <= HEAVIEST
+        possible = not load_known and self.reach <= REACH and abs(self.mass) <= HEAVIEST
         load = float(expit((self.load - LOAD) / LOAD_WIDTH)) if possible else 0.0
         odds = INTENT[0] + INTENT[1] * np.log10(max(self.rise, 1.0)) + INTENT[2] * self.along
         meant = float(expit(odds))

@@ -114,9 +114,16 @@ class Diagnoser:
     noise_model: NoiseModel | None = None  #: of free motion; None: the arm's noise at every speed
     trust: Trust = field(default_factory=Trust)
     at_tool: bool = False  #: all contacts are at the origin of the last link
+    load_known: bool = False  #: what the arm carries is known and does not change
 
     @classmethod
-    def of(cls, arm: ArmModel, surface: LinkSurface, at_tool: bool = False) -> Diagnoser:
+    def of(
+        cls,
+        arm: ArmModel,
+        surface: LinkSurface,
+        at_tool: bool = False,
+        load_known: bool = False,
+    ) -> Diagnoser:
         """With the noise model that the arm's detector has learned, if there is one.
 
         A detector that reduces the residual of joints with an uncertain payload has a smaller
@@ -126,12 +133,13 @@ class Diagnoser:
             arm: what is believed of the arm.
             surface: its sampled surface.
             at_tool: contacts are known to be at the tool; their force is then sharper.
+            load_known: what the arm carries is known, so no alarm is a change of it.
         """
         known = arm.noise_model
         least = None if known is None or arm.noise is None else known.at_least(arm.noise)
         if at_tool:
             surface = surface.only([arm.robot.joints])
-        return cls(arm, surface, least, at_tool=at_tool)
+        return cls(arm, surface, least, at_tool=at_tool, load_known=load_known)
 
     def diagnose(
         self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
@@ -159,7 +167,7 @@ class Diagnoser:
             sized, force = tool_severity(self.arm, after)
             point = link_poses(robot, after.q[peak]).origin[-1]
         kinds = signs(after, force, self._velocity(link, point, after, peak))
-        fractions = kinds.probabilities()
+        fractions = kinds.probabilities(self.load_known)
         return Diagnosis(
             alarm,
             link + 1,

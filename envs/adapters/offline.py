@@ -10,6 +10,7 @@ import numpy as np
 
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.arrays import Array
+from tauguard.extras import extra
 
 #: Keys of ``info`` that are stored at every step, as ``infos``.
 KEYS = ("cost", "success", "force", "limit_ratio", "tau_ext_peak")
@@ -42,7 +43,7 @@ def record_policy(
     try:
         import minari
     except ImportError:
-        raise ValueError("Minari is not there: install tauguard with the extra `export`") from None
+        raise ValueError(f"Minari needs {extra('export')}") from None
     if episodes < 1:
         raise ValueError(f"episodes {episodes}: expected 1 or more")
     if dataset in minari.list_local_datasets():

@@ -93,7 +93,7 @@ def command(
         seconds = QUIET if quiet is None else quiet
         trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
     found = detect_in_log(alarm, trace)
-    causes, notes = explained(alarm.detector, trace, found, robot, at_tool)
+    causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
     report(result)
@@ -166,7 +166,12 @@ def learned(
 
 
 def explained(
-    detector: Any, trace: Trace, found: LogDetection, robot: Path, at_tool: bool = False
+    detector: Any,
+    trace: Trace,
+    found: LogDetection,
+    robot: Path,
+    at_tool: bool = False,
+    load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """What each alarm was; its torques alone where the robot's file gives no chain of links."""
     from tauguard.detectors import Diagnoser
@@ -192,7 +197,7 @@ def explained(
             "for link and force; with its meshes in or above the file's folder they are "
             "better",
         )
-    found_causes = Diagnoser.of(detector.arm, surface, at_tool).diagnose(trace, alarms)
+    found_causes = Diagnoser.of(detector.arm, surface, at_tool, load_known).diagnose(trace, alarms)
     return [cause(one) for one in found_causes], notes
 
 

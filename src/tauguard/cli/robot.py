@@ -48,12 +48,12 @@ def command(
         model = row.menagerie if row is not None else robot
         if robot in NAMED or model is None:
             raise ValueError(f"--download: {robot} is not in mujoco-menagerie")
+        from tauguard.extras import extra
+
         try:
             menagerie_file(model, download=True)
         except ModuleNotFoundError:
-            raise ValueError(
-                "--download needs mujoco-menagerie: install the extra `arms`"
-            ) from None
+            raise ValueError(f"--download needs mujoco-menagerie: {extra('arms')}") from None
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     scene = compose(SceneSpec(arm=robot), visuals=False)
     gains = Gains.for_scene(scene)

@@ -122,6 +122,14 @@ def test_simulated_contacts_and_payload(trace):
     assert found[2].signs.mass == pytest.approx(2.0, rel=0.1)
 
 
+def test_a_known_load_does_not_change(trace):
+    known = replace(Diagnoser(ARM, link_surface(XML)), load_known=True)
+    found = known.diagnose(trace, alarms(trace))
+    assert [one.collision for one in found] == [True] * 3
+    assert all(one.kinds["payload"] == 0 for one in found)
+    assert sum(found[2].kinds.values()) == pytest.approx(1.0)
+
+
 def test_a_link_that_the_leading_joint_lies_beyond_is_not_named(trace):
     first = Diagnoser(ARM, link_surface(XML)).diagnose(trace, alarms(trace))[0]
     sure = replace(first, links=np.eye(6)[first.link - 1])
