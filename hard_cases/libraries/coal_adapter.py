@@ -27,6 +27,6 @@ def _hull(points: Any) -> Any:
     for point in points:
         cloud.append(np.array(point, dtype=np.float64))
     # coal's own hull builder ends the process if Qhull fails, and Qhull fails on flat bodies.
-    for face in ConvexHull(points).simplices:
+    for face in ConvexHull(points, qhull_options="Qt Pp").simplices:
         triangles.append(coal.Triangle(*map(int, face)))
     return coal.Convex(cloud, triangles)
