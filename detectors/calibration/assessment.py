@@ -76,20 +76,24 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
         ValueError: more than ``UNEXPLAINED`` of a joint's torque is left.
     """
     left, torque = np.zeros(arm.robot.joints), np.full(arm.robot.joints, 1e-12)
+    rows = np.zeros(arm.robot.joints)
     for trace in traces:
         estimator = Estimator(arm, rate, trace.dt, Unknowns.none())
         residual = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
         moves = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
         left += (np.where(moves, residual, 0.0) ** 2).sum(axis=0)
+        rows += moves.sum(axis=0)
         torque += (np.where(moves, trace.current * arm.drive_gain, 0.0) ** 2).sum(axis=0)
     fraction = np.sqrt(left / np.maximum(torque, FAINT**2 * torque.max()))
     worst = int(np.argmax(fraction))
     name = arm.robot.joint_names[worst]
+    error, whole = (float(np.sqrt(x[worst] / max(rows[worst], 1))) for x in (left, torque))
     said = (
-        f"{100 * fraction[worst]:.0f} % of the torque of {name} in motion is not explained: "
-        "friction that changes with temperature, a load that was not named, contacts (nothing may "
-        "touch the arm in these logs), or wrong order, signs, units or gains of the currents or "
-        "torques"
+        f"{100 * fraction[worst]:.0f} % of the torque of {name} in motion is not explained "
+        f"({error:.2g} N m beside {whole:.2g} N m, root mean square): friction that changes with "
+        "temperature, a load that was not named (--payload), contacts (nothing may touch the arm "
+        "in these logs), another arm's robot file, or wrong order, signs, units or gains of the "
+        "currents or torques"
     )
     if fraction[worst] > UNEXPLAINED:
         raise ValueError(said)
