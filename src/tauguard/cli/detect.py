@@ -148,7 +148,10 @@ def learned(
     trace = matched(trace, numbers.joint_names)
     length = float(trace.t[-1] - trace.t[0])
     if not 0 < quiet < length:
-        raise ValueError(f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s")
+        raise ValueError(
+            f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s; or train on logs "
+            "of free motion (`tauguard train --free`) and give --model"
+        )
     rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))
     load = Load() if payload is None else parse_load(payload)
     first = Recording(cut(trace, slice(0, rows)), load)
