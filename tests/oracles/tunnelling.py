@@ -166,6 +166,8 @@ class Tunnelling:
             distance = coal.distance(*a.at(t), *b.at(t), self._request, self._result) - radius
             if distance <= MEET:
                 return 0.0
+            if np.isnan(distance):  # coal could not tell
+                break
             if t >= 1 or t + distance / max(speed, 1e-300) >= 1:
                 return max(float(distance - (1 - t) * speed), 1e-12)
             t += distance / speed
