@@ -55,8 +55,8 @@ def command(
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone, a name that `tauguard robot` lists, or the TOML
             file of `tauguard twin`.
-        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto for what the
-            names and numbers suggest, or a JSON file with the fields of
+        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, libfranka, doosan, lbr),
+            auto for what the names and numbers suggest, or a JSON file with the fields of
             tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque": ["tau1",
             "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
@@ -68,7 +68,7 @@ def command(
         quiet: without --model, seconds from the log's beginning that you vouch for (default: 20); a
             collision in them raises the bounds so that others like it are missed later.
         gains: without --model, N m per ampere, one a joint (known for calibrated robot files and
-            for the preset ur10e; else the masses of the robot file set the scale).
+            for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.
         reading: how logs are read.
         json: write the figures here as JSON.
@@ -149,8 +149,8 @@ def learned(
     length = float(trace.t[-1] - trace.t[0])
     if not 0 < quiet < length:
         raise ValueError(
-            f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s; or train on logs "
-            "of free motion (`tauguard train --free`) and give --model"
+            f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s; or train on "
+            "logs of free motion (`tauguard train --free`) and give --model"
         )
     rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))
     load = Load() if payload is None else parse_load(payload)
