@@ -41,8 +41,8 @@ def impact_zone(
     that the partners of each hit do not move relative to each other (rigid impact zones: Provot
     1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds none, except for
     the work of mocap bodies. The bodies then follow that velocity for the sub-step. Pairs that meet
-    on this new path are added. If this does not end, everything except mocap bodies stands still
-    for the sub-step.
+    on this new path are added. If this does not end, or the inertia that an edit has left gives no
+    finite velocity, everything except mocap bodies stands still for the sub-step.
 
     Args:
         model: MjModel.
@@ -58,7 +58,10 @@ def impact_zone(
     """
     stopped, velocity = list(hits), data.qvel.copy()
     for _ in range(ROUNDS):
-        data.qvel[:], work = _joined(model, data, velocity, stopped, length)
+        joined = _joined(model, data, velocity, stopped, length)
+        if joined is None:
+            break
+        data.qvel[:], work = joined
         data.qpos[:] = qpos
         mujoco.mj_integratePos(model, data.qpos, data.qvel, length)
         more = judge()
@@ -71,11 +74,11 @@ def impact_zone(
 
 def _joined(
     model: Any, data: Any, velocity: Array, hits: Sequence[Hit], length: float
-) -> tuple[Array, float]:
+) -> tuple[Array, float] | None:
     """The velocity nearest to ``velocity`` at which the partners of each hit move as one.
 
-    With rows J, inertia M, mocap velocity c and S the impulses, J M^-1 J' S = J v + c; the
-    field do the work S c.
+    With rows J, inertia M, mocap velocity c and S the impulses, J M^-1 J' S = J v + c; mocap
+    bodies do the work S c. None if a number is not finite, as M^-1 of negative moments of inertia.
     """
     field = MocapVelocityField(model, data, length) if model.nmocap else None
     parts = [_rows(model, data, hit, field) for hit in hits]
@@ -86,8 +89,13 @@ def _joined(
         return velocity, 0.0
     weighted = np.zeros_like(rows)
     mujoco.mj_solveM(model, data, weighted, rows)
-    impulses = np.linalg.lstsq(rows @ weighted.T, rows @ velocity + carried, rcond=1e-10)[0]
-    return np.asarray(velocity - impulses @ weighted), float(impulses @ carried)
+    with np.errstate(all="ignore"):
+        square = rows @ weighted.T
+        if not np.isfinite(square).all():
+            return None
+        impulses = np.linalg.lstsq(square, rows @ velocity + carried, rcond=1e-10)[0]
+        joined = np.asarray(velocity - impulses @ weighted)
+    return (joined, float(impulses @ carried)) if np.isfinite(joined).all() else None
 
 
 def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> tuple[Array, Array]:

@@ -205,6 +205,23 @@ def test_stopped_partners_move_as_one_and_momentum_stays():
     np.testing.assert_array_equal(data.qpos, start)  # what never ends stands still
 
 
+@pytest.mark.filterwarnings("error")
+def test_partners_whose_inertia_is_none_stand_still(capfd):
+    """Negative moments of inertia, as an edit can leave them: M^-1 overflows."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><geom type="box" size="1 1 .001"/>
+      <body pos="0 0 .05"><freejoint/><geom type="box" size=".02 .01 .01" pos=".01 .02 .03"
+      euler="10 20 30" mass=".007"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    model.body_inertia[1] = 2.13e-3, -1.2e-4, -1.05e-4
+    mujoco.mj_forward(model, data)
+    start, data.qvel[2] = data.qpos.copy(), -40
+    hit = Hit((("geom", 0), ("geom", 1)), np.zeros(0, dtype=np.int32))
+    assert impact_zone(model, data, start, 2e-3, [hit], lambda: []) == ([hit], 0.0)
+    np.testing.assert_array_equal(data.qpos, start)
+    assert not data.qvel.any()
+    assert "DLASCL" not in "".join(capfd.readouterr())  # LAPACK was not asked
+
+
 def test_a_state_that_somebody_changes_is_seen():
     """The guard keeps the last step's end; a ball that is put elsewhere starts from there."""
     model, data = ball_cloth(50.0, offset=1.0).start(1e-3)
