@@ -2,6 +2,7 @@
 // more than writing the arrays.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
@@ -79,6 +80,9 @@ class SpareArray {
   std::size_t size() const { return size_; }
   T& operator[](std::size_t i) { return data()[i]; }
   const T& operator[](std::size_t i) const { return data()[i]; }
+  bool operator==(const SpareArray& other) const {
+    return std::equal(data(), data() + size_, other.data(), other.data() + other.size_);
+  }
 
  private:
   std::shared_ptr<void> block_;

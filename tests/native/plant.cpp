@@ -137,8 +137,8 @@ Surroundings around(const Scene& scene) {
     const std::string name = "frame" + std::to_string(k);
     s.regions.push_back(region(scene, name, scene.model->body_mocapid[scene.id(mjOBJ_BODY, name)]));
   }
-  s.people.emplace_back(Anatomy{0.9,  0.5,  0.22, 0.1,  0.09, 0.22, 0.32, 0.25,  0.18,  0.09,
-                                0.42, 0.42, 0.0,  M_PI, 1.0,  0.8,  0.2,  false, false, true});
+  s.people.emplace_back(Anatomy{0.9,  0.5, 0.22, 0.1, 0.09, 0.22, 0.32, 0.25,  0.18,  0.09, 0.42,
+                                0.42, 0.0, M_PI, 1.0, 0.8,  0.2,  0.3,  false, false, true});
   s.sensor_begin = scene.model->sensor_adr[scene.id(mjOBJ_SENSOR, "on_link1")];
   return s;
 }
@@ -165,7 +165,8 @@ Cell::Cell(Mode mode, std::uint64_t seed, bool alone) : scene(mjcf()) {
   rows.target = array({3}), rows.q = array({substeps, n}), rows.qd = array({substeps, n});
   rows.current = array({substeps, n}), rows.tau = array({substeps, n});
   rows.contact = array({substeps, contact_width}), rows.region = array({substeps, regions, 7});
-  rows.tau_peak = array({n}), rows.peak = array({regions, peak_width});
+  rows.tau_peak = array({n});
+  rows.touched = {array({regions}), array({regions}), array({regions, 3}), array({regions, 3})};
   rows.reaches = array({2, reach_rows, reach_width}), rows.walks = array({walk_rows, walk_width});
   for (int k = 0; k < 2 * reach_rows; ++k) {
     double* r = rows.reaches.data() + reach_width * k;
@@ -196,8 +197,9 @@ bool same(const std::vector<double>& a, const std::vector<double>& b) {
 
 std::vector<double> seen(const Cell& cell) {
   std::vector<double> out = cell.plant->state();
-  for (const Held* h : {&cell.rows.observation, &cell.rows.metrics, &cell.rows.tau, &cell.rows.peak,
-                        &cell.rows.contact, &cell.rows.current})
+  for (const Held* h :
+       {&cell.rows.observation, &cell.rows.metrics, &cell.rows.tau, &cell.rows.touched.force,
+        &cell.rows.touched.direction, &cell.rows.contact, &cell.rows.current})
     out.insert(out.end(), h->data(), h->data() + h->size());
   out.insert(out.end(), cell.scene.data->qpos, cell.scene.data->qpos + cell.scene.model->nq);
   return out;
