@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -24,6 +27,19 @@ def answer(model: Any, data: Any) -> float:
     return float(data.sensor("answer").data[-1])
 
 
+@contextlib.contextmanager
+def _quiet_library() -> Iterator[None]:
+    """Nothing reaches the process's standard error: Qhull inside MuJoCo warns of narrow hulls."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
 class MuJoCo:
     """The defaults of ``mj_step`` and of ``mj_geomDistance``."""
 
@@ -38,7 +54,8 @@ class MuJoCo:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
             body = spec.worldbody.add_body(name=name)
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
-        model = spec.compile()
+        with _quiet_library():
+            model = spec.compile()
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         return bool(mujoco.mj_geomDistance(model, data, 0, 1, 1e300, None) <= 0.0)

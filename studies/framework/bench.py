@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from studies import STUDIES
+from studies.framework.jobs import Workers
 from studies.framework.pareto import draw_points
 from studies.framework.rows import Incomplete
 from studies.framework.study import Part, all_parts, find, package
@@ -30,6 +31,7 @@ def command(
     detector: str | None = None,
     robot: str | None = None,
     keep: Path | None = None,
+    workers: int | None = None,
     json: Path | None = None,
     figure: Path | None = None,
     out: Path = Path("bench"),
@@ -48,6 +50,7 @@ def command(
         robot: arms by name or file, separated by commas, for the parts that take any arm.
         keep: folder of the job cache. Jobs whose results it holds are not run again, unless
             versions or the sources of simulation and detectors have changed.
+        workers: processes of the parts that use several (default: all processors).
         json: write the rows here as JSON.
         figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -58,11 +61,14 @@ def command(
     if name == "all":
         from studies.framework.collect import collect
 
-        if part or detector or robot or keep or json or figure:
+        if part or detector or robot or keep or workers or json or figure:
             raise ValueError("bench all takes --quick, --seed and --out alone")
         if collect(out, all_parts(), quick=quick, seed=seed):
             raise SystemExit(1)
         return
+    if workers is not None and workers < 1:
+        raise ValueError(f"--workers {workers}: expected 1 or more")
+    Workers.count = workers
     options = {"detector": detector, "robot": robot, "keep": str(keep) if keep else None}
     given = {option: value for option, value in options.items() if value is not None}
     chosen = _taking(find(name, part), given, name)

@@ -1,16 +1,12 @@
-"""Jobs over processes, and a cache of their results, with which a stopped run continues.
-
-A file of the cache is a pickle. Reading it creates data classes and arrays only, so it cannot run
-code.
-"""
+"""Jobs over processes, and a cache of their results, with which a stopped run continues."""
 
 from __future__ import annotations
 
 import functools
 import hashlib
+import importlib
 import multiprocessing
 import os
-import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
@@ -18,18 +14,11 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from tauguard.atomic_write import atomic_file
+from tauguard.atomic_write import write_atomic
 from tauguard.report import versions
 
-#: Packages whose data classes a result may hold, and NumPy's constructors of arrays and numbers.
+#: Packages whose data classes a kept result may hold.
 OURS = ("tauguard", "studies")
-ARRAYS = {
-    ("numpy", "dtype"),
-    ("numpy", "ndarray"),
-    ("numpy._core.multiarray", "_reconstruct"),
-    ("numpy._core.multiarray", "scalar"),
-    ("numpy._core.numeric", "_frombuffer"),
-}
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
@@ -39,19 +28,22 @@ class Workers:
     Each process has one thread. Results come in the order of the jobs.
     """
 
-    def __init__(self, count: int | None = None) -> None:
-        """Keep the number of processes (default: one a processor)."""
-        self._count = count or os.cpu_count() or 1
+    #: The number of processes; None: one a processor.
+    count: int | None = None
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
         self._processes: Any = None
 
     def __enter__(self) -> Each:
         """Start the processes; the map takes a function of a module and its jobs."""
-        if self._count == 1:
+        count = self.count or os.cpu_count() or 1
+        if count == 1:
             return lambda call, jobs: map(call, jobs)
         context = multiprocessing.get_context("spawn")
         # One thread for each process: linear algebra is many times slower with more threads than
         # processors.
-        self._processes = context.Pool(self._count, threadpool_limits, (1,))
+        self._processes = context.Pool(count, threadpool_limits, (1,))
         imap: Callable[..., Iterator[Any]] = self._processes.imap
         return imap
 
@@ -99,7 +91,7 @@ class JobCache:
     ) -> Iterator[Any]:
         if self.folder is None:
             return each(call, jobs)
-        paths = [self.folder / f"{name}-{k:03d}.pickle" for k in range(len(jobs))]
+        paths = [self.folder / f"{name}-{k:03d}.skops" for k in range(len(jobs))]
         known = [path.exists() for path in paths]
         every = zip(jobs, paths, known, strict=True)
         missing = [(call, job, path) for job, path, done in every if not done]
@@ -123,33 +115,33 @@ class _InOrder:
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
     """Do a job and keep its result in a file."""
+    from skops.io import dumps
+
     call, own, path = job
     result = call(own)
-    with atomic_file(path) as stream:
-        pickle.dump(result, stream)
+    # skops keeps no keys that are tuples.
+    kept = ([*result], [*result.values()]) if isinstance(result, dict) else result
+    write_atomic(path, dumps(kept))
     return result
 
 
 def read(path: Path) -> Any:
     """A result that was kept; ``ValueError`` names a damaged file."""
+    from skops.io import get_untrusted_types, loads
+
     try:
-        with path.open("rb") as stream:
-            return _Results(stream).load()
+        data = path.read_bytes()
+        kept = loads(data, trusted=[t for t in get_untrusted_types(data=data) if _is_result(t)])
     except Exception as error:  # a damaged file can make the reader raise anything
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
+    return dict(zip(*kept, strict=True)) if isinstance(kept, tuple) else kept
 
 
-class _Results(pickle.Unpickler):
-    """Builds arrays, data classes of ours, and classes of a module that the user has named."""
+def _is_result(name: str) -> bool:
+    """Whether a class may be in a result: a data class of ours, or of a module the user named."""
+    from tauguard.detectors.registry import file_type
 
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) not in ARRAYS and module.partition(".")[0] not in OURS:
-            from tauguard.detectors.registry import file_type
-
-            return file_type(f"{module}:{name}")
-        found = super().find_class(module, name)
-        if module.partition(".")[0] in OURS and not (
-            isinstance(found, type) and is_dataclass(found)
-        ):
-            raise ValueError(f"{module}.{name} is no class of results")
-        return found
+    module, _, own = name.rpartition(".")
+    if module.partition(".")[0] in OURS:
+        return is_dataclass(getattr(importlib.import_module(module), own))
+    return isinstance(file_type(f"{module}:{own}"), type)
