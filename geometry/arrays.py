@@ -1,7 +1,5 @@
 """Conversion of arguments to the arrays that native kernels take, with checks."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """Arrays that nobody can change, for native kernels that keep what was checked."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Exact orientation signs (Shewchuk 1997, with dyadic big numbers behind the filter)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

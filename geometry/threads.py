@@ -1,7 +1,5 @@
 """The argument ``threads`` of every native kernel."""
 
-from __future__ import annotations
-
 import operator
 import os
 

@@ -1,7 +1,5 @@
 """What a library implements to be asked, and the adapters there are."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """A case: what is given, where it comes from, and which answers are right."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass

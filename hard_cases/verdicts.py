@@ -1,7 +1,5 @@
 """Every case put to every library: one row an answer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

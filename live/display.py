@@ -1,7 +1,5 @@
 """Display in a separate thread: a slow viewer drops answers and never delays the detector."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Callable

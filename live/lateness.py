@@ -1,7 +1,5 @@
 """The delay of answers: arrival times compared with the robot's own clock."""
 
-from __future__ import annotations
-
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
 #: It is a fault if no sample comes for this time, or if a sample is later than the least late one

@@ -1,7 +1,5 @@
 """Samples from lines of text that another program pipes in."""
 
-from __future__ import annotations
-
 import selectors
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A log as a live source: its samples at their own pace."""
 
-from __future__ import annotations
-
 import time
 
 from tauguard.live.stream import Closing, Sample, StreamClosed

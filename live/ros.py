@@ -1,7 +1,5 @@
 """A ROS 2 topic with sensor_msgs/JointState, where rclpy is there."""
 
-from __future__ import annotations
-
 import math
 import queue
 import threading

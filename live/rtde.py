@@ -5,8 +5,6 @@ port 30004, every packet is its size (uint16, the header's 3 bytes included), it
 a payload; all numbers are big-endian. Protocol version 2 is spoken here.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A clock in a thread of its own watches for silence. The state is a fault as soon
 come for 20 ms, even if the stream blocks, reconnects or receives other packets.
 """
 
-from __future__ import annotations
-
 import gc
 import threading
 import time

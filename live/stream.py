@@ -1,7 +1,5 @@
 """The interface of every robot stream: one sample at a time, read-only."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self

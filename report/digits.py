@@ -1,7 +1,5 @@
 """Numbers in sentences: two digits and no exponent."""
 
-from __future__ import annotations
-
 
 def two_digits(value: float) -> str:
     """Two significant digits, four decimals at most: ``120``, ``4.9``, ``0.03``."""

@@ -1,7 +1,5 @@
 """Rows as a JSON file."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

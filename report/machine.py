@@ -1,7 +1,5 @@
 """The machine and the versions that results were measured with."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import os
 import platform

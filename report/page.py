@@ -1,7 +1,5 @@
 """Rows, text and pictures as one HTML file that needs no other file."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Proportions with their 95 % intervals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -1,7 +1,5 @@
 """Rows as text tables for a terminal."""
 
-from __future__ import annotations
-
 import itertools
 import re
 import textwrap

@@ -8,8 +8,6 @@ give equal bytes. The metadata record ``tauguard.meta`` holds :attr:`Trace.meta`
 :attr:`Trace.attachments`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checked contacts as MCAP messages, a topic ``/contacts/NAME`` a checker."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ are laid out here, as arrays. Topics of one group share their times and are inte
 row, in the order of time.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """The ROS 2 message types of a trace as ``ros2msg`` schemas, with which any MCAP reader decodes."""
 
-from __future__ import annotations
-
 SEPARATOR = "=" * 80
 
 HEADER = "std_msgs/Header"

@@ -1,7 +1,5 @@
 """Times of a trace as MCAP and ROS 2 count them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The writer of MCAP files whose topics are tables: a chunk of messages is packed at once."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """A trace at a lower sample rate, as a slower controller would have logged it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

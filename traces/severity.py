@@ -1,7 +1,5 @@
 """How hard a collision was: strata of the achieved peak torque."""
 
-from __future__ import annotations
-
 #: Severity strata by achieved peak ``|tau_ext|`` over joints 1-4 [N m]: [low, high).
 STRATA = ((4.0, 8.0), (8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, 128.0))
 

@@ -1,7 +1,5 @@
 """A twin as the robot file that the simulator reads: TOML, beside it the bodies as URDF or MJCF."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Friction of each joint: linear least squares with coefficients of 0 or more."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A figure that compares a twin with its arm."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

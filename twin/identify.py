@@ -1,7 +1,5 @@
 """A twin from free logs: the calibrated bodies, friction, and what neither explains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """A twin beside its arm on logs that it has not seen: residuals, their peaks, and a classifier."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The currents that a drive would report along a motion that is given."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.arrays import Array

@@ -1,7 +1,5 @@
 """What a log says before any model of a drive: its motion, and the bodies' torque along it."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Are all logs of one arm, with the loads that were told? Those of another would spoil a twin."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ builder takes the number of triangles to aim for and a seed; the same arguments 
 bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from tauguard.cloth.scenes.ball import turning_ball

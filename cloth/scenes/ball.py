@@ -1,7 +1,5 @@
 """A sheet that falls over a ball, which then turns and winds it up."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.groups import Groups

@@ -1,7 +1,5 @@
 """A sheet crumpled into a ball."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, grid_size, sheet, smooth_step

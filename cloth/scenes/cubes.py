@@ -1,7 +1,5 @@
 """Cubes: pushed together until their faces lie on each other, or dropped on a cloth."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Mats lying on one another, twisted about their long axis."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, grid_size, sheet, smooth_step

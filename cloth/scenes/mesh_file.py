@@ -4,8 +4,6 @@ A line or a count that does not fit is refused. Leaving it out would renumber al
 it.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

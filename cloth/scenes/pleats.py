@@ -1,7 +1,5 @@
 """Pleated ruffles around a body that sways and turns, as a dancer's dress."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.groups import Groups

@@ -1,7 +1,5 @@
 """Recorded sequences: one mesh file a frame, the layout of the UNC dynamic-scene benchmarks."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A rod that is twisted until it coils up and touches itself."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, sheet, smooth_step

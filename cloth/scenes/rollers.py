@@ -1,7 +1,5 @@
 """A soft, bumpy body that is drawn between two rollers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.groups import Groups

@@ -1,7 +1,5 @@
 """A scene: faces, which bodies meet, and the position of every vertex at any time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A long skirt whose wearer sits down: the cloth gathers in folds that lie on one another."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, grid_size, sheet, smooth_step

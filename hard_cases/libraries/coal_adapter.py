@@ -1,7 +1,5 @@
 """coal's GJK on convex hulls."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import coal

@@ -1,7 +1,5 @@
 """The momentum observer as textbooks write it, stepped by explicit Euler; for comparison."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

@@ -1,7 +1,5 @@
 """ipctk's tight-inclusion queries (Wang et al. 2021); times are not rescaled."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import ipctk

@@ -1,7 +1,5 @@
 """MuJoCo: distances of convex meshes, and its own steps, plain and speculative."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """tauguard's own kernels: cloth queries, convex bodies, guarded steps, the momentum observer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

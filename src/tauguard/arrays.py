@@ -1,7 +1,5 @@
 """Types of arrays that every package uses."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

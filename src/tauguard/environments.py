@@ -1,7 +1,5 @@
 """Names of the environments for ``gymnasium.make``; nothing of them is imported before."""
 
-from __future__ import annotations
-
 #: Name -> module and class prefix, and how many actions an episode has.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),

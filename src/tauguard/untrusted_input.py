@@ -1,7 +1,5 @@
 """Reading of untrusted files: whatever is wrong with one becomes a ``ValueError`` of one line."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 from collections.abc import Iterator

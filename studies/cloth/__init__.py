@@ -1,7 +1,5 @@
 """Cloth: whole frames of deforming meshes and single queries, beside ipctk."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ The same queries come again scaled by powers of two, with their vertices in anot
 backwards in time; no answer may change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

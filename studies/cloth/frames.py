@@ -3,8 +3,6 @@
 Everything runs in one thread. Times are those of the processor, without other programs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the parts of the cloth study share: frames, recorded data, ipctk, units of time."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The broad phase: kinds of bounding volumes, and growth with the mesh up to 10^6 triangles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from time import process_time

@@ -1,7 +1,5 @@
 """Contacts: checkers beside MuJoCo's own contacts, and guarded steps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from studies.framework import Part, Point, Study, groups, number, table_rows

@@ -7,8 +7,6 @@ moving ball on cloth with ordinary contacts also under its flags ``speculative``
 those rows equal the plain ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

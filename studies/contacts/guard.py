@@ -5,8 +5,6 @@ decides which scenes are drawn. Table ``overhead`` holds scenes in which nothing
 guarded.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager

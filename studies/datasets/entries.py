@@ -6,8 +6,6 @@ hour. It is judged on the test splits, as by ``tauguard train --traces`` and ``t
 arms; their false alarms stand beside it.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Generation of datasets: speed beside ``mujoco.rollout``, size and reading speed."""
 
-from __future__ import annotations
-
 import io
 import tempfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Collision detection from proprioception, on simulated arms."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -7,8 +7,6 @@ link. ``exact``: ``surface`` with the true external torque; what is wrong then i
 other contacts explain the same torques.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Judged events of the diagnosis study: struck, pushed and loaded arms, and the truth of each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ its own 15 slices with the dissertation's payloads, get their thresholds from ot
 arm, and are judged on motions with payloads that no slice had and no detector is given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ that severe collisions cannot flatter a detector. Plans that found no target, or
 fell into another stratum, are drawn again with another seed until the strata are full.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

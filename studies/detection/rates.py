@@ -5,8 +5,6 @@ payloads. What is counted is other motion of that arm, with payloads that were i
 arm says little of a rate, since a bad moment returns in all of its motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 

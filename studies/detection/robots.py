@@ -6,8 +6,6 @@ CURA6-like arm's drives, as fractions of its torque limits: without losses any d
 Payloads and torques of collisions are smaller on an arm with smaller torque limits.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Rows of the dissertation's experiment, how they are printed, and their figure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -13,8 +13,6 @@ allowances of the position check (a velocity or time stamp one sample late) and 
 torque ratios. On simulated arms only one thing was chosen: a load of training is no fault.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``tauguard bench NAME``: parts of a study, measured, judged, printed and drawn."""
 
-from __future__ import annotations
-
 import importlib
 import io
 from collections.abc import Mapping

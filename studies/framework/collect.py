@@ -1,7 +1,5 @@
 """Run every part in a separate process and write its files into a folder."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The first screen of the report: how fast, how right, how quiet, a sentence and a figure each."""
 
-from __future__ import annotations
-
 import io
 import math
 import statistics

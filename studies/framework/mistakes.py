@@ -1,7 +1,5 @@
 """The part of the report that shows what a detector got wrong, recording by recording."""
 
-from __future__ import annotations
-
 import json
 from html import escape
 from pathlib import Path

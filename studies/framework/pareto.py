@@ -1,7 +1,5 @@
 """Error against microseconds: a figure for each question; peers have their own marks."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """``tauguard report``: the parts of a folder and the hard cases in one HTML file."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

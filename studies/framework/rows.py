@@ -1,7 +1,5 @@
 """What parts share: timings with their spread, lines of the summary, points of the first page."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a study is: named parts, and how the command line finds them."""
 
-from __future__ import annotations
-
 import difflib
 import importlib
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Logs of real arms: pushes found, delays and false alarms, beside public observers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from studies.framework import Part, Point, Study, table_rows

@@ -1,7 +1,5 @@
 """The real arms of the data folder: their logs, and the pushes in them."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path

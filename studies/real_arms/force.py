@@ -12,8 +12,6 @@ pose, where a lever cannot be told from the drives' gains. The sensor's own erro
 its makers' log: its baseline was removed, below 2 N nothing counts as a push.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

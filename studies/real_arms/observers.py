@@ -6,8 +6,6 @@ bandwidth :data:`RATE`. None has thresholds: each joint's is :data:`FACTOR` time
 in the training logs, for :data:`LASTS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

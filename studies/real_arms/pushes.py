@@ -15,8 +15,6 @@ Panda. A fresh arm does a little worse.
 docs/notes/2026-11-24-touches.md lists what was compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 

@@ -6,8 +6,6 @@ them. ``own alarms`` are those of the training's logs, each left out in turn, as
 them; both rates an hour are 95 % intervals.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

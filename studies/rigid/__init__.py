@@ -1,7 +1,5 @@
 """Rigid bodies: overlap, bounding volumes, meshes, distance and time of impact, beside coal."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Lines of the summary: the worst of several values, beside the value that is asked."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from studies.framework import answer, timed

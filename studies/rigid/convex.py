@@ -10,8 +10,6 @@ first separating axis, and has no error bounds. Data layout, compiler flags and 
 as for the other methods. Times are processor time of one thread.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from time import process_time
 

@@ -3,8 +3,6 @@
 The truth is rational arithmetic. coal's own tolerance is 1e-6 of the pair's size.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

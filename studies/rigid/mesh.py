@@ -5,8 +5,6 @@ it the mesh is the Stanford bunny in ``TAUGUARD_DATA/meshes`` or, if that is mis
 one of the bunny's size.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import dataclass

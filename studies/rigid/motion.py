@@ -7,8 +7,6 @@ query. The peer is therefore the textbook method over coal's distance: step by t
 divided by the largest speed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """coal as the peer: its overlap without the time of the call, and advancement over its distance."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -5,8 +5,6 @@ a new pose a ball and an oriented box are moved. An axis-aligned box and an 18-D
 again.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from time import process_time
 from typing import Any

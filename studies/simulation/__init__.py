@@ -1,7 +1,5 @@
 """Simulation and environments: what each modelled thing costs, and what a step's length costs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """What an environment costs beside its physics, many at once, and what reactions are worth."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -7,8 +7,6 @@ reflected mass and from the standard's mass M/2 + m_L. The last column is the pe
 position control.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from oracles import two_mass_impact as impacts

@@ -6,8 +6,6 @@ in the complete one (what is true). If leaving a part out changes neither result
 detector do not need it.
 """
 
-from __future__ import annotations
-
 import functools
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What each modelled thing of a scene costs per step, and error against cost of the time step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

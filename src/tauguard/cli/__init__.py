@@ -5,8 +5,6 @@ turns into flags. It raises ``ValueError`` or ``OSError`` with one helpful line 
 code 2) and ``SystemExit`` with its own code where a script needs to tell outcomes apart.
 """
 
-from __future__ import annotations
-
 import difflib
 import importlib
 import os

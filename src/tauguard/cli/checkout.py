@@ -1,7 +1,5 @@
 """``tauguard bench`` and ``tauguard report`` run ``studies``, which only a checkout has."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

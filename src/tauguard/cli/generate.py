@@ -1,7 +1,5 @@
 """``tauguard generate``: a labelled dataset from its description."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Annotated

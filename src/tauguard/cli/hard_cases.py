@@ -1,7 +1,5 @@
 """``tauguard hard-cases``: cases with exact answers, for tauguard and other libraries."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

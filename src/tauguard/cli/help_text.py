@@ -1,7 +1,5 @@
 """Text that all commands share: arguments of ``--help``, notes."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Iterable

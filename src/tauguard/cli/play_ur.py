@@ -1,7 +1,5 @@
 """``tauguard play-ur LOG``: a robot to test against, on this machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """``tauguard replay PATH``: recordings for rerun, in its own window or in a browser."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

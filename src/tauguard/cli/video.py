@@ -1,7 +1,5 @@
 """``tauguard video RECORDING``: a recording as a picture that moves, without a viewer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

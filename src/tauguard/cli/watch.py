@@ -1,7 +1,5 @@
 """``tauguard watch ENVIRONMENT``: an environment live in the rerun viewer."""
 
-from __future__ import annotations
-
 import ast
 import time
 from pathlib import Path
