@@ -5,8 +5,6 @@ measures the narrow phase alone. ``comparators.hpp`` says what was taken from wh
 and what was inferred.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The result of a step of a mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

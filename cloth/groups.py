@@ -1,7 +1,5 @@
 """Which parts of a mesh may meet."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -13,8 +13,6 @@ that the fixed width decides 3 us. The worst take 200 us for positions of simila
 distance: 4001 cuts, no exact arithmetic, conservative.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

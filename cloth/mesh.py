@@ -8,8 +8,6 @@ the step they have one at each of its ends. This leaves fewer candidates and mis
 ``k_dop.hpp``). And features can be added and removed without a rebuild (``update_topology``).
 """
 
-from __future__ import annotations
-
 import time
 from numbers import Real
 from typing import Any

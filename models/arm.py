@@ -1,7 +1,5 @@
 """An arm ready for a scene: from a name, a file or a :class:`tauguard.models.Robot`."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, field, replace
 from pathlib import Path

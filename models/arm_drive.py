@@ -1,7 +1,5 @@
 """The drives of an arm whose file says little: as stated, assumed, or like the CURA6's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

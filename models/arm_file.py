@@ -1,7 +1,5 @@
 """From a robot file, MJCF or URDF, to a spec that holds one serial arm and stands alone."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ it. Verify the others against the standard before you rely on them. Nothing here
 risk assessment of a real workplace.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What `tauguard calibrate` wrote into a robot file, as the drive that is simulated."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

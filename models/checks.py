@@ -1,7 +1,5 @@
 """Argument checks that name what is wrong and what would work."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

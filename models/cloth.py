@@ -1,7 +1,5 @@
 """A hanging or stretched cloth: MuJoCo's two-dimensional flex."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Numbers that a robot file leaves open, derived from stated ones: each rule with its reason."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

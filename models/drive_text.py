@@ -1,7 +1,5 @@
 """The numbers of a drive as text, which a recording carries with it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, replace
 from typing import Any

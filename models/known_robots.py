@@ -4,8 +4,6 @@ Every number names its source. Numbers that a row leaves out are derived, see
 :mod:`tauguard.models.derive`.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from collections.abc import Mapping

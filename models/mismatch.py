@@ -1,7 +1,5 @@
 """How the simulated arm differs from the nominal one that the observer assumes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import mujoco

@@ -1,7 +1,5 @@
 """Compiling a spec whose meshes are missing, and MJCF text with every digit."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Known defects of MuJoCo versions that change results, and the models that they concern."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The MuJoCo library that the Python binding has loaded, for code that calls it natively."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from pathlib import Path

@@ -5,8 +5,6 @@ below the first top-level body. Here MuJoCo compiles the file, and the Pinocchio
 from the compiled numbers, so that both describe the same arm, for MJCF and URDF alike.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from pathlib import Path

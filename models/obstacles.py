@@ -1,7 +1,5 @@
 """Obstacles that the arm may touch, and contacts of a stated stiffness."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol

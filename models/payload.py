@@ -1,7 +1,5 @@
 """What the arm carries: a body at the flange whose mass changes while the simulation runs."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -4,8 +4,6 @@ MuJoCo's compiler can crash on XML that looks valid, so a file is compiled in a 
 memory and time first.
 """
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache

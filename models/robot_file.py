@@ -1,7 +1,5 @@
 """A robot file with other inertial numbers and a note inside: URDF stays URDF, MJCF stays MJCF."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 

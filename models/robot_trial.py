@@ -3,8 +3,6 @@
 One process is kept for a while: it has loaded MuJoCo, and forks a child for each robot.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

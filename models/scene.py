@@ -1,7 +1,5 @@
 """The scene composer: a :class:`SceneSpec` lists what a scene holds; nothing else is compiled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 

@@ -3,8 +3,6 @@
 trimesh reads STL, OBJ, Collada, PLY, glTF and others, MuJoCo its own MSH.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 import xml.etree.ElementTree as ElementTree

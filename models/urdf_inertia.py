@@ -1,7 +1,5 @@
 """Inertias of a URDF that no body can have, made possible: MuJoCo refuses them."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np

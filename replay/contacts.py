@@ -1,7 +1,5 @@
 """A run of any MuJoCo scene with the contacts that checkers saw in it, as a rerun recording."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path

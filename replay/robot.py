@@ -1,7 +1,5 @@
 """Shapes and poses of the bodies of a MuJoCo model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

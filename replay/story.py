@@ -1,7 +1,5 @@
 """Guidance for the viewer of a recording: the first detection, and a page of text."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -5,8 +5,6 @@ make wrong; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and sing
 volumes, which are built, moved and tested as in figure 1.1 of the dissertation.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

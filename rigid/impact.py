@@ -1,7 +1,5 @@
 """Time of impact of bodies under linear and angular motion."""
 
-from __future__ import annotations
-
 from typing import cast, overload
 
 import numpy as np

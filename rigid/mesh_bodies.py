@@ -1,7 +1,5 @@
 """A mesh against convex bodies, for `overlap`, `distance` and `time_of_impact`."""
 
-from __future__ import annotations
-
 from typing import cast
 
 import numpy as np

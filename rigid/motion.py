@@ -1,7 +1,5 @@
 """Rigid poses and motions, checked."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Overlap of coherent frames: the separating planes of the last frame are tried first."""
 
-from __future__ import annotations
-
 from threading import Lock
 
 import numpy as np

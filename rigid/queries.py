@@ -6,8 +6,6 @@ functions scaled by determinants, redundant combinations left out); ``sat`` test
 bounds. What they cannot decide goes to exact arithmetic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal, get_args

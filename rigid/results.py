@@ -1,7 +1,5 @@
 """Answers of the queries, row by row: frozen values of arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

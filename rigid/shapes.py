@@ -7,8 +7,6 @@ A batch keeps its own copy of its arrays, which nobody can change, so the kernel
 checked.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

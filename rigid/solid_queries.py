@@ -1,7 +1,5 @@
 """Distance and overlap of convex bodies, with or without radii."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

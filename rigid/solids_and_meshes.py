@@ -1,7 +1,5 @@
 """Overlap and distance of convex bodies, rounded or not, and of a mesh beside them."""
 
-from __future__ import annotations
-
 from typing import Literal, cast, get_args, overload
 
 from tauguard.rigid import mesh_bodies

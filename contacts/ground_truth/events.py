@@ -1,7 +1,5 @@
 """From contacts in single steps to events, and which events a checker saw."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Which geoms and flexes may touch by MuJoCo's rules: a second, independent implementation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

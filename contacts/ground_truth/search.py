@@ -7,8 +7,6 @@ than the resolution (Piyavskii 1972; the same bound moves a conservative advance
 alone would prove nothing about the times between them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Which pairs touch on the path that checkers get, and when."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Distances between flex elements (triangles) and geoms, row by row, in closed form or by coal."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import coal

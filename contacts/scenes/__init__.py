@@ -1,7 +1,5 @@
 """Scenes in which contacts are hard to find, each holding only what it needs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from tauguard.contacts.scenes.arms import arm_boxes, two_arms

@@ -1,7 +1,5 @@
 """Arms that touch rigid things: boxes on both sides, and one another over a table."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -1,7 +1,5 @@
 """The control of the arms in contact scenes: stiff position control along a function of time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

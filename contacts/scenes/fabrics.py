@@ -1,7 +1,5 @@
 """Fabrics and bodies: a hanging cloth in the arm's way, a sleeve over it, a garment on a chest."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

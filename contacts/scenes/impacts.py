@@ -1,7 +1,5 @@
 """Fast spheres against thin objects, which steps of fixed length skip."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -1,7 +1,5 @@
 """A contact scene: a compiled model, its first state, and its control."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A mesh that falls onto the table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco

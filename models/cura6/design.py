@@ -4,8 +4,6 @@ After a change of a number, ``mjcf()`` gives the file's new text (a test holds t
 README.md beside this file gives the source of each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ They are designs, not products. They test whether something works on arms that i
 developed on.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from tauguard.models.cura6.design import FLANGE, LINKS, Link, Part
