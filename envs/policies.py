@@ -15,6 +15,8 @@ from tauguard.untrusted_input import reading
 
 #: Observations are normalised and cut to this many standard deviations, as VecNormalize does.
 CLIP = 10.0
+#: A policy's statistics of observations count as this many when learning goes on.
+SEEN = 1e5
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +83,37 @@ class MlpPolicy:
                 raise ValueError("layers that do not fit one another")
             return cls(arrays["mean"], arrays["deviation"], weights, biases)
 
+    def to_sb3(self, model: Any, normalize: Any) -> None:
+        """Give a Stable-Baselines3 actor-critic this mean action, to go on learning from.
+
+        Raises:
+            ValueError: layers of other sizes, or an environment of other observations.
+        """
+        rms, layers = normalize.obs_rms, _actor(model)
+        found = [tuple(layer.weight.shape) for layer in layers]
+        if found != [weight.shape for weight in self.weights]:
+            raise ValueError(f"{self}: the learner's layers have the shapes {found}")
+        for layer, weight, bias in zip(layers, self.weights, self.biases, strict=True):
+            layer.weight.data[:] = layer.weight.new_tensor(weight)
+            layer.bias.data[:] = layer.bias.new_tensor(bias)
+        rms.mean, rms.var, rms.count = self.mean, self.deviation**2 - normalize.epsilon, SEEN
+
     @classmethod
     def from_sb3(cls, model: Any, normalize: Any) -> MlpPolicy:
         """The mean action of a Stable-Baselines3 actor-critic with a ``VecNormalize``."""
-        net = model.policy
-        layers = [part for part in net.mlp_extractor.policy_net if hasattr(part, "weight")]
-        layers.append(net.action_net)
-        rms = normalize.obs_rms
+        rms, layers = normalize.obs_rms, _actor(model)
         return cls(
             np.asarray(rms.mean),
             np.sqrt(np.asarray(rms.var) + normalize.epsilon),
             tuple(layer.weight.detach().numpy().astype(float) for layer in layers),
             tuple(layer.bias.detach().numpy().astype(float) for layer in layers),
         )
+
+
+def _actor(model: Any) -> list[Any]:
+    """The layers of an actor-critic that lead to the mean action."""
+    net = model.policy
+    return [
+        *(part for part in net.mlp_extractor.policy_net if hasattr(part, "weight")),
+        net.action_net,
+    ]

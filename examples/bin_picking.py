@@ -39,7 +39,7 @@ def main(picture=None, seconds=8.0):
             worst[name] = max(worst[name], force)
     for name in (name for name in names if worst[name] > 0):
         print(f"{name:<18} {worst[name]:6.0f} N")
-    print(f"cost {info['cost_sum']:.0f} N")
+    print(f"cost {info['cost_sum']:.2f} N s")
     if picture:
         import matplotlib.pyplot as plt
 

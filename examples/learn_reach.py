@@ -14,7 +14,7 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 
-PRICE = 0.002  # of a newton beyond a body region's limit, beside 1 for a reached target
+PRICE = 1.0  # of a newton second beyond the limits, beside 1 for a reached target
 EPISODES, ELITE = 4, 0.25
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
 
 #: Colours of the sky above and at the horizon, and of the floor.
 SKY, FLOOR_COLOUR = ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90)), (0.80, 0.82, 0.85, 1.0)
@@ -16,10 +19,31 @@ FLOOR = (8.0, 8.0, 1.0)
 LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
 #: Light of the camera: from everywhere, and from in front.
 AMBIENT, DIFFUSE = 0.35, 0.4
+#: Height of the floor where nothing stands lower [m].
+FLOOR_HEIGHT = -0.001
+#: What an arm stands on where the floor is lower: half its extents [m] and colour.
+PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
+#: Radius [m] and colour of the ball that marks a target; width [m] and colour of an arrow.
+MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
+ARROW_WIDTH, ARROW_COLOUR = 0.012, (0.85, 0.1, 0.1, 1.0)
 
 
-def staged(spec: mujoco.MjSpec, floor: float) -> mujoco.MjModel:
-    """The model of ``spec`` with sky, lamp and a floor at a height [m], which only show."""
+def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -> mujoco.MjModel:
+    """The model of ``spec`` with sky, lamp and a floor at a height [m], which only show.
+
+    Arms at ``bases`` [m] get a pedestal where the floor is below them.
+    """
+    height = (FLOOR_HEIGHT - floor) / 2
+    for base in bases if height > 0 else ():
+        x, y, _ = np.asarray(base, dtype=float).tolist()
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[*PEDESTAL, height],
+            pos=[x, y, FLOOR_HEIGHT - height],
+            rgba=PEDESTAL_COLOUR,
+            contype=0,
+            conaffinity=0,
+        )
     bright, blue = SKY
     spec.add_texture(
         name="sky",
@@ -49,6 +73,30 @@ def staged(spec: mujoco.MjSpec, floor: float) -> mujoco.MjModel:
     model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = AMBIENT, DIFFUSE
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 8, 2048
     return model
+
+
+def _next(scene: Any, kind: Any, rgba: Any) -> Any:
+    """The next free shape of a ``MjvScene``; None where it is full."""
+    if scene.ngeom >= scene.maxgeom:
+        return None
+    shape, scene.ngeom = scene.geoms[scene.ngeom], scene.ngeom + 1
+    colour = np.array(rgba, dtype=np.float32)
+    mujoco.mjv_initGeom(shape, kind, np.full(3, MARK), np.zeros(3), np.eye(3).ravel(), colour)
+    return shape
+
+
+def mark(scene: Any, targets: ArrayLike) -> None:
+    """Add a ball at each target to a ``MjvScene``; shape (arms, 3) [m]."""
+    for target in np.asarray(targets, dtype=float):
+        if (ball := _next(scene, mujoco.mjtGeom.mjGEOM_SPHERE, MARK_COLOUR)) is not None:
+            ball.pos[:] = target
+
+
+def point_at(scene: Any, point: ArrayLike, vector: ArrayLike) -> None:
+    """Add an arrow [m] that ends at a point [m] to a ``MjvScene``."""
+    end, kind = np.asarray(point, dtype=float), mujoco.mjtGeom.mjGEOM_ARROW
+    if (arrow := _next(scene, kind, ARROW_COLOUR)) is not None:
+        mujoco.mjv_connector(arrow, kind, ARROW_WIDTH, end - np.asarray(vector, dtype=float), end)
 
 
 @contextmanager

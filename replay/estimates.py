@@ -1,4 +1,4 @@
-"""Arrows that show a viewer the contact estimated after each alarm."""
+"""Arrows that show a viewer a force, and the contact estimated after each alarm."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from tauguard.traces.trace import Alarm
 
 #: An estimate is shown from its alarm on for at least this time [s].
 SHOWN = 0.5
+#: Length of a force's arrow [m/N], so that 100 N are 0.2 m, and the largest length [m].
+ARROW, LONGEST_ARROW = 2e-3, 0.5
 
 
 class Explained(Protocol):
@@ -53,18 +55,20 @@ def during(explained: Sequence[Explained], frames: Array) -> list[Explained | No
     return found
 
 
-def arrows(shown: Sequence[Explained | None], metres: float, longest: float) -> dict[str, Any]:
+def arrow(force: Array) -> Array:
+    """Vectors [m] that show forces [N], shape (..., 3)."""
+    size = np.maximum(np.linalg.norm(force, axis=-1, keepdims=True), 1e-12)
+    return np.asarray(force / size * np.minimum(ARROW * size, LONGEST_ARROW))
+
+
+def arrows(shown: Sequence[Explained | None]) -> dict[str, Any]:
     """Arrows that end at the points: vectors, origins, labels, and the number at each frame.
 
     Args:
         shown: at most one for each frame.
-        metres: length of one newton [m/N].
-        longest: no arrow is longer [m].
     """
     some = [one for one in shown if one is not None]
-    force = np.array([one.force for one in some]).reshape(-1, 3)
-    size = np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-12)
-    vectors = force / size * np.minimum(metres * size, longest)
+    vectors = arrow(np.array([one.force for one in some]).reshape(-1, 3))
     points = np.array([one.point for one in some]).reshape(-1, 3)
     return {
         "vectors": vectors,

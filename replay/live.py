@@ -15,8 +15,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.replay.estimates import arrow
 from tauguard.replay.robot import bodies
-from tauguard.replay.rrd import ARROW, COLOURS, GREEN, LONGEST_ARROW, RED, TIMELINE, drawn, entity
+from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, drawn, entity
 
 #: The only address that the viewer listens on; the longest wait for it [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
@@ -98,13 +99,12 @@ class LiveView:
 
     def contact(self, point: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Show an arrow at ``point`` [m] along ``force`` [N]; a zero force removes it."""
-        size = float(np.linalg.norm(force))
-        if size == 0:
+        if not force.any():
             self._recording.log("scene/contact", rr.Clear(recursive=False))
             return
-        arrow = force / size * min(ARROW * size, LONGEST_ARROW)
+        vector = arrow(force)
         self._recording.log(
-            "scene/contact", rr.Arrows3D(origins=[point - arrow], vectors=[arrow], colors=[RED])
+            "scene/contact", rr.Arrows3D(origins=[point - vector], vectors=[vector], colors=[RED])
         )
 
     def chart(self, origin: str, names: list[str], values: ArrayLike) -> None:

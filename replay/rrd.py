@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.replay.estimates import Explained, arrows, during
+from tauguard.replay.estimates import Explained, arrow, arrows, during
 from tauguard.replay.robot import Body, Motion, Shape, bodies, load_model, motion, quats_wxyz
 from tauguard.replay.story import cut, first_moment, page
 from tauguard.traces.trace import Detection, Trace
@@ -25,8 +25,6 @@ SERIES_RATE = 200.0  # [Hz] of the charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
 SCORE_TOP = 8.0  # times the threshold: end of the chart of the score, so that both are visible
-ARROW = 2e-3  # [m/N]: 100 N is drawn 0.2 m long
-LONGEST_ARROW = 0.5  # [m]
 NORMAL = 0.06  # [m], length of a checked contact's normal
 COLOURS = np.array(
     [
@@ -232,12 +230,11 @@ def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> Non
     rows = np.array([a + np.argmax(size[a:b]) for a, b in zip(starts, ends, strict=True)])
     there = (size[rows] > 0) & np.isfinite(truth.contact_point[rows]).all(axis=1)
     points, forces = truth.contact_point[rows][there], truth.contact_vector[rows][there]
-    length = np.minimum(ARROW * size[rows][there], LONGEST_ARROW)
-    arrows = forces / size[rows][there][:, None] * length[:, None]
+    vectors = arrow(forces)
     labels = [f"{value:.0f} N" for value in size[rows][there]]
     when, lengths = times(trace.t[starts]), there.astype(int)
     columns = [
-        *rr.Arrows3D.columns(vectors=arrows, origins=points - arrows, labels=labels),
+        *rr.Arrows3D.columns(vectors=vectors, origins=points - vectors, labels=labels),
     ]
     styles = rr.Arrows3D.from_fields(radii=0.012, colors=RED, show_labels=True)
     recording.log("scene/contact_force", styles, static=True)
@@ -277,7 +274,7 @@ def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) 
     if not explained:
         return
     frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
-    drawn_arrows = arrows(during(explained, frames), ARROW, LONGEST_ARROW)
+    drawn_arrows = arrows(during(explained, frames))
     lengths = drawn_arrows.pop("lengths")
     place = "scene/estimated_force"
     styles = rr.Arrows3D.from_fields(radii=0.012, colors=BLUE, show_labels=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.extras import extra
-from tauguard.traces import Trace
+from tauguard.replay.estimates import arrow
+from tauguard.traces import TARGETS, Trace
 
 #: Endings that Pillow writes, which comes with Matplotlib.
 PILLOW = (".gif", ".webp", ".png")
@@ -28,6 +31,8 @@ def frames(
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a recording that holds its scene, shape (height, width, 3).
 
+    They show targets as balls, and an arrow for the strongest contact since the last picture.
+
     Args:
         trace: as :func:`tauguard.traces.read_mcap` gives it.
         start: of what is drawn [s].
@@ -42,8 +47,7 @@ def frames(
     """
     import mujoco
 
-    from tauguard.models.picture import opengl, staged
-    from tauguard.replay.robot import load_model
+    from tauguard.models.picture import mark, opengl, point_at
 
     if "scene.xml" not in trace.attachments:
         raise ValueError("the recording holds no scene: only those of a simulation can be drawn")
@@ -51,8 +55,7 @@ def frames(
     rows = np.searchsorted(trace.t, np.arange(start, end, 1 / rate))
     if not len(rows) or start < trace.t[0] - 1:
         raise ValueError(f"nothing from {start:g} s on: it has {trace.t[0]:g} to {trace.t[-1]:g} s")
-    load_model(trace.attachments["scene.xml"])  # refuses what MuJoCo does not survive
-    model = staged(mujoco.MjSpec.from_string(trace.attachments["scene.xml"]), -0.001)
+    model = _stage(trace, int(rows[0]))
     model.vis.global_.offheight, model.vis.global_.offwidth = size
     data = mujoco.MjData(model)
     camera, options = mujoco.MjvCamera(), mujoco.MjvOption()
@@ -67,12 +70,54 @@ def frames(
     with opengl():
         renderer = mujoco.Renderer(model, *size)
     try:
-        for row in rows:
+        for last, row in zip([rows[0], *rows[:-1]], rows, strict=True):
             place(int(row))
             renderer.update_scene(data, camera, options)
+            mark(renderer.scene, _targets(trace, float(trace.t[row])))
+            for point, force in _contact(trace, int(last), int(row)):
+                point_at(renderer.scene, point, arrow(force))
             yield renderer.render().copy()
     finally:
         renderer.close()
+
+
+def _stage(trace: Trace, row: int) -> Any:
+    """The recording's scene on a floor below everything that it shows."""
+    import mujoco
+
+    from tauguard.models.picture import FLOOR_HEIGHT, staged
+    from tauguard.replay.robot import load_model
+
+    text = trace.attachments["scene.xml"]
+    model = load_model(text)  # refuses what MuJoCo does not survive
+    data = mujoco.MjData(model)
+    _placer(model, data, trace)(row)
+    plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    shown = np.flatnonzero((model.geom_group < 3) & ~plane)
+    up, box = data.geom_xmat.reshape(-1, 3, 3)[shown, 2], model.geom_aabb[shown]
+    middle = data.geom_xpos[shown, 2] + (up * box[:, :3]).sum(axis=1)
+    low = middle - (np.abs(up) * box[:, 3:]).sum(axis=1)
+    roots = {int(model.body_rootid[model.joint(name).bodyid[0]]) for name in trace.joint_names}
+    floor = min(FLOOR_HEIGHT, float(low.min(initial=0.0)))
+    spec = mujoco.MjSpec.from_string(text)
+    return staged(spec, floor, [model.body_pos[root] for root in sorted(roots)])
+
+
+def _targets(trace: Trace, t: float) -> Any:
+    """Where the targets were at a time [m], shape (arms, 3); none in other recordings."""
+    rows = json.loads(trace.attachments.get(TARGETS, "[]"))
+    return next((places for begin, places in reversed(rows) if begin <= t), np.zeros((0, 3)))
+
+
+def _contact(trace: Trace, last: int, row: int) -> Iterator[tuple[Array, Array]]:
+    """Point [m] and force [N] of the strongest contact after one row until another."""
+    if trace.truth is None:
+        return
+    some = slice(min(last + 1, row), row + 1)
+    points, forces = trace.truth.contact_point[some], trace.truth.contact_vector[some]
+    strongest = int(np.linalg.norm(forces, axis=1).argmax())
+    if forces[strongest].any() and np.isfinite(points[strongest]).all():
+        yield points[strongest], forces[strongest]
 
 
 def _placer(model: Any, data: Any, trace: Trace) -> Any:

@@ -9,11 +9,12 @@ if TYPE_CHECKING:
     from tauguard.traces.mcap import read_mcap, write_mcap
     from tauguard.traces.resample import resampled
     from tauguard.traces.severity import STRATA, stratum
-    from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
+    from tauguard.traces.trace import KINDS, TARGETS, Alarm, Collision, Detection, Trace, Truth
 
 __all__ = [
     "KINDS",
     "STRATA",
+    "TARGETS",
     "Alarm",
     "CheckedContacts",
     "Collision",

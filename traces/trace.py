@@ -12,6 +12,9 @@ from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
+#: Attachment of an environment's recording: JSON rows of a time [s] and each tool's target from
+#: then on [m].
+TARGETS = "targets.json"
 
 
 @dataclass(frozen=True)

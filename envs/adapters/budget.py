@@ -24,7 +24,7 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
 
         Args:
             env: an environment of tauguard.
-            limit: the sum of ``info["cost"]`` that an episode may reach [N]; 0 allows none.
+            limit: the sum of ``info["cost"]`` that an episode may reach [N s]; 0 allows none.
 
         Raises:
             ValueError: below 0 or not finite.
@@ -54,7 +54,7 @@ class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     """``step`` returns six values with the cost third, as Safety-Gymnasium's do.
 
     observation, reward, cost, terminated, truncated, info: what OmniSafe, SafePO and others read.
-    ``scale`` makes the cost a number near 1, as their default budgets expect.
+    ``scale`` turns newton seconds into the unit of their budgets.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], scale: float = 1.0) -> None:
@@ -62,7 +62,7 @@ class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
 
         Args:
             env: an environment whose ``info`` has a cost.
-            scale: [1/N] the cost is multiplied by this.
+            scale: [1/(N s)] the cost is multiplied by this.
 
         Raises:
             ValueError: a scale that is not above 0.

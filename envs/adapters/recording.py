@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import find_alarms
 from tauguard.envs.episodes.labels import Wrenches, collisions
 from tauguard.envs.gym.base import ArmEnv, arm_env
-from tauguard.traces import Detection, Trace, Truth, write_mcap
+from tauguard.traces import TARGETS, Detection, Trace, Truth, write_mcap
 
 
 @dataclass
@@ -33,6 +34,7 @@ class _Rows:
     region: list[NDArray[np.void]] = field(default_factory=list)
     residual: list[Array] = field(default_factory=list)
     alarm: list[NDArray[np.bool_]] = field(default_factory=list)
+    targets: list[tuple[float, Any]] = field(default_factory=list)  #: from when on [s], places [m]
 
 
 class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
@@ -40,8 +42,8 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
 
     A recording has a row for every physics step: measured (where the drive has sensors and a
     detector or noise is on) or true positions, velocities and currents, and the truth: external
-    torque, contact force, link and point, collisions, where the body regions were. With a detector
-    its residual and alarms are in it. ``tauguard replay`` shows it.
+    torque, contact force, link and point, collisions, where the body regions and targets were.
+    With a detector its residual and alarms are in it. ``tauguard replay`` shows it.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], folder: str | Path) -> None:
@@ -66,8 +68,12 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
         """Act, and store the rows of the action."""
+        targets = self._arm.batch.target[0].tolist()
         result = self.env.step(action)
         if not self._arm.batch.metrics["diverged"][0]:
+            if not self._rows.targets or self._rows.targets[-1][1] != targets:
+                done = sum(len(part) for part in self._rows.q)
+                self._rows.targets.append((done * self._arm.compiled.settings.timestep, targets))
             self._keep()
         if result[2] or result[3]:
             self._finish()
@@ -134,7 +140,11 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
                 "tauguard": importlib.metadata.version("tauguard"),
                 "mujoco": mujoco.__version__,
             },
-            attachments={"scene.xml": compiled.scene.xml, **compiled.scene.nominal_texts},
+            attachments={
+                "scene.xml": compiled.scene.xml,
+                TARGETS: json.dumps(rows.targets),
+                **compiled.scene.nominal_texts,
+            },
         )
 
     def _truth(

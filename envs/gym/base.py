@@ -105,8 +105,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     The keywords are those of :class:`tauguard.envs.gym.settings.Settings` and of the task.
 
     Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
-    ``success``, ``force`` (peak on a link [N]), ``cost`` (peak force on body regions beyond their
-    limits, and of two arms on one another [N]), ``cost_sum`` (of the episode [N]), ``pressure``
+    ``success``, ``force`` (peak on a link [N]), ``cost`` (impulse of forces on body regions beyond
+    their limits, and of two arms on one another [N s]; of a force no more than the arm would exert
+    if nobody else moved), ``cost_sum`` (of the episode [N s]), ``pressure``
     (peak mean pressure [N/cm^2], where the keyword ``contact_area`` says the area; else it is 0),
     ``limit_ratio`` (peak force over the region's transient limit, or its quasi-static one after 0.5
     s of contact or where the region cannot move), ``region`` (of that ratio, 1-based, 0 for none;

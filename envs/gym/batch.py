@@ -35,7 +35,7 @@ class StepMetrics(NamedTuple):
     time: Any  #: since the episode began [s]
     distance: Any  #: of the tool, of several the farthest, from its target [m]
     force: Any  #: largest force on a link [N]
-    cost: Any  #: largest sum over the body regions of forces beyond their limits [N]
+    cost: Any  #: impulse of the arm beyond the limits of the body regions [N s]
     limit_ratio: Any  #: largest force on a body region divided by its limit
     region_force: Any  #: largest force on a body region [N]
     onset: Any  #: a collision began
@@ -44,7 +44,7 @@ class StepMetrics(NamedTuple):
     region: Any  #: of the largest ratio, 1-based; 0: none
     diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
     speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
-    cost_sum: Any  #: of the costs of the episode's actions so far [N]
+    cost_sum: Any  #: of the costs of the episode's actions so far [N s]
 
 
 #: The same fields as columns of :attr:`Batch.metrics`.
@@ -408,6 +408,7 @@ def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:
         speed=region.speed,
         area=compiled.settings.contact_area or 0.0,
         least_pressure=region.least_pressure,
+        stiffness=region.stiffness,
     )
 
 

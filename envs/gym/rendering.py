@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -13,20 +12,14 @@ from numpy.typing import NDArray
 
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.second_arm import APART
-from tauguard.models.picture import opengl, staged
+from tauguard.models.picture import FLOOR_HEIGHT, mark, opengl, staged
 
 #: Of a picture [px].
 HEIGHT, WIDTH = 480, 640
 #: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
 SHOWN = (0, 1, 2)
-#: Height of the floor that is drawn, not simulated, where nobody stands lower [m].
-FLOOR_HEIGHT = -0.001
-#: What an arm stands on where people stand lower: half its extents [m] and colour.
-PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
 #: Shadows fall this far from the middle of the scene [m].
 SHADOW_REACH = 3.0
-#: Radius [m] and colour of the ball that marks a target.
-MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
 
 
 def _need_display() -> None:
@@ -45,19 +38,7 @@ def _staged(compiled: CompiledScene) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(compiled.scene.xml)
     person = compiled.person
     floor = FLOOR_HEIGHT if person is None else person.floor
-    if floor < FLOOR_HEIGHT:
-        height = (FLOOR_HEIGHT - floor) / 2
-        for base in _bases(compiled):
-            place = [base[0], base[1], FLOOR_HEIGHT - height]
-            _draw(spec, mujoco.mjtGeom.mjGEOM_BOX, [*PEDESTAL, height], place, PEDESTAL_COLOUR)
-    return staged(spec, floor)
-
-
-def _draw(
-    spec: mujoco.MjSpec, kind: Any, size: Sequence[float], place: Sequence[float], rgba: Any
-) -> None:
-    """A visual shape."""
-    spec.worldbody.add_geom(type=kind, size=size, pos=place, rgba=rgba, contype=0, conaffinity=0)
+    return staged(spec, floor, _bases(compiled))
 
 
 def _bases(compiled: CompiledScene) -> list[NDArray[np.float64]]:
@@ -102,21 +83,6 @@ class Stage:
         for place in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):
             place(model, drawn)
 
-    def mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
-        """A ball at each target."""
-        for target in targets:
-            if scene.ngeom >= scene.maxgeom:
-                return
-            mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom],
-                mujoco.mjtGeom.mjGEOM_SPHERE,
-                np.full(3, MARK),
-                np.array(target),
-                np.eye(3).ravel(),
-                np.array(MARK_COLOUR, dtype=np.float32),
-            )
-            scene.ngeom += 1
-
 
 class Camera(Stage):
     """An off-screen camera that draws one copy of a compiled scene."""
@@ -160,7 +126,7 @@ class Camera(Stage):
     def _render(self, targets: NDArray[np.float64]) -> Any:
         self.follow()
         self._renderer.update_scene(self.drawn, self._camera, self._options)
-        self.mark(self._renderer.scene, targets)
+        mark(self._renderer.scene, targets)
         return self._renderer.render()
 
     def close(self) -> None:
@@ -193,7 +159,7 @@ class Window(Stage):
             self.follow()
             scene = self._window.user_scn
             scene.ngeom = 0
-            self.mark(scene, targets)
+            mark(scene, targets)
         self._window.sync()
 
     def close(self) -> None:

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 #include "drive.hpp"
@@ -167,5 +168,17 @@ struct Controls {
     }
   }
 };
+
+// Whether a number can be a value of this type; what counts or chooses is a whole number.
+template <class T>
+inline bool holds(const T&, double number) {
+  if constexpr (std::is_same_v<T, double>) return true;
+  const double most = std::is_same_v<T, bool>   ? 1
+                      : std::is_enum_v<T>       ? static_cast<double>(Override::brake)
+                      : sizeof(T) > sizeof(int) ? 0x1p53
+                                                : 0x1p31 - 1;
+  const bool below_zero = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+  return number == std::floor(number) && number <= most && number >= (below_zero ? -most : 0);
+}
 
 }  // namespace tauguard::envs

@@ -43,6 +43,13 @@ struct Kinematics {
     return links[i].slide ? axis(i) : cross(axis(i), p - anchor(i));
   }
 
+  // Of the point p of a link at joint velocities qd.
+  Vec3 velocity(std::size_t link, Vec3 p, const double* qd) const {
+    Vec3 v;
+    for (std::size_t i = begin(link); i <= link; ++i) v = v + qd[i] * lever(i, p);
+    return v;
+  }
+
   Vec3 tool(const Tool& t) const {
     return load(t.site >= 0 ? physics->site_position(t.site) : physics->position(t.body));
   }

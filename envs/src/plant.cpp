@@ -2,10 +2,6 @@
 // it is the same for any number of threads.
 #include "plant.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -15,27 +11,14 @@
 #include <string>
 #include <utility>
 
+#include "bindings.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using namespace tauguard::envs;
+using namespace nb::literals;
 
 namespace {
-
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Numbers = std::vector<double>;
-// An array that Python made and the plant reads or writes.
-using Array = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
-
-// The same for the plant, which keeps the array alive.
-Held held(const Array& array) {
-  Held out(array.data(), {}, std::make_shared<Array>(array));
-  for (std::size_t k = 0; k < array.ndim(); ++k) out.add_axis(array.shape(k));
-  return out;
-}
 
 // The arrays that MuJoCo's Python binding shows; model and data are kept alive.
 Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
@@ -171,163 +154,6 @@ void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
   }
 }
 
-void bind_joint(nb::module_& m) {
-  nb::class_<Joint>(m, "Joint")
-      .def(
-          "__init__",
-          [](Joint* self, int qpos, int dof, double gain, double nominal_gain, double current_limit,
-             double gear, double coulomb, double breakaway, double stribeck_velocity,
-             double viscous, double bristle_stiffness, double load, double kp, double kd,
-             double rated_speed, double no_load_speed, double known_coulomb, double known_viscous,
-             Numbers cycles, Numbers amplitude, Numbers phase, Numbers slope,
-             Numbers slope_velocity) {
-            *new (self) Joint() = {qpos,
-                                   dof,
-                                   gain,
-                                   nominal_gain,
-                                   current_limit,
-                                   gear,
-                                   coulomb,
-                                   breakaway,
-                                   stribeck_velocity,
-                                   viscous,
-                                   bristle_stiffness,
-                                   load,
-                                   kp,
-                                   kd,
-                                   rated_speed,
-                                   no_load_speed,
-                                   known_coulomb,
-                                   known_viscous,
-                                   std::move(cycles),
-                                   std::move(amplitude),
-                                   std::move(phase),
-                                   std::move(slope),
-                                   std::move(slope_velocity)};
-          },
-          nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
-          "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
-          "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a, "known_coulomb"_a,
-          "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a, "slope"_a = Numbers(),
-          "slope_velocity"_a = Numbers());
-}
-
-void bind_anatomy(nb::module_& m) {
-  nb::class_<Anatomy>(m, "Anatomy")
-      .def(
-          "__init__",
-          [](Anatomy* self, double hip_height, double trunk, double shoulder, double hip_half,
-             double neck, double head, double upper_arm, double lower_arm, double hand, double grip,
-             double thigh, double shank, double floor, double facing, double hand_speed,
-             double walk_speed, double reaction_time, double step_back, bool seated, bool hanging,
-             bool reacts) {
-            new (self) Anatomy{
-                hip_height, trunk,      shoulder,      hip_half,  neck,   head,    upper_arm,
-                lower_arm,  hand,       grip,          thigh,     shank,  floor,   facing,
-                hand_speed, walk_speed, reaction_time, step_back, seated, hanging, reacts};
-          },
-          nb::kw_only(), "hip_height"_a, "trunk"_a, "shoulder"_a, "hip_half"_a, "neck"_a, "head"_a,
-          "upper_arm"_a, "lower_arm"_a, "hand"_a, "grip"_a, "thigh"_a, "shank"_a, "floor"_a,
-          "facing"_a, "hand_speed"_a, "walk_speed"_a, "reaction_time"_a, "step_back"_a, "seated"_a,
-          "hanging"_a, "reacts"_a)
-      .def(nb::init<>());
-}
-
-void bind_surroundings(nb::module_& m) {
-  nb::class_<Link>(m, "Link").def(
-      "__init__",
-      [](Link* self, int joint, int body, int first, bool slide, double mass, Numbers com) {
-        if (com.size() != 3) throw nb::value_error("com: expected three numbers");
-        new (self) Link{joint, body, first, slide, mass, Vec3{com[0], com[1], com[2]}};
-      },
-      nb::kw_only(), "joint"_a, "body"_a, "first"_a, "slide"_a, "mass"_a, "com"_a);
-  nb::class_<Tool>(m, "Tool").def(
-      "__init__",
-      [](Tool* self, int site, int body, int first) { new (self) Tool{site, body, first}; },
-      nb::kw_only(), "site"_a, "body"_a, "first"_a);
-  nb::class_<Region>(m, "Region")
-      .def(
-          "__init__",
-          [](Region* self, int body, int joint, int qpos, int dof, int mocap, bool held, int sensor,
-             double quasi_static, double transient, double span, double speed, double area,
-             double least_pressure) {
-            new (self) Region{body,         joint,     qpos, dof,   mocap, held,          sensor,
-                              quasi_static, transient, span, speed, area,  least_pressure};
-          },
-          nb::kw_only(), "body"_a, "joint"_a, "qpos"_a, "dof"_a, "mocap"_a, "held"_a, "sensor"_a,
-          "quasi_static"_a, "transient"_a, "span"_a, "speed"_a, "area"_a, "least_pressure"_a);
-  nb::class_<Surroundings>(m, "Surroundings")
-      .def(
-          "__init__",
-          [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
-             std::vector<Region> regions, int people_begin, const std::vector<Anatomy>& people,
-             int sensor_begin, int arms_sensor, Numbers low, Numbers high) {
-            if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
-            new (self) Surroundings{
-                Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
-                std::move(tools),
-                std::move(regions),
-                people_begin,
-                std::vector<Person>(people.begin(), people.end()),
-                std::move(low),
-                std::move(high),
-                sensor_begin,
-                arms_sensor};
-          },
-          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "people_begin"_a,
-          "people"_a, "sensor_begin"_a, "arms_sensor"_a, "low"_a, "high"_a);
-}
-
-void bind_outputs(nb::module_& m) {
-  nb::class_<Rows>(m, "Rows").def(
-      "__init__",
-      [](Rows* self, Array observation, Array metrics, Array tau_ext, Array target, Array q,
-         Array qd, Array current, Array tau, Array contact, Array region, Array tau_peak,
-         Array region_force, Array region_pressure, Array region_point, Array region_direction,
-         Array reaches, Array walks) {
-        const Touched touched{held(region_force), held(region_pressure), held(region_point),
-                              held(region_direction)};
-        new (self)
-            Rows{held(observation), held(metrics), held(tau_ext), held(target),  held(q),
-                 held(qd),          held(current), held(tau),     held(contact), held(region),
-                 held(tau_peak),    touched,       held(reaches), held(walks)};
-      },
-      nb::kw_only(), "observation"_a, "metrics"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
-      "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "region_force"_a,
-      "region_pressure"_a, "region_point"_a, "region_direction"_a, "reaches"_a, "walks"_a);
-  nb::class_<Track>(m, "Track")
-      .def(
-          "__init__",
-          [](Track* self, Array q, Array qd, Array current, Array sensors, Array poses,
-             std::vector<int> bodies, int sensor_begin) {
-            new (self) Track{held(q),     held(qd),          held(current), held(sensors),
-                             held(poses), std::move(bodies), sensor_begin};
-          },
-          nb::kw_only(), "q"_a, "qd"_a, "current"_a, "sensors"_a, "poses"_a, "bodies"_a,
-          "sensor_begin"_a);
-  nb::class_<Controls>(m, "Controls")
-      .def(
-          "__init__",
-          [](Controls* self, int mode, double period, Numbers scale, Numbers centre,
-             Numbers max_speed, Numbers torque_limit, Numbers low, Numbers high, double moving,
-             double driven) {
-            new (self) Controls();
-            self->moving = moving;
-            self->driven = driven;
-            self->low = std::move(low);
-            self->high = std::move(high);
-            self->mode = static_cast<Mode>(mode);
-            self->period = period;
-            self->scale = std::move(scale);
-            self->centre = std::move(centre);
-            self->override_speed.assign(max_speed.size(), 0.0);
-            self->max_speed = std::move(max_speed);
-            self->torque_limit = std::move(torque_limit);
-          },
-          nb::kw_only(), "mode"_a, "period"_a, "scale"_a, "centre"_a, "max_speed"_a,
-          "torque_limit"_a, "low"_a, "high"_a, "moving"_a, "driven"_a);
-}
-
 void bind_plant(nb::module_& m) {
   nb::class_<Physics>(m, "Physics")
       .def(nb::new_(&physics_of), "model"_a, "data"_a, nb::kw_only(), "step"_a, "kinematics"_a);
@@ -408,10 +234,7 @@ void bind_plant(nb::module_& m) {
 
 NB_MODULE(_plant, m) {
   m.doc() = "The plant: an arm, its drives and surroundings, stepped natively.";
-  bind_joint(m);
-  bind_anatomy(m);
-  bind_surroundings(m);
-  bind_outputs(m);
+  bind_values(m);
   bind_plant(m);
   m.def(
       "set_clock",

@@ -4,40 +4,17 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "control.hpp"
+#include "conveyance.hpp"
 #include "drive.hpp"
 #include "surroundings.hpp"
 
 namespace tauguard::envs {
-
-// A body that follows a path: rows of time [s] and position [m]; after the last it begins anew.
-struct Carried {
-  int mocap = -1;
-  std::vector<std::array<double, 4>> path;
-
-  Vec3 at(double t) const {
-    const double period = path.back()[0];
-    t -= period * std::floor(t / period);
-    std::size_t k = 1;
-    while (k + 1 < path.size() && path[k][0] <= t) ++k;
-    const auto &a = path[k - 1], &b = path[k];
-    const double s = (t - a[0]) / (b[0] - a[0]);
-    return {a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]), a[3] + s * (b[3] - a[3])};
-  }
-};
-
-// The surface of a conveyor: a slide that moves at a speed [m/s] and stays where it is.
-struct Belt {
-  int qpos = -1, dof = -1;
-  double speed = 0;
-};
 
 class Plant {
  public:
@@ -69,7 +46,7 @@ class Plant {
   void relax() {
     drives_.relax();
     contact_ = Contact{};
-    for (Region& r : around_.regions) r.touching = r.force = 0;
+    for (Region& r : around_.regions) r.touching = r.force = r.advance = 0;
     count_ = 0;
     sound_ = true;
     impossible_ = false;
@@ -101,7 +78,7 @@ class Plant {
     row_ = 0;
     for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
     controls.take(around_.arms, drives_.joints, around_.tools, q_.data(), action);
-    for (const Region& r : around_.regions) turn_back(r);
+    for (const Region& r : around_.regions) turn_back(r, physics_);
   }
 
   // Up to `steps` physics steps of the action; fewer where the simulation diverges.
@@ -208,7 +185,7 @@ class Plant {
   template <class Visitor>
   void visit(Visitor&& each) {
     for (JointState& s : drives_.states) each(s.current), each(s.bristle);
-    for (Region& r : around_.regions) each(r.touching), each(r.force);
+    for (Region& r : around_.regions) each(r.touching), each(r.force), each(r.advance);
     speeds_.resize(around_.regions.size());
     for (Vec3& v : speeds_) each(v.x), each(v.y), each(v.z);
     for (Person& person : around_.people) person.visit(each);
@@ -222,18 +199,6 @@ class Plant {
       row->resize(joints(), 0.0);
       for (double& value : *row) each(value);
     }
-  }
-
-  // Whether a number can be a value of this type; what counts or chooses is a whole number.
-  template <class T>
-  static bool holds(const T&, double number) {
-    if constexpr (std::is_same_v<T, double>) return true;
-    const double most = std::is_same_v<T, bool>   ? 1
-                        : std::is_enum_v<T>       ? static_cast<double>(Override::brake)
-                        : sizeof(T) > sizeof(int) ? 0x1p53
-                                                  : 0x1p31 - 1;
-    const bool below_zero = std::is_integral_v<T> && !std::is_same_v<T, bool>;
-    return number == std::floor(number) && number <= most && number >= (below_zero ? -most : 0);
   }
 
   void assign(const std::vector<double>& saved) {
@@ -272,12 +237,9 @@ class Plant {
   }
 
   void carry() {
-    for (const Carried& c : carried) {
-      const Vec3 p = c.at(static_cast<double>(count_) * drives_.dt);
-      double* place = physics_.mocap_position(c.mocap);
-      place[0] = p.x, place[1] = p.y, place[2] = p.z;
-    }
-    for (const Belt& b : belts) physics_.qpos()[b.qpos] = 0, physics_.qvel()[b.dof] = b.speed;
+    const double t = static_cast<double>(count_) * drives_.dt;
+    for (const Carried& c : carried) c.follow(physics_, t);
+    for (const Belt& b : belts) b.run(physics_);
   }
 
   // Of a person: two rows of hands, and their part of the walks.
@@ -360,7 +322,9 @@ class Plant {
       if (std::fabs(tau[i]) > std::fabs(peak[i])) peak[i] = tau[i];
     const double* arms = physics_.sensors() + around_.arms_sensor;
     const double between = around_.arms_sensor < 0 || arms[0] == 0 ? 0.0 : norm(load(arms + 1));
-    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_, rows_.touched, between);
+    const Sensed step{physics_.sensors() + around_.sensor_begin, physics_.sensors(),
+                      rows_.qd.data() + row_ * n, drives_.dt};
+    read_regions(around_.regions, around_.arms, step, contact_, rows_.touched, between);
   }
 
   // Whether the arm can exert the largest force so far; a solver that fails reports any number.
@@ -373,13 +337,6 @@ class Plant {
         fastest =
             std::max(fastest, std::fabs(rows_.qd.data()[k * joints() + i]) / controls.max_speed[i]);
     return squared <= fastest * fastest * controls.moving + controls.driven;
-  }
-
-  // A region that has left its span comes back at its own speed: a hand that goes to and fro.
-  void turn_back(const Region& r) {
-    if (r.joint < 0 || r.speed == 0) return;
-    const double at_now = physics_.qpos()[r.qpos];
-    if (std::fabs(at_now) > r.span) physics_.qvel()[r.dof] = at_now > 0 ? -r.speed : r.speed;
   }
 
   // q, qd, torque; a tool's position and the vector to its target; a region's position and

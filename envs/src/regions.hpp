@@ -23,9 +23,18 @@ struct Region {
   double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
   double area = 0;             // of the robot's contact surface [cm^2]; 0: unknown
   double least_pressure = 0;   // of a flat surface, where the area is unknown [N/cm^2]
+  double stiffness = 0;        // of its contact [N/m]
   double touching = 0;         // unbroken contact so far [s]
   double force = 0;            // at the last physics step [N]
+  double advance = 0;          // of the arm into it during the unbroken contact [m]
 };
+
+// A region that has left its span comes back at its own speed: a hand that goes to and fro.
+inline void turn_back(const Region& r, const Physics& physics) {
+  if (r.joint < 0 || r.speed == 0) return;
+  const double at_now = physics.qpos()[r.qpos];
+  if (std::fabs(at_now) > r.span) physics.qvel()[r.dof] = at_now > 0 ? -r.speed : r.speed;
+}
 
 // Of each region at its peak over an action: force [N], pressure [N/cm^2], point [m], direction of
 // the force on it.
@@ -41,7 +50,7 @@ struct Touched {
 // The largest values over one control step, and what lasts longer.
 struct Contact {
   double force = 0;         // peak net force on a link [N]
-  double cost = 0;          // peak force beyond the regions' limits [N]
+  double cost = 0;          // impulse beyond the regions' limits [N s]
   double ratio = 0;         // peak force over the limit
   double region_force = 0;  // peak force on a region [N]
   int link = 0;             // 1-based, of the peak force; 0: none
@@ -100,31 +109,52 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
   }
 }
 
+// Speed along a direction [m/s] of a point of the link whose contact is nearest to it.
+inline double speed_of(const Kinematics& arms, const double* links, const double* qd, Vec3 point,
+                       Vec3 direction) {
+  std::size_t link = arms.size();
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const double* s = links + sensor_width * i;
+    const double away = norm(load(s + 7) - point);
+    if (s[0] != 0 && away < nearest) nearest = away, link = i;
+  }
+  return link < arms.size() ? dot(arms.velocity(link, point, qd), direction) : 0.0;
+}
+
+// What a physics step of the arms is read from: the links' sensors, all sensors, joint velocities.
+struct Sensed {
+  const double *links, *all, *qd;
+  double dt;
+};
+
 // Reads the regions' contact sensors. An impact counts against the transient limit, unbroken
 // contact beyond half a second and a region that cannot move away against the quasi-static one.
-// Where no impact is allowed the whole force is cost, and the ratio is against the quasi-static
-// limit. `between` is the force between two arms, which are never meant to touch: all of it is
-// cost.
-inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c,
-                         const Touched& peak, double between) {
-  double cost = between;
+// Where no impact is allowed the ratio is against the quasi-static limit. What costs is the force
+// beyond the limit that the arm would exert if nobody but it moved: not more than the stiffness
+// times its advance since the touch, so nothing where somebody runs into an arm that stands.
+// `between` is the force between two arms, which are never meant to touch: all of it is cost.
+inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, const Sensed& step,
+                         Contact& c, const Touched& peak, double between) {
+  double excess = between;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Region& r = regions[i];
-    const double* s = sensors + r.sensor;
+    const double* s = step.all + r.sensor;
     const double force = s[0] == 0 ? 0.0 : norm(load(s + 1));
     r.force = force;
     if (force == 0) {
-      r.touching = 0;
+      r.touching = r.advance = 0;
       continue;
     }
-    r.touching += dt;
+    r.touching += step.dt;
+    const Vec3 direction = (-1.0 / force) * load(s + 1);
+    r.advance += step.dt * speed_of(arms, step.links, step.qd, load(s + 7), direction);
     const bool impact = !r.held && r.touching <= transient_time;
     const double limit = impact ? r.transient : r.quasi_static;
     const double ratio = force / (limit > 0 ? limit : r.quasi_static);
-    cost += std::max(0.0, force - limit);
+    excess += std::max(0.0, std::min(force, r.stiffness * r.advance) - limit);
     c.region_force = std::max(c.region_force, force);
     if (force > peak.force.data()[i]) {
-      const Vec3 direction = (-1.0 / force) * load(s + 1);
       double* d = peak.direction.data() + 3 * i;
       peak.force.data()[i] = force;
       peak.pressure.data()[i] = r.area > 0 ? force / r.area : r.least_pressure;
@@ -136,7 +166,7 @@ inline void read_regions(std::vector<Region>& regions, const double* sensors, do
       c.region = static_cast<int>(i) + 1;
     }
   }
-  c.cost = std::max(c.cost, cost);
+  c.cost += step.dt * excess;
 }
 
 }  // namespace tauguard::envs

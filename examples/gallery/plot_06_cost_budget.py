@@ -2,8 +2,8 @@
 A policy under a cost budget
 ============================
 
-The cost of a step is the force beyond the limits of the touched body regions. A controller that
-slows down near people pays less, and reaches less. Where is the trade-off?
+The cost of a step is the impulse of the arm beyond the limits of the body regions. A controller
+that slows down near people pays less, and reaches less. Where is the trade-off?
 """
 
 import gymnasium as gym
@@ -42,10 +42,10 @@ def play(near):
 
 for near in (0.0, 0.2, 0.6):
     (targets, cost), error = play(near)
-    print(f"slower within {near:.2f} m: {targets:.1f} targets, cost {cost:.0f} +- {error[1]:.0f} N")
+    print(f"slower within {near:.2f} m: {targets:.1f} targets, {cost:.3f} +- {error[1]:.3f} N s")
     plt.errorbar(cost, targets, error[0], error[1], "o", label=f"{near:.2f} m")
 envs.close()
-plt.xlabel("cost of an episode [N]")
+plt.xlabel("cost of an episode [N s]")
 plt.ylabel("targets reached")
 plt.legend(title="slower within")
 

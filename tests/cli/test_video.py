@@ -1,8 +1,10 @@
 """A recording becomes a moving picture; what is missing is named in one line."""
 
+import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from tauguard.cli import main
 from tauguard.envs import Episode, simulate
 from tauguard.models import SceneObject, Shape
 from tauguard.replay.video import write_video
-from tauguard.traces import write_mcap
+from tauguard.traces import TARGETS, write_mcap
 
 MAIN = "from tauguard.cli import main; main()"
 CART = SceneObject(
@@ -55,6 +57,32 @@ def test_the_arm_and_what_moves_are_drawn_where_they_are(tmp_path):
     again = run(tmp_path / "a.mcap")
     assert again.returncode == 2
     assert "--out" in again.stderr
+
+
+def test_target_and_force_are_drawn_where_they_are(tmp_path):
+    """A green ball is drawn until the target has moved on; a red arrow while something presses."""
+    trace = simulate(Episode(3, seconds=0.5))
+    rows = [[0.0, [[0.4, 0.3, 0.5]]], [trace.t[-1] / 2, [[9.0, 9.0, 9.0]]]]
+    vectors = np.zeros((len(trace.t), 3))
+    points = np.full((len(trace.t), 3), np.nan)
+    late = trace.t > 0.2
+    vectors[late], points[late] = (0.0, 0.0, 200.0), (0.5, -0.3, 0.6)
+    truth = replace(trace.truth, contact_vector=vectors, contact_point=points)
+    attachments = {**trace.attachments, TARGETS: json.dumps(rows)}
+    write_mcap(tmp_path / "a.mcap", replace(trace, truth=truth, attachments=attachments))
+    out = run(tmp_path / "a.mcap", "--rate", 4, "--out", tmp_path / "a.png")
+    if out.returncode == 2 and "no picture" in out.stderr:
+        pytest.skip("the EGL library cannot draw here")
+    assert out.returncode == 0, out.stderr
+    seen = []
+    with Image.open(tmp_path / "a.png") as file:
+        for k in range(file.n_frames):
+            file.seek(k)
+            red, green, blue = np.moveaxis(np.asarray(file.convert("RGB")).astype(int), 2, 0)
+            ball = (green > red + 40) & (green > blue + 25)
+            arrow = (red > green + 60) & (red > blue + 60)
+            seen.append((bool(ball.sum() > 20), bool(arrow.sum() > 20)))
+    assert seen == [(True, False), (False, True)]
 
 
 def test_an_opengl_that_is_not_there_is_one_line(tmp_path):

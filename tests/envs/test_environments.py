@@ -256,7 +256,6 @@ def test_a_blow_is_judged_against_the_hands_limits(struck):
     limit = env.regions[0].transient
     assert limit == 280
     assert infos[peak]["limit_ratio"] == pytest.approx(force[peak] / limit)
-    assert infos[peak]["cost"] == pytest.approx(max(0.0, force[peak] - limit))
     assert infos[peak]["pressure"] == pytest.approx(force[peak] / 2.0)
     assert infos[peak]["region"] == 1
     assert 1 <= infos[peak]["link"] <= 6

@@ -30,16 +30,15 @@ def test_the_path_of_react_is_for_the_gentle():
     assert gentle[:, 2].mean() > fast[:, 2].mean() + 1
 
 
-@pytest.mark.parametrize("task", ["ClothReach-v1", "TwoArms-v1"])
-def test_straight_paths_touch(task):
-    rows = BASELINES.play(task, "fast", 4, FIRST)
+def test_straight_paths_of_two_arms_meet_and_cost():
+    rows = BASELINES.play("TwoArms-v1", "fast", 4, FIRST)
     assert rows[:, 1].mean() > 1
     assert (rows[:, 4] > 0).mean() >= 0.5
 
 
 def test_an_arm_that_yields_presses_less_than_one_that_does_not():
     stiff, soft = (BASELINES.play("Reach-v0", name, 8, FIRST) for name in ("fast", "admittance"))
-    assert soft[:, 4].mean() < 0.8 * stiff[:, 4].mean()
+    assert soft[:, 3].mean() < 0.8 * stiff[:, 3].mean()
     assert soft[:, 1].sum() > 0
 
 

@@ -114,7 +114,7 @@ Region region(const Scene& scene, const std::string& body, int mocap) {
   }
   r.held = mocap >= 0;
   r.sensor = scene.model->sensor_adr[scene.id(mjOBJ_SENSOR, "on_" + body)];
-  r.quasi_static = 100, r.transient = mocap % 2 ? 0 : 200;
+  r.stiffness = 1e5, r.quasi_static = 100, r.transient = mocap % 2 ? 0 : 200;
   return r;
 }
 

@@ -1,0 +1,33 @@
+// What the files of Python's view of the plant share.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <vector>
+
+#include "physics.hpp"
+
+namespace tauguard::envs {
+
+namespace nb = nanobind;
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Numbers = std::vector<double>;
+// An array that Python made and the plant reads or writes.
+using Array = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
+
+// The same for the plant, which keeps the array alive.
+inline Held held(const Array& array) {
+  Held out(array.data(), {}, std::make_shared<Array>(array));
+  for (std::size_t k = 0; k < array.ndim(); ++k) out.add_axis(array.shape(k));
+  return out;
+}
+
+// Joints, people, surroundings, output rows and controls, of which a plant is made.
+void bind_values(nb::module_& m);
+
+}  // namespace tauguard::envs
