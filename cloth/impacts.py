@@ -13,6 +13,7 @@ that the fixed width decides 3 us. The worst take 200 us for positions of simila
 distance: 4001 cuts, no exact arithmetic, conservative.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,14 +120,14 @@ def _solve_points(
     return _solve(True, start[:, corners], end[:, corners], method, min_distance)
 
 
-def method_number(method: str) -> int:
+def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
     """The number of a method, or a ``ValueError`` that lists the names there are."""
-    if not isinstance(method, str) or method not in METHODS:
+    if not isinstance(method, str) or method not in methods:
         raise ValueError(
-            f"method {method!r}: there are {', '.join(METHODS)}; the methods that "
+            f"method {method!r}: there are {', '.join(methods)}; the methods that "
             "tauguard.cloth.comparators has are for comparison only"
         )
-    return METHODS[method]
+    return methods[method]
 
 
 def checked_distance(min_distance: float, method: str) -> float:

@@ -9,8 +9,9 @@ the step they have one at each of its ends. This leaves fewer candidates and mis
 """
 
 import time
+from collections.abc import Mapping
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.impacts import Impacts, checked_distance, method_number
+from tauguard.cloth.impacts import METHODS, Impacts, checked_distance, method_number
 from tauguard.cloth.topology import Isolated, Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
@@ -65,6 +66,9 @@ class MeshCCD:
             volume.
     """
 
+    #: What ``method`` may be, with the numbers of the native module.
+    methods: ClassVar[Mapping[str, int]] = METHODS
+
     def __init__(
         self,
         faces: ArrayLike,
@@ -76,7 +80,7 @@ class MeshCCD:
         points: ArrayLike = (),
     ) -> None:
         """Check the faces and number the edges; the first frame builds the hierarchy."""
-        self._check_method(method)
+        self._method_number = method_number(method, self.methods)
         if not isinstance(volume, str) or volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
@@ -148,8 +152,9 @@ class MeshCCD:
             ValueError: as :meth:`candidates`.
         """
         start = time.perf_counter()
-        vf, ee, stats = self._collisions(
+        vf, ee, stats = self._mesh.find(
             *self._checked_step(x_t0, x_t1),
+            self._method_number,
             checked_distance(min_distance, self.method),
             _checked_flag(fresh),
             _checked_limit(limit),
@@ -279,20 +284,6 @@ class MeshCCD:
         change = self._mesh.update_topology(rows, *_group_arrays(groups))
         self._topology = Topology(checked, isolated, frozen(change.pop("edge_rows")), groups)
         return change
-
-    def _check_method(self, method: str) -> None:
-        method_number(method)
-
-    def _collisions(
-        self,
-        x_t0: NDArray[np.float64],
-        x_t1: NDArray[np.float64],
-        min_distance: float,
-        fresh: bool,
-        limit: int,
-    ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        number = method_number(self.method)
-        return self._mesh.find(x_t0, x_t1, number, min_distance, fresh, limit)
 
     def _checked_parts(
         self, faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None

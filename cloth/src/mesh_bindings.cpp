@@ -166,13 +166,24 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
 
 using Found = nb::typed<nb::tuple, Named, Named, Named>;
 
-// The collisions of both kinds that search(kind) finds, and statistics.
-template <class Search>
-Found found_by(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh,
-               std::size_t limit, Search search) {
+// `method` is a Method, or `first_comparator` and a Comparator.
+constexpr int first_comparator = 2;
+
+Found find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance, bool fresh,
+           std::size_t limit) {
   Collisions vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
+  const auto search = [&](MeshCcd::Kind kind) {
+    if (method < first_comparator)
+      return find_collisions(mesh.ccd, kind, Method(method), min_distance, limit);
+    const auto narrow_phase = [=](const Ends& x, const std::int32_t* rows, std::size_t n,
+                                  std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+      (kind == MeshCcd::Kind::vf ? compare_vf : compare_ee)(
+          x, rows, n, Comparator(method - first_comparator), hit, impacts, stats);
+    };
+    return find_collisions(mesh.ccd, kind, narrow_phase, limit);
+  };
   {
     const Call call(mesh);
     mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh, limit);
@@ -190,25 +201,6 @@ Found found_by(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, 
                         stats);
 }
 
-Found find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance, bool fresh,
-           std::size_t limit) {
-  return found_by(mesh, x_t0, x_t1, min_distance, fresh, limit, [&](MeshCcd::Kind kind) {
-    return find_collisions(mesh.ccd, kind, Method(method), min_distance, limit);
-  });
-}
-
-Found compare(Mesh& mesh, Positions x_t0, Positions x_t1, int comparator, bool fresh,
-              std::size_t limit) {
-  return found_by(mesh, x_t0, x_t1, 0, fresh, limit, [&](MeshCcd::Kind kind) {
-    const auto solve = kind == MeshCcd::Kind::vf ? compare_vf : compare_ee;
-    const auto narrow_phase = [=](const Ends& x, const std::int32_t* rows, std::size_t n,
-                                  std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
-      solve(x, rows, n, Comparator(comparator), hit, impacts, stats);
-    };
-    return find_collisions(mesh.ccd, kind, narrow_phase, limit);
-  });
-}
-
 using Rows4 = nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 using Hits = nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig>;
 using Times = nb::ndarray<double, nb::shape<-1>, nb::c_contig>;
@@ -222,33 +214,22 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
     const LongCall call;
     const tauguard::geometry::RoundToNearest guard;
     const Ends ends = Ends::of(x_t0.data(), x_t1.data());
+    const ImpactArrays impacts{toi.data(), point.data(), normal.data(), weights.data()};
+    const std::size_t n = rows.shape(0);
     Projection points;
     AxisFilter axes;
     // Queries for each vertex. Projecting a vertex costs 18 ns and saves 6 ns for each query.
     constexpr std::size_t pays = 4;
-    if (Method(method) == Method::ab2pf && min_distance == 0 &&
-        rows.shape(0) >= pays * x_t0.shape(0)) {
+    if (Method(method) == Method::ab2pf && min_distance == 0 && n >= pays * x_t0.shape(0)) {
       points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
       axes.points = &points;
     }
-    (vf ? solve_vf : solve_ee)(
-        ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
-        {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
-  }
-  Named counts;
-  add_counts(counts, stats);
-  return counts;
-}
-
-Named solve_compared(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int comparator, Hits hit,
-                     Times toi, Vectors point, Vectors normal, Weights weights) {
-  Stats stats;
-  {
-    const LongCall call;
-    const tauguard::geometry::RoundToNearest guard;
-    (vf ? compare_vf : compare_ee)(
-        Ends::of(x_t0.data(), x_t1.data()), rows.data(), rows.shape(0), Comparator(comparator),
-        hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+    if (method < first_comparator)
+      (vf ? solve_vf : solve_ee)(ends, rows.data(), n, Method(method), min_distance, hit.data(),
+                                 impacts, stats, axes);
+    else
+      (vf ? compare_vf : compare_ee)(ends, rows.data(), n, Comparator(method - first_comparator),
+                                     hit.data(), impacts, stats);
   }
   Named counts;
   add_counts(counts, stats);
@@ -296,11 +277,8 @@ NB_MODULE(_mesh, m) {
            })
       .def("candidates", &candidates, "x_t0"_a, "x_t1"_a, "min_distance"_a, "fresh"_a, "limit"_a)
       .def("find", &find, "x_t0"_a, "x_t1"_a, "method"_a, "min_distance"_a, "fresh"_a, "limit"_a)
-      .def("compare", &compare, "x_t0"_a, "x_t1"_a, "comparator"_a, "fresh"_a, "limit"_a)
       .def("update_topology", &update_topology, "faces"_a, "ids"_a, "meets"_a);
   m.def("solve", &solve, "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "method"_a, "min_distance"_a,
-        "hit"_a, "toi"_a, "point"_a, "normal"_a, "weights"_a);
-  m.def("solve_compared", &solve_compared, "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "comparator"_a,
         "hit"_a, "toi"_a, "point"_a, "normal"_a, "weights"_a);
   m.def(
       "force_batch_kernels",
