@@ -24,21 +24,11 @@ class LineStream(Closing):
 
     def __init__(self, stream: TextIO, joint_names: Sequence[str], rate: float) -> None:
         """Nothing is read before the first :meth:`read`."""
-        self._names, self._rate = tuple(joint_names), rate
+        self.joint_names, self.rate = tuple(joint_names), rate
         self.events: list[str] = []
         self._file, self._pending, self._lines = stream, b"", 0
         self._ready = selectors.SelectSelector()  # a file can be waited for, too
         self._ready.register(stream, selectors.EVENT_READ)
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """As given."""
-        return self._names
-
-    @property
-    def rate(self) -> float:
-        """As given."""
-        return self._rate
 
     def read(self, timeout: float) -> Sample | None:
         """The sample of the next line, or None if none came within ``timeout`` seconds.
@@ -72,7 +62,7 @@ class LineStream(Closing):
         return self._sample(line, arrived)
 
     def _sample(self, line: bytes, arrived: int) -> Sample:
-        n = len(self._names)
+        n = len(self.joint_names)
         try:
             values = np.array([float(cell) for cell in line.split(b",")])
         except ValueError:

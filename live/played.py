@@ -19,19 +19,10 @@ class PlayedStream(Closing):
         if not pace > 0:
             raise ValueError(f"pace: {pace}, expected above 0")
         self.trace, self.pace = trace, pace
+        self.joint_names, self.rate = trace.joint_names, 1 / trace.dt
         self.events: list[str] = []
         self._next = 0
         self._began = 0.0
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """The trace's."""
-        return self.trace.joint_names
-
-    @property
-    def rate(self) -> float:
-        """Samples a second of the trace."""
-        return 1 / self.trace.dt
 
     def read(self, timeout: float) -> Sample | None:
         """The next sample when its time has come, or None if that is after ``timeout`` seconds.

@@ -69,17 +69,7 @@ class UrStream(Closing):
         self._lost = ""
         self._attempt: _Reconnection | None = None
         self._connection: _Connection | None = _Connection(host, port, rate, HANDSHAKE)
-        self._rate = self._connection.rate
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """The names that UR gives."""
-        return UR_JOINTS
-
-    @property
-    def rate(self) -> float:
-        """Samples a second that were asked for."""
-        return self._rate
+        self.joint_names, self.rate = UR_JOINTS, self._connection.rate
 
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.
@@ -151,8 +141,8 @@ class UrStream(Closing):
         arrived = time.monotonic_ns()
         t = float(values[0])
         passed, self._last = t - self._last, t
-        if np.isfinite(passed) and passed * self._rate > 1.5:
-            lost = f"{passed * self._rate - 1:.0f} samples lost before {t:.3f} s"
+        if np.isfinite(passed) and passed * self.rate > 1.5:
+            lost = f"{passed * self.rate - 1:.0f} samples lost before {t:.3f} s"
             add_event(self.events, lost)
         return Sample(t, values[1:7], values[7:13], values[13:19], arrived)
 

@@ -17,16 +17,3 @@ STUDIES = (
     "datasets",
     "faults",
 )
-
-_SLOW = "is a slow test now: run `pytest -m slow -k {}` in a checkout"
-_NOTE = "has ended; its result is docs/notes/2026-11-23-{}.md"
-#: Studies that have ended, and what to do instead.
-FORMER = {
-    "mutants": _SLOW.format("damaged_file"),
-    "kills": _SLOW.format("'interrupted or generate'"),
-    "endurance": _SLOW.format("endurance"),
-    "detection_ladder": _NOTE.format("from-the-dissertation"),
-    "arms": _NOTE.format("arms") + "; `tauguard robot NAME --try` tries an arm",
-    "detection_parts": _NOTE.format("thresholds"),
-    "detection_conformal": "is a row of false_alarms now: `tauguard bench false_alarms`",
-}

@@ -27,7 +27,7 @@ inline double sum_of_sizes(const double* x, std::size_t n) {
   return sum;
 }
 
-// The largest sum of |qd| within the last so many samples: a queue of falling candidates.
+// The largest sum of |qd| within a sliding window of samples, by a queue of falling candidates.
 class RecentSpeed {
  public:
   explicit RecentSpeed(std::int64_t samples)

@@ -7,13 +7,13 @@
 // last link (mass and first moment in that link's frame) and, per joint, a torque offset and the
 // relative errors of viscous and Coulomb friction; slow_errors.hpp tracks them.
 //
-// Errors of the model last longer than the time between two corrections, each of which would take
-// them for news: the noise of a correction has `inflation` times its variance, or the filter soon
-// trusts a wrong payload, and friction errors many times their deviation, more than what it sees.
-// The gate of an innovation knows no `inflation`, or a held contact would be learned as a payload.
+// Errors of the model last for many samples, so successive corrections are not independent. The
+// variance of their noise is therefore multiplied by `inflation`. Without it the filter soon trusts
+// a wrong payload and wrong friction more than new residuals. The gate of an innovation does not
+// use `inflation`; otherwise a held contact would be learned as a payload.
 //
-// The friction of a joint at rest may hold any torque: with `started` above 0 only joints that have
-// moved for so long correct the unknowns.
+// The friction of a joint at rest can hold any torque. If `started` is above 0, a joint corrects
+// the unknowns only after it has moved for that time.
 //
 // Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
 // fraction `transition` of the change: a variance that is added to the noise's.

@@ -1,4 +1,4 @@
-// Faults of a stream of samples that the samples themselves show: no model of the arm is asked.
+// Faults of a stream that its samples show by themselves, without a model of the arm.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ enum class Fault : std::int32_t {
   torque_size,
 };
 
-// What is usual of one arm's samples; all arrays hold one entry a joint.
+// Usual values of one arm's samples; all arrays hold one entry a joint.
 struct Usual {
   double dt = 0;                    // sample interval [s]
   double longest = 0;               // longest interval that is not a gap [s]

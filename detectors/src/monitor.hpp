@@ -73,7 +73,7 @@ class Monitor {
     known_ = true;
     time_ = t;
     const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
-    // What a contact did to the torques is no fault of theirs once it has ended.
+    // When an alarm ends the averages are reset, so the contact's torques are not called a fault.
     if (said_.alarm && !up) torques_.reset();
     const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
     if (t < ready_ && reason_.fault != Fault::none)
@@ -92,7 +92,8 @@ class Monitor {
     return torques_.step(out_.data(), current, dt);
   }
 
-  // Interpolates the samples that are missing before this one, or begins anew; their number.
+  // Interpolates the samples that are missing before this one and returns their number; begins anew
+  // if they are too many.
   double bridge(double t, const double* q, const double* qd, const double* current) {
     if (!known_) {
       ready_ = t + set_.settle;

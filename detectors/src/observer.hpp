@@ -34,7 +34,7 @@ class Observer {
   bool started() const { return started_; }
   const std::vector<double>& residual() const { return residual_; }
 
-  // Starts at rest of the residual: the next step knows what went before.
+  // Starts with a residual of 0. The next step uses these values as those of the last sample.
   void reset(const double* q, const double* qd, const double* tau) {
     chain_.momentum(q, qd, p_before_.data(), beta_before_.data(), work_);
     for (std::size_t j = 0; j < gain_.size(); ++j) {
@@ -69,7 +69,7 @@ class Observer {
     return out;
   }
 
-  // Goes back to what state() gave; false where it is of another length.
+  // Restores what state() returned; false if the length differs.
   bool restore(const std::vector<double>& saved) {
     if (saved.size() != 1 + 4 * gain_.size()) return false;
     started_ = saved[0] != 0.0;

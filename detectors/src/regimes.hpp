@@ -1,29 +1,31 @@
-// What each joint of a real arm does, what counts of its residual, and how large that may be
-// without a contact.
+// The regime of each joint of a real arm (at rest, starting, in motion, in a contact), and for each
+// regime the signal that is judged and its largest value without a contact, the bound.
 //
-// At rest static friction may hold any torque, so only a change counts: the residual less a
-// baseline that follows it. Motion of any joint stirs the torques of all that stand: integral
-// action of the controllers, changing loads. That adds to the bound, fully from `full_speed` on,
-// and is forgotten within about a second.
+// At rest, static friction can hold any torque. The signal is therefore the residual minus a
+// baseline that follows it. Motion of one joint changes the torques of the joints at rest, by the
+// integral action of their controllers and by changing loads. It raises their bound, fully from
+// `full_speed` on, and decays within about a second.
 //
-// A contact with a standing arm lasts from its beginning to its release. While it lasts, the
-// residual less its level before the contact counts, on all joints that stood. It is released
-// where the joint of the largest ratio falls below half of that, or where nothing has changed for
-// a second and what is left is no more than static friction may keep. For a second after it only a
-// change away from the former level counts, so that letting go is no new contact, and what a joint
-// does that the contact turned may be its controller.
+// A contact with a standing arm lasts from its beginning to its release. Meanwhile the signal of
+// all joints that stood is the residual minus its level before the contact. The contact is released
+// when the joint with the largest ratio falls below half of that ratio. It is also released when
+// nothing has changed for a second and the remaining signal is within what static friction can
+// keep. For a second after the release only a change away from the former level counts, so letting
+// go is not a new contact. Joints that the contact turned get a higher bound, because their
+// controllers act.
 //
-// In motion the residual without slow errors counts. The bound is linear in speed, accelerations
-// and slowness: near standstill friction is between static and sliding. While a joint starts, more
-// is allowed.
+// In motion the signal is the residual without slow errors. The bound is linear in speed,
+// accelerations and slowness; slowness covers friction between static and sliding near standstill.
+// A joint that starts gets a higher bound.
 //
-// A joint whose motion no log shows has `low` and `high`: where it stood. While it moves,
-// and soon after, nothing is judged; while it stands elsewhere, no joint in motion is.
+// A joint that moves in no training log has `low` and `high`, the positions at which it stood.
+// While it moves, and soon after, nothing is judged. While it stands elsewhere, moving joints are
+// not judged.
 //
-// A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks
-// pass a bound for longer than noise does at rest. From a ratio of 2 on time counts for more, from
-// 3 on twice, so that a blow of some tens of ms is confirmed. A gap between samples confirms no
-// more than a sample.
+// A ratio above 1 is reported as 1 until it is confirmed by its duration. In motion and soon after
+// it, the duration is longer, because ripple and jerks exceed a bound for longer than noise at
+// rest. Time counts more from a ratio of 2 on, and twice from 3 on, so that an impact of some tens
+// of ms is confirmed. A gap between samples counts as one sample.
 #pragma once
 
 #include <algorithm>
@@ -176,7 +178,7 @@ class Regimes {
     return lasted ? ratio : std::min(ratio, 1.0);
   }
 
-  // What counts of a standing joint's residual. Soon after a contact the way back does not.
+  // The signal of a standing joint. Soon after a contact, a change back to the former level is 0.
   static double changed(Joint& one, double residual, double dt) {
     const double side = one.most;
     if (one.since < after && (residual - one.base) * side < 0.0 &&

@@ -19,7 +19,7 @@ class Scores {
   virtual void reset() = 0;  // the next sample is the first
   // The score of a sample, `dt` s after the last; n numbers each.
   virtual double step(const double* q, const double* qd, const double* current, double dt) = 0;
-  // The score of the plain thresholds beneath, at the same sample.
+  // The score of the plain thresholds that this detector contains, at the same sample.
   virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
 };
 
@@ -102,13 +102,13 @@ class LimitScores final : public Scores {
   std::vector<double> limits_, ratio_;
 };
 
-// A severity x of a target x / (1 + x); no target counts more than 0.98.
+// The severity x that has the target x / (1 + x). Targets above 0.98 are taken as 0.98.
 inline double severity(double target) {
   const double bounded = std::min(target, 0.98);
   return bounded / (1 - bounded);
 }
 
-// Plain thresholds on the residual in another scaling; none without limits.
+// Plain thresholds on the residual in another scaling. Without limits there are none.
 struct Floor {
   Scaling scaling;
   std::vector<double> limits;

@@ -1,10 +1,10 @@
 // The Kalman filter for what a model does not know and what changes slowly: a payload, which loads
 // every joint, and errors of each joint's own.
 //
-// Each state is an Ornstein-Uhlenbeck process with a standard deviation and a time constant: what
-// no measurement tells falls back to zero, which stands for the calibrated model. A deviation of 0
-// removes a state. A measurement is one joint's residual. Its row has entries for the payload and
-// for the joint's own errors alone.
+// Each state is an Ornstein-Uhlenbeck process with a standard deviation and a time constant.
+// Without measurements it decays to zero, the calibrated model. A deviation of 0 removes a state. A
+// measurement is one joint's residual. Its row has entries for the payload and for the joint's own
+// errors alone.
 //
 // A collision must not change the states. An innovation z of more than c = `clip` standard
 // deviations counts as c^2 / z: the larger it is, the less it says about the model.
@@ -21,7 +21,8 @@ constexpr int per_joint = 3;        // errors of a joint's own: offset, viscous,
 
 class SlowErrors {
  public:
-  // `deviation` and `persistence` [s]: payload, then those of each joint, 4 + 3 n.
+  // Standard deviations and time constants [s] of the states: those of the payload, then those of
+  // each joint; 4 + 3 n numbers each.
   SlowErrors(std::vector<double> deviation, std::vector<double> persistence, double clip)
       : m_(deviation.size()),
         clip_(clip),
@@ -45,8 +46,8 @@ class SlowErrors {
     for (std::size_t a = 0; a < m_; ++a) covariance_[a * m_ + a] = deviation_[a] * deviation_[a];
   }
 
-  // The residual that the states predict at joint j, of the derivatives of the residual by the
-  // payload and by the joint's own errors.
+  // The residual that the states predict at joint j. The arguments are the derivatives of the
+  // residual by the payload and by the joint's own errors.
   double predicted(std::size_t j, const double* payload, const double* own) const {
     double sum = 0.0;
     for (int a = 0; a < payload_numbers; ++a) sum += payload[a] * state_[a];
@@ -79,8 +80,9 @@ class SlowErrors {
     }
   }
 
-  // Corrects the states by joint j's residual, whose noise has `variance`. Its errors last for
-  // `inflation` corrections, which together count as one measurement; the gate is that of one.
+  // Corrects the states by joint j's residual, whose noise has `variance`. The noise is correlated
+  // over `inflation` corrections, which together count as one measurement. The gate uses the
+  // variance of one.
   void correct(std::size_t j, double residual, const double* payload, const double* own,
                double variance, double inflation) {
     set_row(j, payload, own);

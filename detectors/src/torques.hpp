@@ -1,9 +1,9 @@
 // Whether the drives' torques are those of this arm's motion: signs, exchanged joints, gains, load.
 //
-// needed = r + given is what the model says the motion takes, given what the currents say the
-// drives give, both through the observer's filter. The ratio E[given needed] / E[needed^2] of a
-// joint is 1 but for errors and contacts, -1 with the other sign. E is an average that forgets: a
-// fast one, for torques that work against the motion, and a slow one, for those of another size.
+// `given` is the drives' torque by the measured currents. `needed` = r + given is the torque that
+// the motion takes by the model. Both pass the observer's filter. The ratio E[given needed] /
+// E[needed^2] of a joint is 1 without errors and contacts, and -1 if the sign is wrong. E is an
+// exponential average: a fast one finds torques of the wrong sign, a slow one those of wrong size.
 #pragma once
 
 #include <algorithm>

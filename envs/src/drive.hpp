@@ -69,7 +69,7 @@ inline double reserve(const Joint& j, double speed) {
   return std::min(std::max(fraction, -1.0), 1.0);
 }
 
-// The current [A] that a drive gives for a wanted one at a joint speed.
+// `current` [A], limited to what the drive can supply at a joint speed.
 inline double possible(const Joint& j, double current, double qd) {
   double low = -j.current_limit, high = j.current_limit;
   if (j.no_load_speed > 0.0) {
@@ -79,7 +79,7 @@ inline double possible(const Joint& j, double current, double qd) {
   return std::min(std::max(current, low), high);
 }
 
-// What the servo adds at a reference speed to make up for the friction that it knows of [N m]; the
+// Torque by which the servo compensates the friction that it knows at a reference speed [N m]; the
 // Coulomb part rises over `smooth` [rad/s].
 inline double compensation(const Joint& j, double speed) {
   constexpr double smooth = 0.02;

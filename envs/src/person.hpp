@@ -30,8 +30,9 @@ struct Anatomy {
   bool seated, hanging, reacts;
 };
 
-// What happens when: a row a reach of a hand (wait [s], place [m], hold [s]), a row a walk (wait
-// [s], place [m]; the first is where they start). It begins anew at its end.
+// The script, which is repeated. A row of `reaches` is one reach of a hand: wait [s], place [m],
+// hold [s]. A row of `walks` is one walk: wait [s], place [m]; the first row is where the person
+// starts.
 struct Script {
   const double *reaches = nullptr, *walks = nullptr;
   std::size_t reach_rows = 0, walk_rows = 0;
@@ -122,7 +123,7 @@ class Person {
   // How far the nearer hand is from a place [m].
   double away(Vec3 place) const { return std::min(norm(place - grip_[0]), norm(place - grip_[1])); }
 
-  // The nearer hand goes to a place now, whatever it was about to do.
+  // Sends the nearer hand to a place at once, in place of its next reach.
   void aim(Vec3 place, double hold, double t) {
     if (walking_ || body_.hanging) return;
     const auto away = [&](int side) { return norm(place - grip_[side]); };
@@ -144,7 +145,7 @@ class Person {
     visit(axes_.forward, each), visit(axes_.left, each), visit(axes_.hip, each);
   }
 
-  // Whether phases and rows of the script are some that there are.
+  // Whether the phases are valid and the rows exist in the script.
   bool plausible() const {
     const auto row_of = [](int k, std::size_t rows) {
       return k >= 0 && static_cast<std::size_t>(k) < std::max<std::size_t>(rows, 1);
@@ -253,7 +254,7 @@ class Person {
     turned_ += std::min(std::max(error, -most), most);
   }
 
-  // A touch is felt, and after the reaction time the hand, or the body, draws back.
+  // A touch is felt; the hand or the body draws back after the reaction time.
   void react(double t) {
     for (int k = 0; k < person_segments; ++k) {
       if (touched_[k] < 0 || t - touched_[k] < body_.reaction_time) continue;

@@ -11,7 +11,7 @@
 
 namespace tauguard::envs {
 
-// What one action came to, as numbers; Python's StepMetrics has the same fields in this order.
+// Metrics of one action; Python's StepMetrics has the same fields in this order.
 struct Metrics {
   double time, distance, force, cost, limit_ratio, region_force;
   double onset, onset_time, link, region, diverged, speed_ratio, cost_sum;

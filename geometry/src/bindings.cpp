@@ -67,5 +67,4 @@ NB_MODULE(_geometry, m) {
         return 0;
     }
   });
-  m.def("hardware_threads", [] { return ThreadPool::hardware(); });
 }

@@ -23,7 +23,6 @@ from tauguard.report.machine import load, load_line
 def command(
     name: Annotated[str, tyro.conf.Positional] = "all",
     /,
-    part: str | None = None,
     quick: bool = False,
     seed: int = 0,
     detector: str | None = None,
@@ -40,8 +39,7 @@ def command(
     Parts that the folder holds are not run again. `tauguard report` makes one page of the folder.
 
     Args:
-        name: a study, or a part by its own name: `tauguard bench list` names them; or `all`.
-        part: run only this part of the study.
+        name: a study, or one part as STUDY-PART: `tauguard bench list` names them; or `all`.
         quick: a shorter run, 60 s or less a part on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
@@ -59,7 +57,7 @@ def command(
     if name == "all":
         from studies.framework.collect import collect
 
-        if part or detector or robot or keep or workers or json or figure:
+        if detector or robot or keep or workers or json or figure:
             raise ValueError("bench all takes --quick, --seed and --out alone")
         if collect(out, all_parts(), quick=quick, seed=seed):
             raise SystemExit(1)
@@ -69,7 +67,7 @@ def command(
     Workers.count = workers
     options = {"detector": detector, "robot": robot, "keep": str(keep) if keep else None}
     given = {option: value for option, value in options.items() if value is not None}
-    chosen = _taking(find(name, part), given, name)
+    chosen = _taking(find(name), given, name)
     for full, one in chosen.items():
         run_part(
             full,

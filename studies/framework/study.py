@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
 
-from studies import FORMER, STUDIES
+from studies import STUDIES
 
 
 @dataclass(frozen=True)
@@ -57,31 +57,21 @@ def all_parts() -> dict[str, Part]:
     }
 
 
-def find(name: str, part: str | None = None) -> dict[str, Part]:
-    """Find parts by the name of a study, by a full name, or by an alias.
-
-    The name of a study gives all its parts, or only the one that ``part`` names.
+def find(name: str) -> dict[str, Part]:
+    """Find parts by the name of a study, which gives all its parts, by a full name or by an alias.
 
     Raises:
         ValueError: no study or part has that name. The message suggests the nearest name or lists
             all names.
     """
     parts = all_parts()
-    if name in STUDIES:
-        own = {full: one for full, one in parts.items() if full.startswith(f"{name}-")}
-        if part is None:
-            return own
-        if f"{name}-{part}" in own:
-            return {f"{name}-{part}": own[f"{name}-{part}"]}
-        names = ", ".join(full.partition("-")[2] for full in own)
-        raise ValueError(f"{name} has no part {part!r}: there are {names}")
-    found = {full: one for full, one in parts.items() if name in (full, one.alias)}
-    if found and part is None:
-        return found
+    found = {
+        full: one
+        for full, one in parts.items()
+        if name in (full, one.alias) or (name in STUDIES and full.startswith(f"{name}-"))
+    }
     if found:
-        raise ValueError(f"--part goes with a whole study: {', '.join(STUDIES)}")
-    if name in FORMER:
-        raise ValueError(f"{name} {FORMER[name]}")
+        return found
     known = [*STUDIES, *(one.alias for one in parts.values() if one.alias), *parts]
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
     if near:

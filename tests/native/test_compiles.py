@@ -1,4 +1,4 @@
-"""The native tests, which `.ci/sanitize` and `.ci/fuzz` run by hand, fit the code that they test."""
+"""The native tests, which `.ci/sanitize` and `.ci/fuzz` run by hand, compile."""
 
 import os
 import shutil

@@ -24,7 +24,7 @@ def run(*command, cwd, **environment):
 
 @pytest.fixture
 def bench(tmp_path):
-    """``bench("cloth", "--part", "frames")``: a quick run's JSON and what it printed."""
+    """``bench("cloth-frames")``: a quick run's JSON and what it printed."""
 
     def quick(name, *flags):
         files = ["--json", tmp_path / "rows.json", "--figure", tmp_path / "figure.png"]

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.mark.slow
 def test_checkers_are_compared(bench):
-    found, _ = bench("contacts", "--part", "checkers")
+    found, _ = bench("contacts-checkers")
     rows = {
         (row["scene"], row["checker"]): row for row in found["rows"] if row["study"] == "scenes"
     }

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.mark.slow
 def test_a_detector_has_its_row_on_every_split_of_a_small_dataset(bench):
-    payload, said = bench("datasets", "--part", "entries")
+    payload, said = bench("datasets-entries")
     rows = [row for row in payload["rows"] if row["study"] == "entries"]
     assert {row["split"] for row in rows} == {"test"}
     (row,) = rows

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.mark.slow
 def test_a_fault_of_samples_is_reported_and_clean_logs_have_none(bench):
-    file, _ = bench("faults", "--part", "samples")
+    file, _ = bench("faults-samples")
     clean = [row for row in file["rows"] if row["study"] == "clean"]
     assert clean
     assert all(row["false_fault_s"] == 0 for row in clean)

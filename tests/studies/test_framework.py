@@ -89,9 +89,7 @@ def checkout(tmp_path):
     shutil.copy(FRAMEWORK.parent / "__main__.py", studies)
     with (studies / "framework" / "mistakes.py").open("a") as module:
         module.write(RECORDED)  # instead of training a detector for minutes
-    (studies / "__init__.py").write_text(
-        f"STUDIES = {tuple(STUDIES)!r}\nFORMER = {{'old': 'has ended'}}\n"
-    )
+    (studies / "__init__.py").write_text(f"STUDIES = {tuple(STUDIES)!r}\n")
     for study, parts in STUDIES.items():
         (studies / study).mkdir()
         named = ", ".join(
@@ -141,7 +139,7 @@ def rows(path):
 
 
 def test_a_part_is_measured_judged_printed_drawn_and_written(checkout):
-    done = checkout("bench", "first", "--part", "good", "--seed", "3", "--json", "rows.json")
+    done = checkout("bench", "first-good", "--seed", "3", "--json", "rows.json")
     assert done.returncode == 0, done.stderr
     written = json.loads((checkout.folder / "rows.json").read_text())
     assert written["name"] == "first-good"
@@ -179,9 +177,8 @@ def test_an_option_runs_the_parts_that_take_it(checkout):
     [
         (["frist"], "no study 'frist': did you mean first?"),
         (["nothing"], "no study 'nothing': there are first, second"),
-        (["old"], "old has ended"),
-        (["first", "--part", "bad"], "first has no part 'bad': there are good, jobs"),
-        (["second", "--part", "refused"], "no detector of that name"),
+        (["first-bad"], "no study 'first-bad': there are first, second"),
+        (["second-refused"], "no detector of that name"),
         (["own_good", "--json", "none/f.json"], "no folder none; make it first"),
     ],
 )

@@ -24,7 +24,7 @@ def test_it_says_so_where_there_are_no_logs(bench):
 
 @pytest.mark.usefixtures("no_logs")
 def test_a_drawn_arm_is_trained_with_minutes_and_says_what_it_promised(bench):
-    file, _ = bench("real_arms", "--part", "training")
+    file, _ = bench("real_arms-training")
     (row,) = file["rows"]
     assert row["seconds"] == 90.0
     assert row["false alarms: minutes"] > 0

@@ -22,7 +22,7 @@ def no_errors(rows):
 def test_volumes_hold_their_bodies(bench, monkeypatch):
     monkeypatch.delenv("TAUGUARD_DATA", raising=False)
     monkeypatch.delenv("TAUGUARD_MESH", raising=False)
-    rows = bench("rigid", "--part", "volumes")[0]["rows"]
+    rows = bench("rigid-volumes")[0]["rows"]
     volumes = {row["volume"]: row for row in rows if row["study"] == "figure 1.1 volumes"}
     assert set(volumes) == {"sphere", "aabb", "obb", "k_dop", "hull"}
     for name, row in volumes.items():
@@ -32,14 +32,14 @@ def test_volumes_hold_their_bodies(bench, monkeypatch):
 
 
 def test_motion_stands_beside_advancement_over_coal(bench):
-    rows = bench("rigid", "--part", "motion")[0]["rows"]
+    rows = bench("rigid-motion")[0]["rows"]
     methods = [(row["bodies"], row["method"]) for row in rows if row["study"] == "time of impact"]
     assert len(methods) == len(set(methods)) == 4
     no_errors(rows)
 
 
 def test_a_mesh_that_cannot_be_read_is_one_line(tmp_path):
-    command = [sys.executable, "-m", "tauguard", "bench", "rigid", "--part", "mesh", "--quick"]
+    command = [sys.executable, "-m", "tauguard", "bench", "rigid-mesh", "--quick"]
     named = os.environ | {"TAUGUARD_MESH": str(tmp_path / "none.obj")}
     done = subprocess.run(command, cwd=tmp_path, env=named, capture_output=True, text=True)
     assert done.returncode == 2

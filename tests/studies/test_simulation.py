@@ -2,7 +2,7 @@
 
 
 def test_impacts_keep_within_two_percent_of_the_two_mass_model(bench):
-    rows = bench("simulation", "--part", "impact")[0]["rows"]
+    rows = bench("simulation-impact")[0]["rows"]
     asked = [row for row in rows if row["study"] == "summary"]
     assert len(asked) == 2
     assert all(row["met"] for row in asked)
