@@ -35,10 +35,10 @@ class Impacts:
         hit: Shape (N,).
         toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
         point: The point of contact at that time; NaN without a hit. Shape (N, 3).
-        normal: Unit normal at that time of the face by its winding, (f1 - f0) x (f2 - f0), or of
-            both edges, (ea1 - ea0) x (eb1 - eb0): not of the side that the features come from,
-            nor the direction between them at a ``min_distance``. Zeros where they have none (a
-            face without area, parallel edges), NaN where there is no hit. Shape (N, 3).
+        normal: Unit normal at that time: of the face by its winding, (f1 - f0) x (f2 - f0), or of
+            both edges, (ea1 - ea0) x (eb1 - eb0). Its sign does not tell from which side the
+            features come, and with a ``min_distance`` it is not the direction between them. Zeros
+            for a face without area or parallel edges, NaN where there is no hit. Shape (N, 3).
         weights: Of the four vertices of a row: (1, w, w, w) of the vertex and the face's vertices,
             or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4); (N, 3) of a point and an
             edge's ends, (N, 2) of two points.

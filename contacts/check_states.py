@@ -1,7 +1,5 @@
 """Checkers on a recorded run: what they would have reported, step by step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checker ``cloth``: two-dimensional flexes against geoms, one another and themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

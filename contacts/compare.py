@@ -1,7 +1,5 @@
 """Several checkers on one run of a scene, beside MuJoCo's contacts and the ground truth."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

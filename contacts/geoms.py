@@ -1,7 +1,5 @@
 """MuJoCo's geoms as the convex shapes of the native kernel."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

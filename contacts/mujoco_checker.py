@@ -1,7 +1,5 @@
 """The checker ``mujoco``: MuJoCo's own contacts at the end of the step."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

@@ -1,7 +1,5 @@
 """The result of a comparison: a score for every checker, events and disagreements."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checker ``rigid``: geoms against geoms, swept over the step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

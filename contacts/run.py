@@ -1,7 +1,5 @@
 """A run of a scene that several checkers observe."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

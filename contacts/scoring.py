@@ -1,7 +1,5 @@
 """The score of a checker in one run, beside the ground truth and MuJoCo."""
 
-from __future__ import annotations
-
 import itertools
 from collections import defaultdict
 from collections.abc import Sequence

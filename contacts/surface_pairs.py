@@ -1,7 +1,5 @@
 """Meshes by their surface: pairs of a mesh with a mesh or a box, through :mod:`tauguard.rigid`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

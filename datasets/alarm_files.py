@@ -4,8 +4,6 @@ The file is CSV with the columns ``episode`` (SPLIT/NUMBER, from 0), ``start`` a
 episode's clock], a line an alarm. An episode without a line had no alarm.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator, Sequence

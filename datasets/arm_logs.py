@@ -1,7 +1,5 @@
 """Logs of one real arm for the commands: files, joints, units, loads."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass

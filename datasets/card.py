@@ -4,8 +4,6 @@ Card and metadata depend only on ``dataset.json`` and the manifest, so a dataset
 same card. The checksums of shards and arms are in the manifest and in ``dataset.json``.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

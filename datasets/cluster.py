@@ -1,7 +1,5 @@
 """Shards computed by a Ray cluster (extra ``distributed``): one task a shard, one core a task."""
 
-from __future__ import annotations
-
 import itertools
 import logging
 from collections.abc import Callable, Generator, Iterable

@@ -253,7 +253,7 @@ def presets_of(header: Collection[str]) -> list[str]:
 
 
 def presets_of_width(width: int) -> list[str]:
-    """Names of the presets of files without a header line whose rows have so many columns."""
+    """Names of the presets for files without a header line whose rows have ``width`` columns."""
     return [name for name, one in PRESETS.items() if one.headerless and one.width == width]
 
 

@@ -1,7 +1,5 @@
 """The columns of a dataset's Parquet files: one row a sample, one row group an episode."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

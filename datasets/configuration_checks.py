@@ -1,7 +1,5 @@
 """The keys of a dataset's description: type, range, default, and errors that name them."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """A dataset's folder: its head file, its shards, and the lock of its one writer."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

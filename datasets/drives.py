@@ -1,7 +1,5 @@
 """From currents to joint torques for the arms of the presets: published drive numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Counts, balance, outcomes, leakage and damage of a dataset."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ A fault that a detector tolerates gives a note. A fault that would change the me
 is an error that names the row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -22,8 +20,8 @@ FURTHEST = 4 * np.pi
 SPAN = 0.1
 #: No arm's motor takes more [A].
 AMPERES = 100.0
-#: A current is saturated if it stays at its largest value for so many samples in a row, and that
-#: value is so many times the median.
+#: A current is saturated if it stays at its largest value for this many samples in a row, and that
+#: value is at least this multiple of the median.
 PLATEAU, ABOVE = 5, 3.0
 
 Where = Callable[[int], str]

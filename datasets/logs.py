@@ -1,7 +1,5 @@
 """Logs of real arms as traces: CSV with a column map, MCAP with ``sensor_msgs/JointState``."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -20,7 +18,7 @@ from tauguard.datasets.recognition import described, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
-#: Rows at a file's beginning from which units are told.
+#: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
 #: Rows that repeat the state are left out where they are this share, or more: a recorder that is
 #: faster than its robot. Below it, a standing arm repeats its numbers by chance.

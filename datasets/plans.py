@@ -1,7 +1,5 @@
 """Episodes to simulate, drawn from a seed: with collisions, without, and those of the demo."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

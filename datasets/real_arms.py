@@ -1,7 +1,5 @@
 """The numbers of a real arm: from its robot file, its drives, and what a user knows of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ What a name leaves open, numbers decide: angles beyond two turns are degrees, st
 than half a second are milliseconds or less.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

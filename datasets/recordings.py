@@ -1,7 +1,5 @@
 """Folders of labelled recordings, one MCAP file an episode: simulated, resumed, read."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Generator, Sequence

@@ -5,8 +5,6 @@ severity of a collision) is dealt from a separate deck, which is shuffled every 
 part of a split is balanced to within one round, and no two properties are correlated.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import zlib

@@ -1,7 +1,5 @@
 """A shard is a few episodes of one split. One task simulates and writes one shard."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Worker processes: none outlives the command, and it is an error if one dies."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

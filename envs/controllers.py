@@ -1,7 +1,5 @@
 """Basic controllers on the nominal Pinocchio model; each gives joint torques [N m]."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike

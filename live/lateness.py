@@ -49,7 +49,7 @@ class Lateness:
     def step(self, t: float, arrived: float) -> float:
         """Seconds that a sample with a believed time stamp is late; see :meth:`judge`.
 
-        A time stamp that goes back is a clock that begins anew.
+        If a time stamp decreases, the robot's clock was restarted and the measurement restarts too.
         """
         if t < self._time:
             self._least = float("inf")

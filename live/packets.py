@@ -91,7 +91,7 @@ class Fault:
 
 
 def _frozen(packets: Packets, rows: Rows) -> Packets:
-    """Time goes on, every signal stays."""
+    """The time stamps continue; every signal keeps its last value."""
     return _held(packets, rows, ("q", "qd", "current"))
 
 

@@ -31,8 +31,8 @@ VARIABLES = {
 }
 #: Connecting and the handshake together take no longer [s].
 HANDSHAKE = 5.0
-#: An open connection without a data packet for so long is given up: a robot that lost its power
-#: closes nothing [s].
+#: An open connection is given up after this time without a data packet, because a robot that loses
+#: its power does not close it [s].
 NO_DATA = 5.0
 #: Seconds between attempts to connect again.
 RETRY = 0.2
@@ -47,7 +47,7 @@ class UrStream(Closing):
         host: name or address of the controller.
         port: RTDE's.
         rate: samples a second to ask for (default: what the controller can give).
-        reconnect: seconds to go on trying after the connection broke; 0: give up at once.
+        reconnect: seconds of attempts to reconnect after the connection broke; 0: none.
 
     Raises:
         ConnectionError: no answer, another protocol version, or variables that the controller does

@@ -156,10 +156,10 @@ class Sensors:
             q: positions [rad].
             qd: velocities [rad/s].
             current: [A].
-            player: of the left-over errors, see :meth:`player`; it remembers the samples before.
+            player: adds left-over errors, see :meth:`player`; it depends on earlier samples.
 
         Raises:
-            ValueError: signals that are not all of one shape (T, n) for the n of these sensors.
+            ValueError: signals whose shapes differ, or are not (T, n) of these sensors.
         """
         if not (q.shape == qd.shape == current.shape and q.shape[-1:] == self.current_noise.shape):
             raise ValueError(

@@ -30,17 +30,18 @@ if TYPE_CHECKING:
 SLOW = 0.02
 #: Time constants of the filters of velocity and acceleration [s].
 FAST, SLOWER = 0.02, 0.06
-#: Time between two comparisons of the motions, which is that of a fade, too [s].
+#: Time between two comparisons of the motions, and duration of a fade [s].
 EVERY = 0.05
-#: A stretch is left when its motion is farther from the present one than the nearest by so much.
+#: A stretch is left when its motion is farther from the present one than the nearest stretch's by
+#: more than this.
 MARGIN = 1.0
-#: A stretch has at least so much of its log before it [s].
+#: Least remaining length of the log at the beginning of a stretch [s].
 LEAST = 0.2
-#: A joint that stops takes one of so many nearest stretches at random: stops differ. One that
-#: stands takes that which holds the most similar torque, of so many.
+#: A joint that stops takes one of the STOPS nearest stretches at random, because stops differ. A
+#: standing joint takes, of the STANDS nearest stretches, the one with the most similar torque.
 STOPS, STANDS = 8, 64
-#: A joint that has stood for so long keeps what it holds [s]; that fades so fast at rest, and once
-#: it moves [s].
+#: A joint that has stood for HELD keeps its torque [s]. The torque fades with the time constant
+#: FORGET at rest and RELEASE in motion [s].
 HELD, FORGET, RELEASE = 0.3, 1.6, 0.2
 #: Scales of speed [rad/s] and acceleration [rad/s^2]; weights of the features.
 SPEED, ACCELERATION = 0.05, 0.5

@@ -19,7 +19,7 @@ MOST_MEMORY, MOST_SECONDS = 1 << 30, 10.0
 MOST_WORK = 3
 #: Longest time in which MuJoCo is loaded, on a busy machine [s].
 LOADING = 60.0
-#: A process that nobody asks ends after so long [s].
+#: An idle process ends after this time [s].
 IDLE = 20
 
 #: What a trial does with the content of a request, its file's path or its text.

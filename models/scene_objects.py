@@ -83,7 +83,7 @@ class SceneObject:
     quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
     motion: str = "fixed"  #: one of :data:`MOTIONS`
     path: tuple[tuple[float, ...], ...] = ()
-    """Rows of time [s] and position [m], from 0 on; after the last row it begins anew. It replaces
+    """Rows of time [s] and position [m], from 0 on; after the last row it repeats. It replaces
     ``position``."""
     belt: Vector | None = None
     """Velocity of the surface of a conveyor in its own frame [m/s]: it stays where it is and

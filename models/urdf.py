@@ -20,8 +20,8 @@ from tauguard.models.urdf_inertia import mend_inertias
 
 #: Larger files are not read [bytes]; of a mesh of more triangles the convex hull collides.
 MOST_BYTES, MOST_FACES = 1 << 27, 50_000
-#: A mesh that only shows is drawn on a grid of so many cells along its longest side, the finest
-#: that leaves so many triangles.
+#: A visual mesh is simplified on the finest of these grids (cells along its longest side) that
+#: leaves at most this many triangles.
 SHOWN_CELLS, SHOWN_FACES = (64, 45, 32, 24), 5000
 #: Least thickness over length; what is thinner becomes the box around it: MuJoCo needs a volume.
 FLATTEST = 1e-3

@@ -166,7 +166,7 @@ def _left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) 
 
 
 def _sensors(traces: Sequence[Trace], n: int) -> Sensors:
-    """Quanta and times of the samples; all noise is in what is left over."""
+    """Quanta and times of the samples; the noise is part of the left-over errors."""
     one = max(traces, key=lambda trace: len(trace.t))
     steps = np.concatenate([np.diff(trace.t) for trace in traces])
     usual = float(np.median(steps))

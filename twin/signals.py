@@ -16,7 +16,7 @@ from tauguard.traces import Trace
 SLOW = 0.02
 #: Standard deviation of the filter of velocities that friction is computed from [s].
 SMOOTHING = 0.02
-#: A log ends, and another begins, where samples are so many intervals apart.
+#: A log is split where two samples are this many intervals apart.
 GAP = 4.0
 
 

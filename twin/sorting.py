@@ -1,4 +1,4 @@
-"""Are all logs of one arm, with the loads that were told? Those of another would spoil a twin."""
+"""Checks that all logs are of one arm with the stated loads; others would falsify a twin."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,9 @@ from tauguard.detectors.calibration.identification import REAL_FRICTION, identif
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.calibration.regression import filtered
 
-#: Logs are of two arms if each half predicts its own so many times better than all together do.
-#: Splitting the logs of one arm by program brings 1.0 to 1.2 (UR5, UR3, UR10e); two arms, or a load
-#: in some logs that was not told, bring 2.9 to 66.
+#: Logs are of two arms if each half predicts its own logs better than all logs do by this factor.
+#: Splitting the logs of one arm by program gives factors of 1.0 to 1.2 (UR5, UR3, UR10e). Two arms,
+#: or an unstated load in some logs, give 2.9 to 66.
 TWO = 2.0
 ROUNDS = 4
 

@@ -1,7 +1,5 @@
 """The pairs that a guard covers, and the eroded shapes by which it judges them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Energy and momentum of a scene, before and after."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -6,8 +6,6 @@ the structs, as :mod:`mujoco.introspect` declares it for the installed version; 
 what the binding shows.
 """
 
-from __future__ import annotations
-
 import ctypes
 import functools
 from typing import Any

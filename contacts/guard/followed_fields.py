@@ -1,7 +1,5 @@
 """Fields of a model that a guard copies or derives from; it reads all others at each step."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

@@ -1,7 +1,5 @@
 """The last resort: penetrating partners move rigidly together for one sub-step (impact zone)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The bodies that mocap bodies carry, and their velocity, for impact zones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

@@ -1,7 +1,5 @@
 """What one guarded step did."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -179,7 +179,7 @@ class GuardedStepper:
         """Pairs that were deep in one another when one of them last moved.
 
         An edit or the scene itself put them there. A pair is not followed until it has parted, so
-        it may leave on either side without a word in the report.
+        it may leave on either side unreported.
         """
         return self._named(self._guard.sunk())
 

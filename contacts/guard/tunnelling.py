@@ -1,7 +1,5 @@
 """Flexes of triangles against each other and themselves: do their middle surfaces cross?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

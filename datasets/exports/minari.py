@@ -1,7 +1,5 @@
 """Minari datasets (extra ``export``): one step a sample."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -112,9 +112,9 @@ HIGHEST = 0.98
 
 
 def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float) -> list[Array]:
-    """The training target: x / (1 + x) of x = sum over ``joints`` of |tau_ext|, in a unit.
+    """The training target x / (1 + x), where x is the scaled sum over ``joints`` of |tau_ext|.
 
-    The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is chosen so
+    The torques pass the observer's filter and are weighted by :data:`ALIKE`. The scale is chosen so
     that the collisions' peaks of x have the median :data:`MEDIAN_SEVERITY`, so arms of all sizes
     have the same targets. Labels 0/1 do not grow with torque and give no ranking. x / (1 + x) keeps
     the target within [0, 1), so hard impacts do not use up the regressor's bounded weights.

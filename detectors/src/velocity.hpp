@@ -1,6 +1,6 @@
-// Joint velocity from measured position and velocity together: a Kalman filter in its steady state
-// on position, velocity and acceleration, the acceleration being a random walk. Below some hundred
-// rad/s a position says more of the velocity than the measured velocity does.
+// Joint velocity from measured position and velocity: a steady-state Kalman filter on position,
+// velocity and acceleration. The acceleration is a random walk. Below some hundred rad/s the
+// measured positions determine the velocity better than the measured velocity does.
 #pragma once
 
 #include <cstddef>

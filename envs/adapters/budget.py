@@ -1,7 +1,5 @@
 """Costs as libraries of constrained reinforcement learning expect them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Wrappers that add to the observation: a camera beside the arm, and a detector in the loop."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Episodes of a policy as a Minari dataset for offline learning (extra ``export``)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Reactions to a collision: a wrapper that acts in place of the policy."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Any
 

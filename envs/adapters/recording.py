@@ -1,7 +1,5 @@
 """A wrapper that writes every episode as an MCAP recording, with a row for each physics step."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.metadata
 import json

@@ -1,7 +1,5 @@
 """Speed and separation monitoring: the arm stops before a person can be reached."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Contact checkers on an episode: the recorded motion of the arm and of the obstacles, replayed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import mujoco

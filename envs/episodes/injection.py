@@ -1,7 +1,5 @@
 """How a planned collision is carried out: its target, and the obstacle or wrench that causes it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

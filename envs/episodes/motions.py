@@ -1,7 +1,5 @@
 """Smooth joint motions with speed as a percentage of the maximum."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Where the links and joints of a scene's arm are along its joint positions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

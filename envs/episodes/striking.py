@@ -1,7 +1,5 @@
 """Carrying out a planned collision: find a target, search the strength, run its window."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -21,7 +21,7 @@ ARMS = "contact_arms"
 
 
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
-    """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
+    """The scene with a second, nominal arm of the same kind; its joints and links come last.
 
     The two arms can touch each other and everything around them. The model has no visual shapes;
     ``xml`` has them.

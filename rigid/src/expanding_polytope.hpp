@@ -64,9 +64,9 @@ class PointDifferences {
     return best;
   }
 
-  // Four differences that span space: one, the farthest from it, the farthest from their line, and
-  // the farthest from their plane. False if there are none; `normal` is then a normal of the set
-  // that they span, zero for a point.
+  // Finds four differences that span space: a first one, the farthest from it, the farthest from
+  // the line of both, and the farthest from the plane of the three. False if there are none;
+  // `normal` is then a normal of the set that they span, zero for a point.
   bool span(std::array<Vector3<Number>, 4>* y, std::array<Source, 4>* from, Vector3<Number>* normal,
             bool* thin) const {
     const Vector3<Number> y0 = at({0, 0});

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 #: One mark for each element.
 Bools = NDArray[np.bool_]
 
-#: An array of so many elements is written out, a text of so many characters too.
+#: Largest array, in elements, and largest text, in characters, that a message shows whole.
 FEW, SHORT = 7, 60
 
 

@@ -1,4 +1,4 @@
-"""Names of the environments for ``gymnasium.make``; nothing of them is imported before."""
+"""Registers the environments with Gymnasium; each is imported when it is made."""
 
 #: Name -> module and class prefix, and how many actions an episode has.
 ENVIRONMENTS = {

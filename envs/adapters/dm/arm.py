@@ -1,7 +1,5 @@
 """The arm as a ``dm_control.composer`` entity, to be attached to any arena."""
 
-from __future__ import annotations
-
 from typing import Any
 from xml.etree import ElementTree
 

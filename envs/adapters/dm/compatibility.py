@@ -1,7 +1,5 @@
 """Repairs dm_control for a MuJoCo that is newer than it."""
 
-from __future__ import annotations
-
 
 def repair() -> list[str]:
     """Drop the array names that MuJoCo's structures lack from dm_control's tables.

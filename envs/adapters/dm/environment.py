@@ -1,7 +1,5 @@
 """A Gymnasium environment as a ``dm_env`` one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import dm_env

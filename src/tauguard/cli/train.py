@@ -76,9 +76,9 @@ def command(
             --false-alarms-per-hour), error (beyond the bounds for half of the time), gravity (not
             that of the robot file).
         arm: of a dataset with several arms, the one that the detector is for.
-        folds: with --traces, parts of the recordings that are left out in turn, load by load, and
-            so many more fits (default: 3); 1 is quicker and keeps a third of them for the
-            threshold.
+        folds: with --traces, number of parts of the recordings that are left out in turn, load by
+            load; each part takes another fit (default: 3). 1 is quicker and keeps a third of the
+            recordings for the threshold.
         reading: with --free, how logs are read.
     """
     if folds is not None and folds < 1:

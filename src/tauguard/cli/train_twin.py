@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 #: Episodes with contacts, each of another individual, and contacts in each.
 STRUCK, CONTACTS = 24, 6
-#: Seconds that a hand's push lasts; so many of the strikes become pushes, and so many pushes find
-#: the arm standing.
+#: Duration of a hand's push [s]; fraction of the strikes that become pushes; fraction of the pushes
+#: that meet a standing arm.
 PUSH, PUSHED, STANDING = (0.1, 1.2), 0.5, 0.5
 #: Percent of the joints' largest speeds, in turn.
 SPEEDS = (10.0, 30.0, 60.0)

@@ -27,7 +27,7 @@ def command(
         out: .gif, .webp, .png or .mp4 (default: RECORDING with the ending .gif).
         start: of the part that is drawn [s].
         seconds: of recording that are drawn (default: to the end).
-        slower: than real time, so many times.
+        slower: factor by which the video is slower than real time.
         rate: frames a second.
         width: of the picture [px].
         height: of the picture [px].
