@@ -24,7 +24,7 @@ from tauguard.detectors.estimation.velocity import SensorNoise
 #: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3
 #: Rows of :attr:`Estimate.motion`.
-MOTION = 3
+MOTION = 4
 #: Unknowns of the payload: mass [kg] and first moment in the last link's frame [kg m].
 PAYLOAD = 4
 
@@ -57,10 +57,10 @@ class Unknowns:
     hold any torque. 0: joints at rest correct the unknowns, too."""
     transition: float = 0.0
     """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
-    30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
+    30/s [N m], (transition c_j)^2 is added to ``noise^2`` of a correction."""
     weighted: bool = False
-    """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + (transition
-    c_j)^2 + s_j^2), with s_j the standard deviation that the uncertain payload gives it."""
+    """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + s_j^2), with
+    s_j the standard deviation that the uncertain payload gives it."""
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
@@ -148,10 +148,11 @@ class Estimate:
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
     unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
     motion: Array
-    """What the noise grows with, shape (T, 3, n); 0 without unknowns. With the mass matrix M of arm
-    and tracked payload: the torque of accelerations, sum_k |M_jk qdd_k| (velocities differentiated
-    at 30/s) [N m]; the norm of row j of M [kg m^2]; and the largest change of the joint's friction
-    of late (forgotten with 0.3 s) [N m]."""
+    """What the noise grows with, shape (T, 4, n). With the mass matrix M of arm and tracked payload:
+    the torque of accelerations, sum_k |M_jk qdd_k| (velocities differentiated at 30/s) [N m]; the
+    norm of row j of M [kg m^2]; the largest change of the joint's friction of late (forgotten with
+    0.3 s) [N m]; these are 0 without unknowns. In a slow log (``sampled``) half the change of the
+    joint's torque since the last sample [N m], else 0."""
     plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
@@ -239,7 +240,7 @@ class Estimator:
         out: Array,
         dt: float | None = None,
     ) -> None:
-        """One sample into ``out``, shape (5, n): residual, unexplained and three rows of motion.
+        """One sample into ``out``, shape (6, n): residual, unexplained and four rows of motion.
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite; the state is as before.

@@ -10,20 +10,23 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 
 #: Weights of a joint.
-TERMS = 5
+TERMS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class NoiseModel:
-    """What free motion leaves of the residual: per joint a + b |qd_j| + c T_j + d |M_j| + e C_j.
+    """What free motion leaves of the residual of joint j: its standard deviation is
+    a + b |qd_j| + c T_j + d |M_j| + e C_j + f S_j.
 
     T_j is the torque that accelerations take (inertia is known to some percent), |M_j| the norm of
     the joint's row of the mass matrix with the payload that it carries (the noise of velocities,
-    times inertia), and C_j how far the joint's friction has lately changed (it starts, stops or
-    turns): the rows of :attr:`~tauguard.detectors.Estimate.motion`.
+    times inertia), C_j how far the joint's friction has lately changed (it starts, stops or turns),
+    and S_j half the change of its torque between two samples of a slow log, which is the largest
+    error of the mean that stands for what happens between them: the rows of
+    :attr:`~tauguard.detectors.Estimate.motion`.
     """
 
-    weights: Array  #: shape (n, 5), not negative [N m per unit]
+    weights: Array  #: shape (n, 6), not negative [N m per unit]
 
     @classmethod
     def fit(cls, residual: Array, qd: Array, motion: Array) -> NoiseModel:
@@ -32,7 +35,7 @@ class NoiseModel:
         Args:
             residual: residual of free motion [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            motion: of the estimate, shape (T, 3, n).
+            motion: of the estimate, shape (T, 4, n).
         """
         from scipy.optimize import nnls
 

@@ -61,7 +61,7 @@ class Scaling(Frozen):
         Args:
             residual: [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            motion: of the estimate, shape (T, 3, n).
+            motion: of the estimate, shape (T, 4, n).
             out: where to write it (default: a new array).
         """
         found = np.empty((len(residual), len(self.joints))) if out is None else out

@@ -16,21 +16,22 @@
 // the unknowns only after it has moved for that time.
 //
 // Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
-// fraction `transition` of the change: a variance that is added to the noise's.
+// fraction `transition` of the change: a variance that is added to the noise of a correction.
 //
-// What the unknowns do not explain counts less where payload or friction is uncertain (`weighted`):
-// it is divided by the deviation of noise, payload and change of friction together, in units of the
-// noise's.
+// What the unknowns do not explain counts less where the payload is uncertain (`weighted`): it is
+// divided by the deviation of noise and payload together, in units of the noise's.
 //
 // What the noise of the residual grows with, beside the speed (`motion_numbers` a joint), if there
 // are unknowns: the torque of accelerations, sum_k |M_jk qdd_k|, since inertia is known to some
 // percent; the norm of the joint's row of the mass matrix M, since the noise of velocities, times
-// inertia, is most of what a joint at rest shows; and how far friction was of late from its usual
-// value: a joint breaks away, stops or turns. M is that of arm and tracked payload.
+// inertia, is most of what a joint at rest shows; how far friction was of late from its usual
+// value: a joint breaks away, stops or turns; and, in a slow log, half the change of torque since
+// the last sample. M is that of arm and tracked payload.
 //
 // Torques act until the next sample, or with `sampled` are instants of a slow log: between two of
 // them torque and friction count with their mean, as gravity does. Half a sample of lag would
-// otherwise be, while an arm accelerates, as large as a collision.
+// otherwise be, while an arm accelerates, as large as a collision. The mean of the two ends is
+// wrong by up to half of their difference: a brake acts at once, at an unknown time between them.
 //
 // The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
 #pragma once
@@ -49,7 +50,7 @@ namespace tauguard::detectors {
 
 constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
-constexpr int motion_numbers = 3;           // torque of accelerations, inertia, change
+constexpr int motion_numbers = 4;           // torque of accelerations, inertia, change, half a step
 constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
 constexpr double slow = 0.02;               // a joint slower than this stands [rad/s]
 
@@ -86,11 +87,12 @@ class Estimator {
         adapts_(errors_.any()),
         carrying_(chain_),
         mass_(n_ * n_) {
-    for (auto* v : {&p_,     &beta_,           &p_before_,         &beta_before_,
-                    &tau_,   &tau_before_,     &residual_,         &decay_,
-                    &plain_, &plain_tau_,      &plain_tau_before_, &smooth_,
-                    &usual_, &inertia_,        &change_,           &acceleration_,
-                    &one_,   &column_of_mass_, &unused_,           &moved_})
+    for (auto* v : {&p_,        &beta_,           &p_before_,         &beta_before_,
+                    &tau_,      &tau_before_,     &residual_,         &decay_,
+                    &plain_,    &plain_tau_,      &plain_tau_before_, &smooth_,
+                    &usual_,    &inertia_,        &change_,           &acceleration_,
+                    &one_,      &column_of_mass_, &unused_,           &moved_,
+                    &half_step_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
@@ -134,6 +136,7 @@ class Estimator {
       acceleration_[j] = std::fabs(acceleration_rate * (qd[j] - smooth_[j]));
       motion[n_ + j] = inertia_[j];
       motion[2 * n_ + j] = change_[j];
+      motion[3 * n_ + j] = half_step_[j];
     }
     for (std::size_t j = 0; j < n_; ++j) {
       motion[j] = 0.0;
@@ -156,8 +159,8 @@ class Estimator {
     std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v :
-         {&residual_, &plain_, &load_, &own_, &usual_, &mass_, &inertia_, &change_, &moved_})
+    for (auto* v : {&residual_, &plain_, &load_, &own_, &usual_, &mass_, &inertia_, &change_,
+                    &moved_, &half_step_})
       std::fill(v->begin(), v->end(), 0.0);
     errors_.reset();
     since_ = 0.0;
@@ -231,6 +234,7 @@ class Estimator {
       return before + now * (after - before);
     };
     for (std::size_t j = 0; j < n_; ++j) {
+      half_step_[j] = now * std::fabs(tau_[j] - tau_before_[j]);
       residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j],
                                    beta_before_[j], acting(tau_before_[j], tau_[j]));
       plain_[j] = observer_step(plain_[j], plain_decay_, dt, p_[j], p_before_[j], beta_[j],
@@ -263,7 +267,7 @@ class Estimator {
   double certainty(std::size_t j) const {
     if (!set_.weighted) return 1.0;
     const double noise = set_.noise[j] * set_.noise[j];
-    const double more = changed(j) + errors_.payload_variance(load(j));
+    const double more = errors_.payload_variance(load(j));
     return more > 0 ? std::sqrt(noise / (noise + more)) : 1.0;
   }
 
@@ -293,7 +297,7 @@ class Estimator {
   bool adapts_;
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
-  std::vector<double> own_now_, own_before_, own_, smooth_, usual_, moved_;
+  std::vector<double> own_now_, own_before_, own_, smooth_, usual_, moved_, half_step_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
   Chain carrying_;  // the arm with the tracked payload
   std::vector<double> mass_, inertia_, change_, acceleration_, one_, column_of_mass_, unused_;

@@ -66,7 +66,7 @@ class KernelSum {
 
 // Terms of the noise model: 1, own speed, and what the estimator says of the motion, a row of n
 // each.
-constexpr std::size_t motion_rows = 3, noise_terms = 2 + motion_rows;
+constexpr std::size_t motion_rows = 4, noise_terms = 2 + motion_rows;
 
 // Residuals of the chosen joints in units of their noise, row by row.
 class Scaling {

@@ -13,6 +13,7 @@ from tauguard.detectors import (
     mass_matrix,
     observe,
 )
+from tauguard.traces import resampled
 
 
 def test_without_unknowns_and_friction_it_is_the_momentum_observer(training, robot, drive_gain):
@@ -42,7 +43,7 @@ def test_online_equals_batch_bitwise(training, alarm):
     estimator = Estimator(alarm.detector.arm)
     batch = estimator.run(trace.t, trace.q, trace.qd, trace.current, keep=True)
     estimator.reset()
-    out = np.empty((5, 6))
+    out = np.empty((6, 6))
     for k in range(2000):
         dt = trace.t[k] - trace.t[k - 1] if k else None
         estimator.step(trace.q[k], trace.qd[k], trace.current[k], out, dt)
@@ -80,25 +81,43 @@ def test_what_is_uncertain_counts_less(training, alarm):
     assert share[8, 1] < 0.3 < np.median(share[5000:, 1])
 
 
-def test_friction_that_has_just_changed_counts_less(robot, drive_gain):
-    level, share, gain, start = 10.0, 0.3, 200.0, 300
+def test_a_change_of_friction_counts_in_what_the_noise_grows_with_and_nowhere_else(
+    robot, drive_gain
+):
+    level, gain, start = 10.0, 200.0, 300
     friction = FrictionModel.coulomb_viscous(np.full(6, level), np.zeros(6), width=1e-6)
     arm = ArmModel(robot, drive_gain, friction, noise=np.ones(6))
     t = np.arange(1000) * 1e-3
     qd = np.where((t >= start * 1e-3)[:, None], 0.5, 0.0) * np.ones(6)
     q = 0.2 + np.cumsum(qd, axis=0) * 1e-3
-    known = Unknowns(payload=0.0, moment=0.0, transition=share, weighted=True)
+    known = Unknowns(payload=0.0, moment=0.0, transition=0.3, weighted=True)
     whole, careful = (
-        Estimator(arm, gain, unknowns=u).run(t, q, qd, np.ones_like(q)).unexplained
+        Estimator(arm, gain, unknowns=u).run(t, q, qd, np.ones_like(q))
         for u in (replace(known, weighted=False), known)
     )
+    np.testing.assert_array_equal(careful.unexplained, whole.unexplained)
     since = t[start + 1 :] - t[start]  # friction is a step behind two low-passes
     change = level * gain / (gain - 30) * (np.exp(-30 * since) - np.exp(-gain * since))
-    expected = 1 / np.sqrt(1 + (share * change) ** 2)
-    np.testing.assert_array_equal(careful[1:start], whole[1:start])
-    got = careful[start + 1 :] / whole[start + 1 :]
-    np.testing.assert_allclose(got, np.broadcast_to(expected[:, None], got.shape), atol=0.03)
-    assert expected.min() < 0.5
+    most = np.maximum.accumulate(change)
+    got = careful.motion[start + 1 :, 2]
+    assert (careful.motion[1:start, 2] == 0).all()
+    top = int(change.argmax())
+    np.testing.assert_allclose(got[:top], np.broadcast_to(most[:top, None], (top, 6)), atol=0.5)
+    late = most[-1] * np.exp(-(since - since[top]) / 0.3)  # it is forgotten slowly
+    np.testing.assert_allclose(got[top + 50], np.full(6, late[top + 50]), rtol=0.05)
+
+
+def test_the_noise_of_a_slow_log_grows_with_half_a_change_of_torque(training, robot, drive_gain):
+    trace = resampled(training[0], 25.0)
+    friction = FrictionModel.coulomb_viscous(np.arange(1.0, 7), np.arange(6.0), 0.01)
+    arm = ArmModel(robot, drive_gain, friction)
+    given = trace.t, trace.q, trace.qd, trace.current
+    slow = Estimator(arm, dt=trace.dt, sampled=True).run(*given).motion[:, 3]
+    held = Estimator(arm, dt=trace.dt).run(*given).motion[:, 3]
+    tau = trace.current * drive_gain
+    tau = tau - friction.torque(trace.q, trace.qd, tau)
+    np.testing.assert_allclose(slow[1:], np.abs(np.diff(tau, axis=0)) / 2, atol=1e-9)
+    assert (held == 0).all()
 
 
 def test_an_error_that_lasts_is_not_taken_for_friction_that_changed(training, alarm):
@@ -146,7 +165,7 @@ def test_what_unknowns_may_be(wrong):
 def test_bad_samples_leave_the_state_alone(training, alarm):
     trace = training[0]
     good, bad = Estimator(alarm.detector.arm), Estimator(alarm.detector.arm)
-    a, b = np.zeros((2, 5, 6))
+    a, b = np.zeros((2, 6, 6))
     for k in range(30):
         sample = trace.q[k], trace.qd[k], trace.current[k]
         good.step(*sample, a)

@@ -80,7 +80,7 @@ def test_the_estimator_uses_it_online_as_in_batch(pendulum):
     fusing = Estimator(ArmModel(pendulum, np.ones(1), sensors=NOISE), 200.0, DT)
     batch = fusing.run(t, q, qd, current)
     noisy = plain.run(t, q, qd, current)
-    out, rows = np.zeros((5, 1)), []
+    out, rows = np.zeros((6, 1)), []
     fusing.reset()
     for k in range(len(t)):
         fusing.step(q[k], qd[k], current[k], out, DT if k == 0 else t[k] - t[k - 1])

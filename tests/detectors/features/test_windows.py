@@ -58,8 +58,8 @@ def test_windows_are_causal_and_equal_to_a_plain_gather(seed, lag, count):
 def test_scaling_is_its_formula_row_by_row(seed, joints, envelope):
     rng = np.random.default_rng(seed)
     left, qd = rng.normal(size=(2, 50, joints)) * 3
-    motion = np.abs(rng.normal(size=(50, 3, joints)))
-    known = NoiseModel(rng.uniform(0.1, 1, (joints, 5))) if envelope else None
+    motion = np.abs(rng.normal(size=(50, 4, joints)))
+    known = NoiseModel(rng.uniform(0.1, 1, (joints, 6))) if envelope else None
     chosen = (0, joints - 1)
     scaling = Scaling(chosen, known, 5.0, 0.7, compress=True)
     truth = 0.7 * left[:, chosen]
@@ -76,17 +76,17 @@ def test_scaling_refuses_joints_that_are_not_there():
     for joints, size in (((0, 5), 4), ((0, -1), 4)):
         scaling = Scaling(joints, None)
         with pytest.raises(ValueError, match="one number a joint"):
-            scaling.rows(*np.zeros((2, 1, size)), np.zeros((1, 3, size)))
+            scaling.rows(*np.zeros((2, 1, size)), np.zeros((1, 4, size)))
     with pytest.raises(ValueError, match="one number a joint"):
-        Scaling((0,)).rows(np.zeros((1, 6)), np.zeros((1, 5)), np.zeros((1, 3, 6)))
+        Scaling((0,)).rows(np.zeros((1, 6)), np.zeros((1, 5)), np.zeros((1, 4, 6)))
     with pytest.raises(ValueError, match="expected some joints"):
         Scaling(())
 
 
 def test_envelope_finds_what_the_noise_grows_with():
     rng = np.random.default_rng(0)
-    qd, motion = rng.normal(size=(20000, 2)), np.exp(rng.normal(size=(20000, 3, 2)))
-    truth = np.array([[1.0, 0.5, 0.0, 0.3, 0.0], [0.2, 0.0, 0.3, 0.0, 0.2]])
+    qd, motion = rng.normal(size=(20000, 2)), np.exp(rng.normal(size=(20000, 4, 2)))
+    truth = np.array([[1.0, 0.5, 0.0, 0.3, 0.0, 0.2], [0.2, 0.0, 0.3, 0.0, 0.2, 0.0]])
     scale = NoiseModel(truth).scale(qd, motion)
     left = scale * rng.normal(size=qd.shape)
     fitted = NoiseModel.fit(left, qd, motion)
@@ -95,8 +95,8 @@ def test_envelope_finds_what_the_noise_grows_with():
 
 
 def test_a_joint_without_any_residual_keeps_a_scale_above_zero():
-    silent = NoiseModel.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 3, 1)))
-    assert (silent.scale(np.zeros(1), np.zeros((3, 1))) > 0).all()
+    silent = NoiseModel.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 4, 1)))
+    assert (silent.scale(np.zeros(1), np.zeros((4, 1))) > 0).all()
 
 
 def test_scaling_brings_the_median_distance_to_what_was_asked(alarm, training):
