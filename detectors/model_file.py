@@ -28,8 +28,8 @@ from tauguard.untrusted_input import reading
 #: The version changes with what a detector computes from the same content, too: a threshold of
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
 #: of regressors are severities; 4: that filter learns less of a held contact; 5: the noise model
-#: knows inertia, payload and changes of friction; 6: also steps of torque in slow logs, and a change
-#: of friction counts once.
+#: knows inertia, payload and changes of friction; 6: also changes of
+#: torque in slow logs, and a change of friction counts once.
 FORMAT, VERSION = "tauguard model", 6
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
