@@ -4,13 +4,14 @@ Points also meet edges and points, which the same kernels treat as faces without
 
 ab2pf takes the given doubles as exact. A query is a hit if and only if there is a contact at
 some time of the step in exact arithmetic. ``toi`` is at most 1e-9 of the step before the first
-such time. The cost of a query is bounded: three cuts of its cubic into at most three pieces of
-one root, 40 Newton steps each; then 41 cuts into intervals (124 at most) of 20 separating
-directions each; then a fixed number of signs of polynomials of degree 3 in exact integers, of
-fixed width first, and of any length if these do not decide. Most queries take some 20 ns, those
-that the fixed width decides 3 us. The worst take 200 us for positions of similar magnitude, and
-0.2 s if magnitudes within one query span 10^600, the widest range of doubles. With a minimum
-distance: 4001 cuts, no exact arithmetic, conservative.
+such time. The cost of a query is bounded. First its cubic is cut three times, into at most three
+pieces with one root each, which take 40 Newton steps each. Queries that stay open are cut into at
+most 124 intervals, with 20 separating directions each. The rest is decided by a fixed number of
+signs of polynomials of degree 3, in integers of fixed width and then of any length. Most queries
+take some 20 ns, those that the fixed width decides 3 us. The worst take 200 us for positions of
+similar magnitude, and 0.2 s if magnitudes within one query span 10^600, the widest range of
+doubles. A query with a minimum distance takes at most 4001 cuts, uses no exact arithmetic and is
+conservative.
 """
 
 from collections.abc import Mapping

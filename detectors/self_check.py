@@ -54,7 +54,7 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 def check_alarms(alarm: CollisionAlarm) -> None:
     """Refuse a detector that no impact moves, or one that is never silent on an arm at rest.
 
-    A learned score and the plain thresholds beneath it have to do so each by itself.
+    A learned score and the plain thresholds that it contains are checked separately.
 
     Raises:
         ValueError: says which, or that a score is not a number.

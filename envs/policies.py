@@ -23,7 +23,7 @@ SEEN = 1e5
 class MlpPolicy:
     """Layers with tanh between them, after a normalisation of the observation.
 
-    ``policy(observation)`` is the action, shape (m,), or a row each of observations (N, size).
+    ``policy(observation)`` is the action, shape (m,); of observations (N, size) it is (N, m).
     """
 
     mean: Array  #: of the observation, shape (size,)

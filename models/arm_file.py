@@ -57,9 +57,9 @@ def read_arm(
 ) -> ArmFile:
     """The arm in a file.
 
-    Actuators, sensors and keyframes are left out (the drive is ours), welded bodies are fused into
-    the links that carry them, mesh files are written into the text. A link without collision
-    geometry collides as the convex hulls of what shows, and gets a capsule where nothing does.
+    Actuators, sensors and keyframes are left out, because the drive is simulated here. Welded
+    bodies are fused into the links that carry them; mesh files are written into the text. A link
+    without collision geometry gets the convex hulls of its visual shapes; without these, a capsule.
 
     Args:
         path: MJCF or URDF.

@@ -1,11 +1,11 @@
 """The currents that a model of an arm's drives does not explain, replayed along like motions.
 
 Most of what a model of a real drive does not explain repeats with the motion, has heavy tails and
-depends on speed, acceleration and the time since a stop. Random processes have its level and are
-wrong in kind. Stretches of the recorded error are right in kind: while the motion is like that of
-the log, the log's error runs on; where it differs, another stretch is faded in, that of the nearest
-motion (as in motion matching for animated characters: Clavet 2016, "Motion matching and the road to
-next-gen animation"). Each joint is matched by itself.
+depends on speed, acceleration and the time since a stop. A random process can have the same level
+but not this structure. Stretches of the recorded error have it. While the motion resembles that of
+the log, the log's error is continued. When it differs, the stretch with the most similar motion is
+faded in, as in motion matching for animated characters (Clavet 2016, "Motion matching and the road
+to next-gen animation"). Each joint is matched separately.
 """
 
 from __future__ import annotations

@@ -90,8 +90,8 @@ class RobotDrive:
     ripple: RobotRipple | None = None
     sensors: RobotSensors | None = None
     like: str | None = None
-    """``"cura6"``: joints of which neither this nor the file states friction get that arm's losses
-    (:mod:`tauguard.models.arm_drive`), all joints its ripple, lag and sensor noise."""
+    """``"cura6"``: all joints get that arm's ripple, lag and sensor noise. Joints whose friction
+    neither this nor the file states also get its losses (:mod:`tauguard.models.arm_drive`)."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""

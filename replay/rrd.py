@@ -104,7 +104,7 @@ def write_rrd(
 
 
 def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
-    """Send the layout before any data, since a viewer plays until it has read that it should wait.
+    """Send the layout before any data: it tells the viewer not to play at once.
 
     Without the flush a busy machine may write data first.
     """

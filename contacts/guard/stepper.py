@@ -269,7 +269,7 @@ class GuardedStepper:
     def _impact_zone(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
         """Stop the partners of these rows from the positions at that address on.
 
-        Also the work that mocap bodies did by it [J].
+        Returns also the work that mocap bodies did through these contacts [J].
         """
         size = ctypes.c_double * self.model.nq
         start = np.array(size.from_address(qpos))

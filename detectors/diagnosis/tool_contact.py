@@ -1,8 +1,8 @@
 """The force of a contact whose place is known: the tool, as in most handling and pushing.
 
-With the place given, six joints see three components, and what is uncertain is the torque: a joint
-at rest takes up to its friction of a push before its drive shows any. The force is Gaussian with
-one of several sizes, which the torques themselves weigh.
+If the place is known, the torques of six joints determine the three components of the force. The
+uncertainty is in the torques: static friction of a joint at rest hides that much of a push. The
+prior of the force is a mixture of Gaussians of several sizes, weighted by their likelihood.
 """
 
 from __future__ import annotations

@@ -128,12 +128,12 @@ struct Sensed {
   double dt;
 };
 
-// Reads the regions' contact sensors. An impact counts against the transient limit, unbroken
-// contact beyond half a second and a region that cannot move away against the quasi-static one.
-// Where no impact is allowed the ratio is against the quasi-static limit. What costs is the force
-// beyond the limit that the arm would exert if nobody but it moved: not more than the stiffness
-// times its advance since the touch, so nothing where somebody runs into an arm that stands.
-// `between` is the force between two arms, which are never meant to touch: all of it is cost.
+// Reads the regions' contact sensors. An impact is compared with the transient limit. Contact that
+// lasts for more than half a second, or on a region that cannot move away, is compared with the
+// quasi-static limit; so is every contact where no impact is allowed. The cost is the force beyond
+// the limit that the arm alone would cause: at most the stiffness times its advance since the
+// touch. If somebody runs into an arm at rest, the cost is 0. `between` is the force between two
+// arms, which must not touch: all of it is cost.
 inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, const Sensed& step,
                          Contact& c, const Touched& peak, double between) {
   double excess = between;

@@ -104,7 +104,7 @@ def command(
 
 
 def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
-    """The logs without those that the others do not predict, and a note on each of these.
+    """The logs that the other logs predict, and a note on each one left out.
 
     Raises:
         ValueError: logs of two arms.
