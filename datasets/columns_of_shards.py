@@ -154,7 +154,7 @@ def trace_of(rows: pa.Table, line: Mapping[str, Any], attachments: Mapping[str, 
     """The inverse of :func:`table`.
 
     Args:
-        rows: of one episode.
+        rows: rows of one episode.
         line: the episode's line of the manifest.
         attachments: the nominal arm and what else belongs to it.
     """

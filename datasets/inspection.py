@@ -246,7 +246,7 @@ def same_again(
     """Simulate an episode from its line; the trace, and whether it equals the stored samples.
 
     Args:
-        folder: of the dataset.
+        folder: folder of the dataset.
         line: of its manifest.
         robot: the file of the episode's arm, where it is not the package's own.
 

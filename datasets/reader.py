@@ -143,7 +143,7 @@ def episodes_of_splits(
     """Names of splits, and their episodes of the arm that a detector was trained for.
 
     Args:
-        folder: of the dataset.
+        folder: folder of the dataset.
         robot: the detector's numbers of its arm.
         splits: by name (default: those whose name begins with "test").
 

@@ -114,7 +114,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
     """The labelled recordings in a folder and those below it, in the order of their paths.
 
     Args:
-        folder: of MCAP recordings, or a dataset of `tauguard generate`, of which the first split is
+        folder: folder of MCAP recordings, or a dataset of `tauguard generate`, whose first split is
             read.
         arm: in a dataset with several arms, the one whose episodes are read.
 

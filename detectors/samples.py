@@ -52,7 +52,7 @@ def check_trace(trace: Trace, joints: int, dt: float) -> None:
 
 
 def check_interval(what: str, trace: Trace, dt: float) -> None:
-    """Refuse a trace that is not sampled every ``dt`` seconds, to a quarter.
+    """Refuse a trace whose sample interval differs from ``dt`` by a quarter or more.
 
     Raises:
         ValueError: names ``what`` and both intervals.
@@ -67,5 +67,5 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
 
 
 def same_rate(dt: float, trained: float) -> bool:
-    """Whether two sample intervals are equal to a quarter."""
+    """Whether two sample intervals differ by less than a quarter of the shorter."""
     return 0.8 < dt / trained < 1.25

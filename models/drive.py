@@ -152,7 +152,7 @@ class Sensors:
         """Measured signals from true ones of shape (T, n): noise is added, then they are quantised.
 
         Args:
-            rng: of the noise.
+            rng: generator of the noise.
             q: positions [rad].
             qd: velocities [rad/s].
             current: [A].
@@ -250,7 +250,7 @@ class Drive:
 
         Args:
             torque_limit: may be infinite [N m], shape (n,).
-            gain: of every joint [N m/A].
+            gain: gain of every joint [N m/A].
         """
         limit = np.asarray(torque_limit, dtype=float)
         same = np.full(limit.shape, gain)

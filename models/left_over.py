@@ -229,7 +229,7 @@ class Player:
         Args:
             source: what is played.
             dt: sample interval of the motion [s].
-            rng: of what a joint that stands holds.
+            rng: generator of the random choices between stretches.
         """
         n = source.qd.shape[1]
         self._source, self._rng, self._step = source, rng, dt * source.rate

@@ -68,7 +68,7 @@ def link_surface(
     Args:
         source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
         points: wanted on each link.
-        seed: of the lines.
+        seed: seed of the lines.
 
     Raises:
         ValueError: no model, or no collision geometry (``contype`` or ``conaffinity``) on any

@@ -192,7 +192,7 @@ def add_payload(
     """A copy of ``model`` that carries a payload on its last joint.
 
     Args:
-        model: of an arm.
+        model: model of an arm.
         mass: [kg].
         com: in the last joint's frame [m], (3,).
         inertia: about the payload's centre of mass [kg m^2], a number or (3, 3).

@@ -17,12 +17,12 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
     """Draw a stretch of a recording as PNG; the file is written atomically.
 
     Args:
-        path: of the picture.
+        path: path of the picture.
         trace: the stretch, with its truth.
-        detection: of that stretch.
+        detection: detection of that stretch.
         held: the score that was reached during the whole confirmation time, shape (T,) of that
             stretch. It is an alarm if it exceeds the threshold.
-        title: of the picture.
+        title: title of the picture.
 
     Raises:
         OSError: the folder cannot be written.

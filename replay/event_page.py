@@ -29,7 +29,7 @@ def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[st
     Args:
         event: of this trace.
         trace: with truth.
-        threshold: of the score.
+        threshold: threshold of the score.
         held: the score that was reached during the whole confirmation time, shape (T,).
     """
     import numpy as np

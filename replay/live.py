@@ -36,7 +36,7 @@ class LiveView:
         Args:
             model: ``mujoco.MjModel`` of the scene.
             save: a ``.rrd`` file instead of a viewer.
-            port: of the viewer.
+            port: port of the viewer.
 
         Raises:
             OSError: the viewer did not come up, or the file cannot be written.

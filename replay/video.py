@@ -35,11 +35,11 @@ def frames(
 
     Args:
         trace: as :func:`tauguard.traces.read_mcap` gives it.
-        start: of what is drawn [s].
+        start: start of what is drawn [s].
         seconds: how much is drawn; None: to the end.
         rate: pictures for each second of the recording.
         size: height and width [px].
-        view: of the camera: azimuth and elevation [deg], distance in units of the arm's size.
+        view: the camera's azimuth and elevation [deg], and distance in units of the arm's size.
 
     Raises:
         ValueError: no scene in it, or nothing in that time.

@@ -36,7 +36,7 @@ def errorbars(
     """Draw values with their intervals: ``value`` or ``median``, ``low`` and ``high`` of each.
 
     Args:
-        axes: of matplotlib.
+        axes: matplotlib axes to draw on.
         at: position of each value on the other axis.
         figures: the values, at least one.
         across: along x instead of y.

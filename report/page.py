@@ -53,7 +53,7 @@ def page(title: str, sections: Mapping[str, str], lead: str = "") -> str:
     """A whole page: a heading and a link for each section, whose bodies are HTML.
 
     Args:
-        title: of the page.
+        title: title of the page.
         sections: heading and body of each; one without a body is left out.
         lead: HTML between the title and the links.
     """

@@ -30,7 +30,9 @@ _TEXTBOOK = 3
 def overlap_by(
     a: Bodies, b: Bodies, method: str, threads: int = 1
 ) -> tuple[NDArray[np.bool_], int]:
-    """``hit`` of shape (N,) and the rows left to exact arithmetic; also ``method="sat_textbook"``.
+    """``hit``, shape (N,), and the number of rows that exact arithmetic decided.
+
+    Besides the methods of :func:`tauguard.rigid.overlap` there is ``"sat_textbook"``.
 
     Raises:
         ValueError: lengths that do not match, ``sat_textbook`` of hulls or polygons.

@@ -38,7 +38,7 @@ def fit_friction(
 
     Args:
         joint: its index.
-        motions: of the logs.
+        motions: motions of the logs.
         torques: gain times current [N m], shape (T, n) each.
     """
     rows = [m.moving[:, joint] for m in motions]

@@ -50,9 +50,9 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
 
     Args:
         arm: calibrated, without a look at these logs.
-        drive: of the twin.
+        drive: drive of the twin.
         traces: held-out logs.
-        seed: of sensor noise and classifier.
+        seed: seed of sensor noise and classifier.
     """
     real: list[Array] = []
     twin: list[Array] = []

@@ -30,7 +30,7 @@ def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
         arm: its bodies.
         drive: what is simulated: friction, ripple, sensors.
         trace: the motion; its currents are not used.
-        seed: of the sensors' noise.
+        seed: seed of the sensors' noise.
     """
     current = modelled(arm, drive.friction, drive.gain, trace)
     if drive.ripple is not None:

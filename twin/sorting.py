@@ -23,7 +23,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
 
     Args:
         arm: nominal numbers; its gains hold.
-        names: of the logs.
+        names: names of the logs.
         recordings: with their loads, all with motion.
 
     Raises:

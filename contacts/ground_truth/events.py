@@ -44,7 +44,7 @@ def events(model: Any, times: Sequence[float], touches: Sequence[Touches]) -> li
 
     Args:
         model: the scene's.
-        times: of the states, one more than ``touches`` [s].
+        times: times of the states, one more than ``touches`` [s].
         touches: of the steps between them.
 
     Raises:

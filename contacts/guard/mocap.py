@@ -15,7 +15,7 @@ class MocapVelocityField:
     Args:
         model: MjModel.
         data: MjData whose kinematics are those of the sub-step's start; mocap poses are its end's.
-        length: of the sub-step [s].
+        length: length of the sub-step [s].
     """
 
     def __init__(self, model: Any, data: Any, length: float) -> None:

@@ -18,7 +18,7 @@ def arm_boxes(speed: float = 1.0) -> ContactScene:
     """The arm swings its base joint between two rows of boxes; a free box stands in its path.
 
     Args:
-        speed: of the swing, 1 is a period of 1.2 s.
+        speed: speed of the swing, 1 is a period of 1.2 s.
     """
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False)).xml)
     for i, (x, y, z) in enumerate(
@@ -50,7 +50,7 @@ def two_arms(speed: float = 1.0) -> ContactScene:
     """Two arms face each other over one table, reach for its middle and meet there.
 
     Args:
-        speed: of the swing, 1 is a period of 1.2 s.
+        speed: speed of the swing, 1 is a period of 1.2 s.
     """
     table = Table(position=(DISTANCE / 2, 0.15, 0.5), half_extents=(0.2, 0.5, 0.02))
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False, table=table)).xml)

@@ -48,7 +48,7 @@ def follow(
     """Position control with gravity compensation, written into ``qfrc_applied``.
 
     Args:
-        model: of the whole scene.
+        model: model of the whole scene.
         qpos: the pose whose inertia sets the gains, shape (nq,).
         arms: of each arm its places in qpos, in qvel, and its reference.
     """

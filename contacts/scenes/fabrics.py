@@ -21,7 +21,7 @@ def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
 
     Args:
         count: vertices along each side of the cloth.
-        speed: of the base joint [rad/s].
+        speed: speed of the base joint [rad/s].
     """
     cloth = Cloth(
         count=count,
@@ -39,7 +39,7 @@ def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> Contact
     Args:
         around: vertices around the tube.
         along: vertices along it.
-        speed: of the swing, 1 is a period of 0.8 s.
+        speed: speed of the swing, 1 is a period of 0.8 s.
     """
     scene = compose(SceneSpec(labels=False, integrator="discrete"))
     model, data = scene.model, mujoco.MjData(scene.model)
@@ -75,7 +75,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
 
     Args:
         count: vertices along each side of the cloth.
-        speed: of the base joint [rad/s].
+        speed: speed of the base joint [rad/s].
     """
     chest = BodyProxy("chest", (0.32, 0.42, 0.78), (0.0, 1.0, 0.0), radius=0.1, clamped=True)
     cloth = Cloth(

@@ -43,7 +43,7 @@ def ball_cloth(
     """A ball (10 mm, 20 g) flies straight into a stretched cloth of 0.3 m; no gravity.
 
     Args:
-        speed: of the ball, along -z [m/s].
+        speed: speed of the ball, along -z [m/s].
         offset: by how much farther away it starts [m].
         impact: one of :data:`IMPACT_POINTS`, on a face in the middle of the cloth.
         stiff: the cloth's contacts use :data:`STIFF`; otherwise MuJoCo's averaging of the cloth's
@@ -109,7 +109,7 @@ def sphere_plate(
     """A rigid sphere (10 mm, 20 g) flies straight into a fixed plate 2 mm thick; no gravity.
 
     Args:
-        speed: of the sphere, along -z [m/s].
+        speed: speed of the sphere, along -z [m/s].
         offset: by how much farther away it starts [m].
         stiff: the plate's contacts use :data:`STIFF` instead of MuJoCo's default.
         mode: ``plain`` or ``speculative``.

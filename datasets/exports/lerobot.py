@@ -34,7 +34,7 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
     Args:
         traces: one an episode, all of equally many joints.
         folder: a new or empty one.
-        rate: of their rows [Hz].
+        rate: rate of their rows [Hz].
         robot: what LeRobot calls the robot type.
 
     Raises:

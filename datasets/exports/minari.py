@@ -19,7 +19,7 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
     Args:
         traces: one an episode, all of equally many joints.
         name: Minari's id, ``namespace/name-v0``.
-        rate: of their rows [Hz], put into the description.
+        rate: rate of their rows [Hz], put into the description.
 
     Returns:
         How many episodes there were.

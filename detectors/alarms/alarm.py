@@ -90,7 +90,7 @@ class CollisionAlarm(Frozen):
 
         Args:
             trace: of the detector's arm.
-            score: of the detector, before it is normalised, where it is known.
+            score: score of the detector, before it is normalised, where it is known.
         """
         known = self.detector.scores(trace) if score is None else score
         level = self.normalised(known, trace)
@@ -103,7 +103,7 @@ class CollisionAlarm(Frozen):
 
         Args:
             trace: of the detector's arm.
-            score: of the detector, before it is normalised, where it is known.
+            score: score of the detector, before it is normalised, where it is known.
 
         Raises:
             ValueError: the trace is over before the detector has settled.

@@ -50,7 +50,7 @@ def residual_rms(
     Args:
         arm: identified.
         trace: collision-free.
-        rate: of the observer [1/s].
+        rate: rate of the observer [1/s].
         unknowns: what is tracked meanwhile (default: nothing, the plain observer).
         stop: seconds before the last motion that do not count, see
             :func:`~tauguard.detectors.calibration.recording.moving_span`.
@@ -70,7 +70,7 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
     Args:
         arm: identified.
         traces: collision-free, without a load.
-        rate: of the observer [1/s].
+        rate: rate of the observer [1/s].
 
     Raises:
         ValueError: more than ``UNEXPLAINED`` of a joint's torque is left.
@@ -124,7 +124,7 @@ def check_loads(arm: ArmModel, names: Sequence[str], recordings: Sequence[Record
 
     Args:
         arm: nominal numbers, and gains whose scale holds.
-        names: of the logs.
+        names: names of the logs.
         recordings: with the loads given.
 
     Raises:

@@ -86,7 +86,7 @@ def calibrate(
         traces: motion of at least 20 s in all; rows of known collisions are left out.
         friction: columns to use (default: those of ``arm.friction``, or the default model).
         priors: how far to trust what is believed.
-        rate: of the filter that residual and columns pass through [1/s].
+        rate: rate of the filter that residual and columns pass through [1/s].
         rounds: the second round weighs each joint by the residual that the first left.
 
     Returns:

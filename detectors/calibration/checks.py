@@ -35,7 +35,7 @@ def check_signs(arm: ArmModel, name: str, trace: Trace) -> None:
 
     Args:
         arm: its gains' signs count.
-        name: of the log.
+        name: name of the log.
         trace: collision-free.
 
     Raises:
@@ -155,7 +155,7 @@ def check_torques(
         tau: torques at the joints less friction [N m], shape (T, n).
         residual: what an observer makes of them [N m], shape (T, n).
         rows: in which nothing touches the arm, shape (T,).
-        rate: of that observer [1/s].
+        rate: rate of that observer [1/s].
         touched: contacts may be in these rows after all.
 
     Raises:

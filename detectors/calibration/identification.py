@@ -158,7 +158,7 @@ def identify(
             recording with a known load above 0 does) or "masses" (those of ``arm`` do).
         friction: its columns.
         beliefs: standard deviations of the assumed numbers.
-        rate: of the filter that everything passes through [1/s].
+        rate: rate of the filter that everything passes through [1/s].
         data: of each recording, from :func:`filtered` (default: made here); only for "gains".
 
     Raises:

@@ -112,7 +112,7 @@ def filtered_columns(
         robot: what is believed of it.
         gain: N m per ampere, shape (n,).
         model: the columns of friction.
-        rate: of the filter [1/s].
+        rate: rate of the filter [1/s].
         used: which rows, shape (T,).
         rest: a joint that has stood still for longer counts no more [s]; ``None``: it counts.
         held: what load-dependent friction grows with [N m], shape (T, n).
@@ -168,7 +168,7 @@ def body_deviations(robot: RobotNumbers, mass: float, centre: float, inertia: fl
 
     Args:
         robot: what is believed.
-        mass: of each link's, relative.
+        mass: standard deviation of each link's mass, relative.
         centre: of each centre of mass [m].
         inertia: relative to the link's largest entry.
     """

@@ -75,7 +75,7 @@ def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
     Args:
         after: the residual around it.
         force: on the arm, at its peak [N], shape (3,).
-        velocity: of the touched point before it [m/s], shape (3,).
+        velocity: velocity of the touched point before it [m/s], shape (3,).
     """
     level = after.level
     highest = float(level.max())

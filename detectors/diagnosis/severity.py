@@ -49,7 +49,7 @@ def force_draws(
         residual: estimate of tau_ext [N m], shape (n,).
         noise: its standard deviation [N m], shape (n,).
         probability: of a contact at each of the surface's points, shape (K,).
-        count: of draws.
+        count: number of draws.
     """
     rng = np.random.default_rng(SEED)
     places = (np.arange(count) + 0.5) / count
@@ -75,7 +75,7 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
         columns: joint torques in units of the noise for a unit force, shape (K, n, 3).
         y: residual in units of the noise, shape (n,).
         inward: unit normals, shape (K, 3).
-        rng: of the draws.
+        rng: generator of the draws.
     """
     from scipy.special import log_ndtr, ndtr, ndtri
 
@@ -202,8 +202,8 @@ class Severity:
         """In a few words; of an impact the impulse, too.
 
         Args:
-            kind: of the contact.
-            names: of the joints.
+            kind: kind of the contact.
+            names: names of the joints.
         """
         force = f"peak force {self.peak.text('N')}"
         if kind == "impact":

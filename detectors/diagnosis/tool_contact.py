@@ -62,7 +62,7 @@ def _draws(jacobian: Array, torque: Array, deviation: Array) -> Array:
     Args:
         jacobian: of the place, shape (3, n).
         torque: shape (n,).
-        deviation: of the torques [N m], shape (n,).
+        deviation: deviation of the torques [N m], shape (n,).
     """
     rng, columns, seen = np.random.default_rng(SEED), (jacobian / deviation).T, torque / deviation
     known, logs, drawn = columns.T @ columns, [], []

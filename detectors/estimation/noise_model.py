@@ -35,7 +35,7 @@ class NoiseModel:
         Args:
             residual: residual of free motion [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            motion: of the estimate, shape (T, 4, n).
+            motion: motion of the estimate, shape (T, 4, n).
         """
         from scipy.optimize import nnls
 

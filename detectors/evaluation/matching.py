@@ -95,7 +95,7 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
     """Match a detection with its trace's truth.
 
     Args:
-        detection: of this trace.
+        detection: detection of this trace.
         trace: with truth.
         skip: seconds at the beginning that do not count.
 

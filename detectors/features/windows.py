@@ -101,7 +101,7 @@ class Prepared:
 #: Only their ratios matter.
 ALIKE = (20.0, 20.0, 15.0, 6.0)
 
-#: The sum of torques, in its unit, that half of the training collisions exceed.
+#: The scaled sum of torques of the median training collision.
 MEDIAN_SEVERITY = 2.5
 
 #: A target above this is a collision that can be felt.
@@ -122,7 +122,7 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
     Args:
         traces: without truth the target is 0.
         joints: 0-based.
-        gain: of the observer [1/s].
+        gain: gain of the observer [1/s].
 
     Returns:
         One target a trace, shape (T,).

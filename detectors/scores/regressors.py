@@ -43,7 +43,7 @@ class Forest:
             trees: how many.
             depth: of each.
             rate: what each counts.
-            seed: of the half of the rows and the fraction of the columns that each tree sees.
+            seed: seed of the half of the rows and the fraction of the columns that each tree sees.
         """
         from sklearn.ensemble import GradientBoostingRegressor
 
@@ -115,7 +115,7 @@ class Network(Frozen):
             x: inputs, shape (N, d).
             y: outputs, shape (N,) or (N, m).
             hidden: widths of the hidden layers.
-            seed: of the start, the order and the held-out tenth.
+            seed: seed of the start, the order and the held-out tenth.
             epochs: at most.
             decay: weight of the squared weights.
         """

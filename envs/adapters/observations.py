@@ -46,8 +46,8 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
         Args:
             env: an environment of tauguard.
             mode: "rgb", "depth" or "rgbd".
-            height: of the pictures [px].
-            width: of the pictures [px].
+            height: height of the pictures [px].
+            width: width of the pictures [px].
 
         Raises:
             ValueError: an unknown mode or no pixels.

@@ -25,11 +25,11 @@ def record_policy(
     """Play a policy and write its episodes into Minari's folder of datasets.
 
     Args:
-        name: of the environment, such as "tauguard/Reach-v0".
+        name: name of the environment, such as "tauguard/Reach-v0".
         policy: from an observation to an action.
         dataset: Minari's id, ``namespace/name-v0``.
         episodes: how many; episode i has the seed ``seed + i``.
-        seed: of the first.
+        seed: seed of the first episode.
         **keywords: of the environment; ``max_episode_steps`` as well.
 
     Returns:

@@ -25,7 +25,7 @@ class CollisionPlan:
         severity: wanted peak of abs(tau_ext), joints 1-4 (low, high) [N m]; the strength is varied
             until the achieved peak is in this range.
         strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
-        duration: of a pulse or of a clamp [s]; it does not apply to a strike.
+        duration: duration of a pulse or of a clamp [s]; it does not apply to a strike.
         at_rest: a pulse or strike while the arm dwells, where one is near ``time``.
         force: wanted peak contact force (low, high) [N]; targets whose lever arms cannot give
             ``severity`` at such a force are skipped.

@@ -262,9 +262,9 @@ def clamp_centre(target: Target, path: Array, depth: float, radius: float) -> Ar
 
     Args:
         target: the surface point that meets the sphere.
-        path: of that point along the references while the clamp stands, shape (T, 3) [m].
+        path: path of that point along the references while the clamp stands, shape (T, 3) [m].
         depth: how far the references would go past the sphere's surface [m].
-        radius: of the sphere [m].
+        radius: radius of the sphere [m].
     """
     ahead = float((-(path - target.point) @ target.direction).max(initial=0.0))
     return target.point - (ahead - depth + radius) * target.direction

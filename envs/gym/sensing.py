@@ -86,8 +86,8 @@ class JointEnds:
 
         Args:
             ranges: of the joints [rad], infinite where free, shape (n, 2).
-            dt: of the samples [s].
-            gain: of the observer [1/s].
+            dt: sample interval of the samples [s].
+            gain: gain of the observer [1/s].
         """
         self._low, self._high = ranges[:, 0] + MARGIN, ranges[:, 1] - MARGIN
         self._hold = round(FORGOTTEN / (gain * dt))
@@ -126,8 +126,8 @@ class ObserverListener:
         Args:
             robot: nominal rigid body.
             drive: nominal drive.
-            dt: of the samples [s].
-            gain: of the observer [1/s].
+            dt: sample interval of the samples [s].
+            gain: gain of the observer [1/s].
             ranges: of the joints [rad], (n, 2): a joint at an end of its range feels its stop.
         """
         free = np.tile([-np.inf, np.inf], (robot.joints, 1))

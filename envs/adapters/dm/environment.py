@@ -21,7 +21,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
 
         Args:
             env: a Gymnasium environment.
-            seed: of the first episode.
+            seed: seed of the first episode.
 
         Raises:
             ValueError: a space of another kind.

@@ -48,8 +48,8 @@ def command(
             good.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
-        columns: of CSV files: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto, or a JSON
-            file (see `tauguard detect`).
+        columns: columns of CSV files: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto, or a
+            JSON file (see `tauguard detect`).
         gains: N m per ampere, one a joint.
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
             m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are taken as

@@ -34,7 +34,7 @@ def command(
 
     Args:
         out: folder of the results (made if it does not exist).
-        seed: of the arm and of everything drawn; the same seed gives the same files.
+        seed: seed of the arm and of everything drawn; the same seed gives the same files.
         robot: which arm, by name or file: see `tauguard robot`.
         arm_joints: the arm's joints, in a file with several chains: names with commas between, or
             FIRST..LAST.

@@ -55,10 +55,10 @@ def command(
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone, a name that `tauguard robot` lists, or the TOML
             file of `tauguard twin`.
-        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, libfranka, doosan, lbr),
-            auto for what the names and numbers suggest, or a JSON file with the fields of
-            tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque": ["tau1",
-            "tau2"]}; numbers instead of names count columns from 0.
+        columns: columns of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, libfranka,
+            doosan, lbr), auto for what the names and numbers suggest, or a JSON file with the
+            fields of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"],
+            "torque": ["tau1", "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
             a model of `train --free` or no model; 0 for nothing. Without it a load is found from

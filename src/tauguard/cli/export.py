@@ -18,7 +18,7 @@ def command(
     pandas, polars, DuckDB and scikit-learn need no export: they read data/*.parquet as it is.
 
     Args:
-        folder: of a dataset that `tauguard generate` made.
+        folder: folder of a dataset that `tauguard generate` made.
         out: for LeRobot a new folder; for Minari a dataset id such as tauguard/collisions-v0, which
             goes where Minari keeps its datasets.
         to: "lerobot" (LeRobotDataset v3.0) or "minari" (extra `export`).

@@ -27,7 +27,7 @@ def command(
     files again, and only those.
 
     Args:
-        folder: of the dataset.
+        folder: folder of the dataset.
         verify: compare every file with its checksum.
         json: write the figures here.
         figure: draw the figures here (PNG).

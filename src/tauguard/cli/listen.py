@@ -48,9 +48,9 @@ def command(
         model: a detector that `tauguard train` wrote, for this arm and this rate.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         ur: host of a Universal Robots controller, read by RTDE.
-        port: of RTDE.
+        port: port of RTDE.
         play: a log (CSV or MCAP) to play at its own pace instead.
-        columns: of a CSV file, see `tauguard detect`.
+        columns: columns of a CSV file, see `tauguard detect`.
         stdin: read lines "t, q1.., qd1.., current1.." from the standard input.
         ros: topic with sensor_msgs/JointState, currents (or torques) in effort; needs ROS 2.
         payload: what the arm carries, as KG or KG,X,Y,Z, see `tauguard detect`.

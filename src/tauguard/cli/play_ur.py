@@ -20,7 +20,7 @@ def command(
 
     Args:
         log: CSV or MCAP of an arm with six joints.
-        columns: of CSV files, see `tauguard detect`.
+        columns: columns of CSV files, see `tauguard detect`.
         port: to serve; 0 takes one that is free and prints it.
         fault: NAME@SECONDS or NAME@SECONDS+DURATION, several if asked: frozen, stale, encoder,
             missing, late, repeated, rate, jump, bias, saturated, swapped, sign, nan.

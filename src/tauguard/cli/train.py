@@ -66,7 +66,7 @@ def command(
             learned on it and quietness from the logs, as with --traces; --robot is not needed.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains,
             and so does the TOML file of `tauguard twin`.
-        columns: of CSV files, see `tauguard detect`.
+        columns: columns of CSV files, see `tauguard detect`.
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
         payload: what the logs carried, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.

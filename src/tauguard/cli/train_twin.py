@@ -35,7 +35,7 @@ def twin_contacts(
         twin: description that `tauguard twin` wrote.
         free: collision-free logs of the same arm, without a load.
         model: file to write.
-        columns: of the logs.
+        columns: columns of the logs.
         detector: one of ``tauguard.detectors.DETECTORS``.
         per_hour: false alarms to accept in an hour of motion like the logs'.
         torque: the logs hold joint torques.

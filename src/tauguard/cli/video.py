@@ -25,12 +25,12 @@ def command(
     Args:
         recording: an MCAP file written by tauguard, or a folder, whose newest is taken.
         out: .gif, .webp, .png or .mp4 (default: RECORDING with the ending .gif).
-        start: of the part that is drawn [s].
+        start: start of the part that is drawn [s].
         seconds: of recording that are drawn (default: to the end).
         slower: factor by which the video is slower than real time.
         rate: frames a second.
-        width: of the picture [px].
-        height: of the picture [px].
+        width: width of the picture [px].
+        height: height of the picture [px].
     """
     from tauguard.cli.replay import newest
     from tauguard.replay.video import frames, write_video

@@ -28,12 +28,12 @@ def command(
         environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
         policy: go straight to the target (Cartesian control), random actions, or none.
         seconds: how long, in simulated time; episodes follow one another.
-        seed: of the first episode.
+        seed: seed of the first episode.
         set: keywords of the environment, each NAME=VALUE, as in --set detector=observer.
         reaction: what to do at an alarm or, without a detector, at a touch: stop0, stop1, stop2,
             retract, admittance.
         save: write an .rrd file instead of opening the viewer.
-        port: of the viewer, which listens on 127.0.0.1 only.
+        port: port of the viewer, which listens on 127.0.0.1 only.
     """
     import gymnasium
 

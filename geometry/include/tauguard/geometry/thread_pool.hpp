@@ -27,8 +27,8 @@ namespace tauguard::geometry {
 class ThreadPool {
  public:
   // One pool per native module and process, grown to the largest number of threads asked for. It is
-  // never destroyed: at exit its threads may be inside a call, or belong to the process forked
-  // from.
+  // never destroyed: at exit its threads may be inside a call or, after a fork, belong to the
+  // parent.
   static ThreadPool& shared() {
     static std::atomic<ThreadPool*> kept{nullptr};
     ThreadPool* pool = kept.load();
