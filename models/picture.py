@@ -99,6 +99,16 @@ def point_at(scene: Any, point: ArrayLike, vector: ArrayLike) -> None:
         mujoco.mjv_connector(arrow, kind, ARROW_WIDTH, end - np.asarray(vector, dtype=float), end)
 
 
+def check_opengl() -> None:
+    """Start an OpenGL and end it.
+
+    Raises:
+        RuntimeError: as :func:`opengl`.
+    """
+    with opengl():
+        mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
+
+
 @contextmanager
 def opengl() -> Iterator[None]:
     """Turn an error of OpenGL's start into one line.

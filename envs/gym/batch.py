@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.envs import _plant
-from tauguard.envs.gym.actions import Entry, action_scale, action_table, observation_table
-from tauguard.envs.gym.compiled import CompiledScene, RegionInfo
-from tauguard.envs.gym.people import REACHES, WALKS, anatomy, draw_script
+from tauguard.envs.gym.actions import Entry, action_table, observation_table
+from tauguard.envs.gym.compiled import CompiledScene
+from tauguard.envs.gym.native import controls, surroundings
+from tauguard.envs.gym.people import REACHES, WALKS, draw_script
 from tauguard.envs.gym.placing import check_clear
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
-from tauguard.envs.gym.second_arm import ARMS
 from tauguard.envs.gym.sensing import Sensing, listening
-from tauguard.envs.gym.settings import CONTROLS
 from tauguard.envs.gym.step_checks import StepChecks
 from tauguard.envs.plant import make_plant
 from tauguard.models import Person
@@ -332,86 +331,11 @@ class Batch:
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
-        around = _surroundings(compiled, self.observations, self.people(i))
-        plant.surround(around, _controls(compiled), rows, substeps=compiled.settings.substeps)
+        around = surroundings(compiled, self.observations, self.people(i))
+        plant.surround(around, controls(compiled), rows, substeps=compiled.settings.substeps)
         return plant
 
 
 def _numbers(table: NDArray[np.void], i: int) -> Array:
     """Row ``i`` of a table with named columns, as its plain numbers."""
     return table[i : i + 1].view(np.float64)
-
-
-def _controls(compiled: CompiledScene) -> _plant.Controls:
-    settings = compiled.settings
-    centre, scale = action_scale(compiled)
-    return _plant.Controls(
-        mode=CONTROLS.index(settings.control),
-        period=float(compiled.scene.model.opt.timestep) * settings.substeps,
-        scale=scale.tolist(),
-        centre=centre.tolist(),
-        max_speed=compiled.max_speed.tolist(),
-        torque_limit=compiled.torque_limit.tolist(),
-        low=compiled.joint_range[:, 0].tolist(),
-        high=compiled.joint_range[:, 1].tolist(),
-        moving=compiled.force_bound.moving**2,
-        driven=compiled.force_bound.driven**2,
-    )
-
-
-def _surroundings(
-    compiled: CompiledScene, observations: list[Entry], people: tuple[Person, ...]
-) -> _plant.Surroundings:
-    model, scene = compiled.scene.model, compiled.scene
-    each = len(scene.joint_names) // compiled.arms
-    links = [
-        _plant.Link(
-            joint=int(joint),
-            body=int(scene.link_bodies[i]),
-            first=i // each * each,
-            slide=bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE),
-            mass=float(compiled.nominal_mass[i]),
-            com=compiled.nominal_com[i].tolist(),
-        )
-        for i, joint in enumerate(compiled.ids())
-    ]
-    labels = scene.spec.labels
-    return _plant.Surroundings(
-        links=links,
-        gravity=model.opt.gravity.tolist(),
-        tools=[
-            _plant.Tool(site=site, body=body, first=first) for site, body, first in compiled.tools
-        ],
-        regions=[_region(compiled, region) for region in compiled.regions],
-        people_begin=len(scene.spec.proxies),
-        people=[anatomy(person, compiled.blocked) for person in people],
-        sensor_begin=_sensor(model, "contact_link1") if labels else -1,
-        arms_sensor=_sensor(model, ARMS) if labels and compiled.arms == 2 else -1,
-        low=[entry.low for entry in observations],
-        high=[entry.high for entry in observations],
-    )
-
-
-def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:
-    model, joint = compiled.scene.model, region.joint
-    return _plant.Region(
-        body=region.body,
-        joint=joint,
-        qpos=int(model.jnt_qposadr[joint]) if joint >= 0 else -1,
-        dof=int(model.jnt_dofadr[joint]) if joint >= 0 else -1,
-        mocap=region.mocap,
-        held=region.held,
-        sensor=_sensor(model, f"contact_{region.name}") if compiled.scene.spec.labels else -1,
-        quasi_static=region.quasi_static,
-        transient=region.transient,
-        span=region.span,
-        speed=region.speed,
-        area=compiled.settings.contact_area or 0.0,
-        least_pressure=region.least_pressure,
-        stiffness=region.stiffness,
-    )
-
-
-def _sensor(model: mujoco.MjModel, name: str) -> int:
-    """Address of a sensor's numbers."""
-    return int(model.sensor_adr[model.sensor(name).id])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array, in_a_line
 from tauguard.envs.gym.placing import Layout, Usual, blocked_ground
 from tauguard.envs.gym.randomization import check_names
+from tauguard.envs.gym.regions import RegionInfo, fastest, regions_of
 from tauguard.envs.gym.second_arm import APART, add_second_arm, both_drives
 from tauguard.envs.gym.settings import PERSON, Settings
 from tauguard.envs.plant import Gains
@@ -24,57 +25,20 @@ from tauguard.models import (
     Mismatch,
     Person,
     Scene,
-    SceneObject,
     SceneSpec,
     compose,
     derive,
     set_payload,
     without_losses,
 )
-from tauguard.models.person import PersonPart
-from tauguard.models.scene import people_parts
 
 #: A tool pose to reach lies at least this high and this far from the base's axis [m], of a short
 #: arm nearer [reach].
 LOWEST, NEAREST, SHORT = 0.12, 0.2, (0.25, 0.4)
 #: No arm reaches less far than this [m].
 LEAST_REACH = 0.02
-#: A region turns back this far from the middle of its line, in units of the reach.
-SPAN = 0.6
-#: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
-#: a torso at less.
-HAND_SPEED, BODY_SPEED = 0.8, 0.3
 #: At which the conjugate gradients of a cloth's edges stop; forces differ by a ten-thousandth.
 CLOTH_TOLERANCE = 1e-6
-#: Largest speed of a falling free object [m/s]: from a metre.
-FALL_SPEED = 4.5
-
-
-@dataclass(frozen=True)
-class RegionInfo:
-    """A body region in the scene."""
-
-    name: str
-    body: int
-    joint: int  #: -1: held in place
-    quasi_static: float  #: limit [N]
-    transient: float  #: limit [N]; 0: no impact is allowed
-    mocap: int  #: of the frame that a person moves; -1: not of a person
-    held: bool  #: cannot move away: its limit is the quasi-static one
-    stiffness: float  #: of its contact [N/m]
-    radius: float  #: [m]
-    span: float  #: [m]
-    speed: float  #: [m/s]
-    unconfirmed: tuple[str, ...]  #: values that no open source confirmed
-
-    @property
-    def least_pressure(self) -> float:
-        """Mean pressure of a flat surface on a round region [N/cm^2], where no area is known.
-
-        The surface touches it in a circle, at the depth that its stiffness allows: pi radius F / k
-        (Hertz' geometry). The estimate is low, since a robot's edge presses harder.
-        """
-        return self.stiffness / (np.pi * self.radius) / 1e4
 
 
 @dataclass(frozen=True)
@@ -154,34 +118,27 @@ def compile_scene(
     Raises:
         ValueError, FileNotFoundError: a robot that cannot be used.
     """
-    spec = SceneSpec(
+    plain = SceneSpec(
         timestep=settings.timestep,
         integrator=settings.integrator,
+        arm=settings.robot,
+        table=settings.table,
+    )
+    bare = compose(replace(plain, labels=False, region_labels=False), visuals=False)
+    layout = Layout.of(bare, arm_reach(bare), moved)
+    proxies, people = _people(settings, bare, layout, places)
+    check_names(settings.randomize or {}, people, settings.checkers)
+    spec = replace(
+        plain,
         mismatch=settings.mismatch if isinstance(settings.mismatch, Mismatch) else None,
         payload=settings.payload_g > 0 or "payload_g" in (settings.randomize or {}),
         labels=settings.labels,
         region_labels=settings.labels,
-        arm=settings.robot,
-        table=settings.table,
         cloth=settings.cloth,
         objects=settings.objects,
+        proxies=proxies,
+        people=people,
     )
-    bare = compose(
-        replace(
-            spec,
-            payload=False,
-            labels=False,
-            region_labels=False,
-            cloth=None,
-            objects=(),
-            mismatch=None,
-        ),
-        visuals=False,
-    )
-    layout = Layout.of(bare, arm_reach(bare), moved)
-    proxies, people = _people(settings, bare, layout, places)
-    check_names(settings.randomize or {}, people, settings.checkers)
-    spec = replace(spec, proxies=proxies, people=people)
     if settings.table is not None and "table" in default:
         spec = replace(spec, table=layout.table(settings.table))
     if settings.cloth is not None and "cloth" in default:
@@ -244,7 +201,7 @@ def _known(
         torque_limit=np.tile(nominal.torque_limit, arms),
         max_speed=np.tile(speed, arms),
         tools=find_tools(scene, arms),
-        regions=_regions(scene, layout.reach),
+        regions=regions_of(scene, layout.reach),
         people=scene.spec.people,
         blocked=blocked_ground(scene),
         force_bound=_force_bound(settings, scene, bare, speed, arms),
@@ -263,100 +220,18 @@ def _force_bound(
     load = max(settings.payload_g, 0.0 if grams is None else grams.ends()[1]) / 1000
     reach = arm_reach(bare) + 0.2
     moving += 0.5 * load * float((np.abs(speed) * reach).sum()) ** 2
-    regions = _regions(scene, 1.0)
+    regions = regions_of(scene, 1.0)
     if regions:
         masses = scene.model.body_mass[[r.body for r in regions]]
-        speeds = [_fastest(r, scene.spec.people) for r in regions]
+        speeds = [fastest(r, scene.spec.people) for r in regions]
         driven += float((0.5 * masses * np.square(speeds)).max())
     stiffness = max([BODY_REGIONS["skull"].stiffness, *(r.stiffness for r in regions)])
     return ForceBound(math.sqrt(2 * stiffness * moving), math.sqrt(2 * stiffness * driven))
 
 
-def _fastest(region: RegionInfo, people: tuple[Person, ...]) -> float:
-    """At which a region may meet the arm [m/s]."""
-    if region.mocap < 0:
-        return region.speed
-    limb = region.name.endswith(("hand", "arm"))
-    return max(person.walk_speed + (person.hand_speed if limb else 0.0) for person in people)
-
-
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
     """What the controller believes: the arm's nominal drive, with all friction that is known."""
     return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
-
-
-def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
-    """The proxies, the person's, then the objects."""
-    spec = scene.spec
-    return (
-        *(_region(scene, proxy, reach) for proxy in spec.proxies),
-        *(_segment(scene, part) for part in people_parts(spec)),
-        *(_object(scene, obj) for obj in spec.objects if obj.touchable),
-    )
-
-
-def _segment(scene: Scene, part: PersonPart) -> RegionInfo:
-    limits = part.limits
-    return RegionInfo(
-        name=part.name,
-        body=int(scene.model.body(part.name).id),
-        joint=-1,
-        quasi_static=limits.quasi_static_force,
-        transient=limits.transient_force,
-        mocap=int(scene.model.body(f"{part.name}_motion").mocapid[0]),
-        held=part.held,
-        stiffness=limits.stiffness,
-        radius=part.radius,
-        span=0.0,
-        speed=0.0,
-        unconfirmed=limits.unconfirmed,
-    )
-
-
-def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
-    limits = proxy.limits
-    slow = limits.mass > 5
-    return RegionInfo(
-        name=proxy.region,
-        body=int(scene.model.body(proxy.region).id),
-        joint=-1 if proxy.clamped else int(scene.model.joint(proxy.region).id),
-        quasi_static=limits.quasi_static_force,
-        transient=limits.transient_force,
-        mocap=-1,
-        held=proxy.clamped,
-        stiffness=limits.stiffness,
-        radius=proxy.radius,
-        span=SPAN * reach,
-        speed=BODY_SPEED if slow else HAND_SPEED,
-        unconfirmed=limits.unconfirmed,
-    )
-
-
-def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
-    body = scene.model.body(obj.name)
-    return RegionInfo(
-        name=obj.name,
-        body=int(body.id),
-        joint=-1,
-        quasi_static=math.inf if obj.quasi_static_limit is None else obj.quasi_static_limit,
-        transient=math.inf if obj.transient_limit is None else obj.transient_limit,
-        mocap=-1,
-        held=obj.motion == "fixed",
-        stiffness=obj.stiffness,
-        radius=math.inf,  # a pressure is estimated on people only
-        span=0.0,
-        speed=_path_speed(obj),
-        unconfirmed=(),
-    )
-
-
-def _path_speed(obj: SceneObject) -> float:
-    """Largest speed along a path [m/s]; of a free object what it may fall with."""
-    if not obj.path:
-        return FALL_SPEED if obj.motion == "free" else 0.0
-    rows = np.array(obj.path)
-    steps = np.diff(rows, axis=0)
-    return float((np.linalg.norm(steps[:, 1:], axis=1) / steps[:, 0]).max())
 
 
 def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:

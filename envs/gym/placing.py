@@ -220,9 +220,7 @@ def check_clear(
     if geom < 0:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or "cloth"
     else:
-        body = int(bodies[k, other])
-        name = model.body(body).name if body in links else model.geom(geom).name
-        name = name or model.body(body).name
+        name = _name(model, geom)
     kinds = {"person": "person", "table": "table", SECOND: "second arm"}
     kind = next((kinds[start] for start in kinds if name.startswith(start)), name)
     if geom < 0:
@@ -269,8 +267,13 @@ def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) ->
         for geom in around:
             depth = -mujoco.mj_geomDistance(model, placed, own, geom, 0.1, None)
             if depth > LEANING:
-                other = model.geom(geom).name
-                raise StartsInContact("person", part.name, other, float(depth))
+                raise StartsInContact("person", part.name, _name(model, geom), float(depth))
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    """Of the body that a geom belongs to; of the world's, its own."""
+    body = int(model.geom_bodyid[geom])
+    return str(model.body(body).name if body else model.geom(geom).name)
 
 
 def _within(model: mujoco.MjModel, body: int, of: set[int]) -> bool:

@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, Outcome, Task
+from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.batch import Batch, StepMetrics
 from tauguard.envs.gym.compiled import LOWEST, NEAREST, SHORT, pose_box, tool_position
+from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 
 #: A target counts as reached this near [m], and is worth this much reward.

@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, Outcome, Task
+from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.batch import Batch, StepMetrics
 from tauguard.envs.gym.compiled import find_tools, tool_position
 from tauguard.envs.gym.placing import Layout
+from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import BodyProxy, Person, Scene
 

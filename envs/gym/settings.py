@@ -34,27 +34,49 @@ PERSON = "person"
 
 @dataclass(frozen=True)
 class Settings:
-    """The keywords of every environment; a scene compiles only what they ask for."""
+    """The keywords of every environment; a scene compiles only what they ask for.
 
-    control: str = "joint_velocity"  #: one of :data:`CONTROLS`
-    control_rate: float = 100.0  #: actions a second [Hz]
-    timestep: float = 1e-3  #: of the physics [s]
-    integrator: str = "implicitfast"  #: of the physics
-    robot: str | Robot = "cura6"  #: or a name, a file or a robot, see ``tauguard robot``
-    payload_g: float = 0.0  #: carried, not told to controller and observer [g]
-    mismatch: Mismatch | int | None = None  #: simulated against nominal arm; a number is a seed
-    obstacles: tuple[str | BodyProxy | Person, ...] = ()  #: "person", body regions, or such by hand
-    table: Table | None = None  #: a board that the arm can touch
-    cloth: Cloth | None = None  #: a hanging cloth
-    objects: tuple[SceneObject, ...] = ()  #: things of your own, or the TOML file that lists them
-    detector: Any = None  #: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``
-    checkers: tuple[str, ...] = ()  #: contact checkers that watch every physics step
-    labels: bool = True  #: contact sensors: without them force, cost and tau_ext stay 0
-    noise: bool = False  #: observe measured instead of true positions, velocities and currents
-    ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
-    max_speed: float | None = None  #: of every joint [rad/s]; default: the arm's own, else 2
-    randomize: Mapping[str, Any] | None = None  #: drawn each episode: see ``envs.randomization``
-    contact_area: float | None = None  #: of the robot's contact surface [cm^2], if known
+    Attributes:
+        control: one of :data:`CONTROLS`.
+        control_rate: actions a second [Hz].
+        timestep: of the physics [s].
+        integrator: of the physics.
+        robot: a name, a file or a robot, see ``tauguard robot``.
+        payload_g: carried, not told to controller and observer [g].
+        mismatch: of the simulated against the nominal arm; a number is a seed.
+        obstacles: "person", names of body regions, or such objects placed by hand [m].
+        table: a board that the arm can touch.
+        cloth: a hanging cloth.
+        objects: things of your own, or the TOML file that lists them.
+        detector: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``.
+        checkers: names of contact checkers that watch every physics step.
+        labels: contact sensors; without them force, cost and tau_ext stay 0.
+        noise: observe measured instead of true positions, velocities and currents.
+        ideal_drive: no friction, ripple, lag or sensor errors.
+        max_speed: of every joint [rad/s]; default: the arm's own, else 2.
+        randomize: what is drawn each episode, see :mod:`tauguard.envs.gym.randomization`.
+        contact_area: of the robot's contact surface [cm^2], if known.
+    """
+
+    control: str = "joint_velocity"
+    control_rate: float = 100.0
+    timestep: float = 1e-3
+    integrator: str = "implicitfast"
+    robot: str | Robot = "cura6"
+    payload_g: float = 0.0
+    mismatch: Mismatch | int | None = None
+    obstacles: tuple[str | BodyProxy | Person, ...] = ()
+    table: Table | None = None
+    cloth: Cloth | None = None
+    objects: tuple[SceneObject, ...] = ()
+    detector: Any = None
+    checkers: tuple[str, ...] = ()
+    labels: bool = True
+    noise: bool = False
+    ideal_drive: bool = False
+    max_speed: float | None = None
+    randomize: Mapping[str, Any] | None = None
+    contact_area: float | None = None
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is wrong and what would work."""

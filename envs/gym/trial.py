@@ -28,6 +28,7 @@ class ArmTrial:
     force: float  #: largest on a link [N]
     bound: float  #: largest that the arm can exert [N]
     diverged: int  #: episodes
+    still: int  #: episodes in which standing still succeeds
     moved: dict[str, float]  #: things that were placed farther from the arm, and by how much [m]
     refused: str = ""  #: why there is no such environment
 
@@ -56,25 +57,28 @@ def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
     try:
         env: Any = _made(name, robot)
     except ValueError as error:
-        return ArmTrial(name, 0, 0, 0.0, 0.0, 0, {}, " ".join(str(error).split()))
-    overlaps = diverged = 0
+        return ArmTrial(name, 0, 0, 0.0, 0.0, 0, 0, {}, " ".join(str(error).split()))
+    overlaps = diverged = succeeded = 0
     force = 0.0
     rng = np.random.default_rng(seed)
     still = np.zeros(env.action_space.shape)
     for episode in range(episodes):
         env.reset(seed=seed + episode)
         overlaps += _inside(env)
+        reached = False
         for step in range(ACTIONS):
             random = rng.uniform(-1, 1, still.shape)
             *_, ended, cut, info = env.step(still if step < ACTIONS // 2 else random)
             force = max(force, info["force"])
             diverged += info["reason"].startswith("diverged")
+            reached |= info["success"] and step < ACTIONS // 2
             if ended or cut:
                 break
+        succeeded += reached
     compiled = env.compiled
     env.close()
     bound, moved = compiled.force_bound.total, dict(compiled.layout.moved)
-    return ArmTrial(name, episodes, overlaps, force, bound, diverged, moved)
+    return ArmTrial(name, episodes, overlaps, force, bound, diverged, succeeded, moved)
 
 
 def _inside(env: Any) -> bool:

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array, Bools
 from tauguard.envs.gym.base import (
     RENDER_MODES,
-    Task,
-    build,
     divergence,
     frame_rate,
     make_spaces,
@@ -27,6 +25,7 @@ from tauguard.envs.gym.batch import StepMetrics
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
 from tauguard.envs.gym.settings import one_of
+from tauguard.envs.gym.task import Task, build
 
 
 class VectorArmEnv(VectorEnv[Array, Array, Array]):

@@ -19,6 +19,7 @@ def command(
     json: Path | None = None,
     try_: Annotated[bool, tyro.conf.arg(name="try")] = False,
     episodes: int = 10,
+    seed: int = 0,
     pictures: Path | None = None,
 ) -> None:
     """Print the description of an arm as tauguard simulates it; without a name, the names.
@@ -30,8 +31,10 @@ def command(
         download: fetch the model by mujoco-menagerie where it has not been fetched before.
         json: write the description as JSON.
         try_: run episodes of every environment with the arm: what begins in contact, the largest
-            force and its bound, and what diverges. The exit code is 1 where something is wrong.
+            force and its bound, what diverges, and where standing still succeeds. The exit code is
+            1 where something is wrong.
         episodes: of each environment, with --try.
+        seed: of the first episode, with --try.
         pictures: a PNG of the beginning of an episode in each environment, with --try.
     """
     from tauguard.envs.plant import Gains
@@ -60,7 +63,7 @@ def command(
     rows = table(scene.facts, gains)
     print(text(scene.facts, rows, largest_force(scene)))
     if try_ or pictures is not None:
-        run_trial(robot, episodes, pictures)
+        run_trial(robot, episodes, seed, pictures)
     if json is not None:
         sources = dict(scene.facts.sources)
         write_json(json, {"name": "robot", "robot": robot, "sources": sources, "rows": rows})
@@ -77,34 +80,41 @@ def largest_force(scene: Scene) -> float:
     return float((2 * BODY_REGIONS["skull"].stiffness * sum(energies)) ** 0.5)
 
 
-def run_trial(robot: str, episodes: int, pictures: Path | None) -> None:
+def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> None:
     """Print a line an environment.
 
     Raises:
+        ValueError: ``pictures``, and nothing to draw with; nothing has run then.
         SystemExit: something is wrong.
     """
     from tauguard.envs.gym.trial import picture, try_arm
+    from tauguard.models.picture import check_opengl
 
-    rows = try_arm(robot, episodes)
+    if pictures is not None:
+        try:
+            check_opengl()
+        except RuntimeError as error:
+            raise ValueError(f"--pictures: {error}") from None
+    rows = try_arm(robot, episodes, seed)
     print()
-    print(f"{'environment':<22} episodes  begin in contact  largest force [N]  bound [N]  diverged")
+    print(
+        f"{'environment':<22} episodes  begin in contact  largest force [N]  bound [N]  diverged  "
+        "still succeeds"
+    )
     for row in rows:
         if row.refused:
             print(f"{row.environment:<22} refused: {row.refused}")
             continue
         print(
             f"{row.environment:<22} {row.episodes:>8}  {row.overlaps:>16}  {row.force:>17.0f}  "
-            f"{row.bound:>9.0f}  {row.diverged:>8}"
+            f"{row.bound:>9.0f}  {row.diverged:>8}  {row.still:>14}"
             + "".join(f"  {kind} moved by {far:.2f} m" for kind, far in row.moved.items())
         )
     if pictures is not None:
         import matplotlib.pyplot as plt
         import numpy as np
 
-        try:
-            shown = [picture(row.environment, robot) for row in rows if not row.refused]
-        except RuntimeError as error:  # no OpenGL
-            raise ValueError(f"--pictures: {error}") from None
+        shown = [picture(row.environment, robot) for row in rows if not row.refused]
         if shown:
             plt.imsave(pictures, np.concatenate(shown, axis=1))
             print(f"wrote {pictures}")

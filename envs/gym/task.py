@@ -1,0 +1,135 @@
+"""What a task defines, and how an environment with it is arranged."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from tauguard.envs.gym.batch import Batch, StepMetrics
+from tauguard.envs.gym.compiled import CompiledScene, compile_scene
+from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
+from tauguard.envs.gym.settings import Settings
+
+#: Beginnings of an episode that are drawn until the arm touches nothing.
+BEGINNINGS = 100
+#: Seeds of the beginnings by which a scene is arranged; of another arm than the package's own at
+#: most so many may be drawn again.
+ARRANGED, DRAWN_AGAIN = 12, 1
+
+
+class Outcome(NamedTuple):
+    """A task's result of one step: numbers of one copy, or arrays of all."""
+
+    rewards: dict[str, Any]  #: named terms, the task's :attr:`Task.terms`; the reward is their sum
+    success: Any
+    memory: Any  #: the memory that :meth:`Task.score` gets at the next step
+    terminated: Any = False
+
+
+class Task(Usual):
+    """A task: where an episode starts, the reward of a step, and when the episode ends."""
+
+    #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
+    defaults: ClassVar[dict[str, Any]] = {}
+    #: How many arms the scene has.
+    arms: ClassVar[int] = 1
+    #: Keywords of the task itself, with their defaults.
+    options: ClassVar[dict[str, Any]] = {}
+    #: Names of the terms of the reward; ``info`` has each as ``reward_NAME``.
+    terms: ClassVar[tuple[str, ...]] = ()
+    #: ``info["reason"]`` of an episode that the task terminates, after a success and without one.
+    ended: ClassVar[str] = ""
+    failed: ClassVar[str] = ""
+
+    def __init__(self, batch: Batch, **options: Any) -> None:
+        """Keep the batch."""
+        self.batch = batch
+        #: The memory of :meth:`score` from one step to the next, a number for each copy.
+        self.memory = np.zeros(batch.rows)
+
+    def start(self, i: int, rng: np.random.Generator) -> None:
+        """Begin an episode of copy ``i``; end with :meth:`Batch.start`."""
+        raise NotImplementedError
+
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
+        """Judge a step; the same arithmetic for one copy and for arrays of all gives equal bits.
+
+        Args:
+            step: the result of the action.
+            memory: what the last step, or :meth:`start`, left.
+        """
+        raise NotImplementedError
+
+    def begin(self, i: int, rng: np.random.Generator) -> None:
+        """Begin an episode of copy ``i`` in which the arm touches nothing at first.
+
+        Raises:
+            StartsInContact: no such beginning was found.
+        """
+        for _ in range(BEGINNINGS):
+            try:
+                return self.start(i, rng)
+            except StartsInContact as error:
+                refused = error
+        raise refused
+
+    def after(self, i: int, rng: np.random.Generator) -> None:
+        """What follows a success of copy ``i``, before its observation is shown."""
+
+    def get_state(self) -> Any:
+        """The state of the task besides :attr:`memory`."""
+        return None
+
+    def set_state(self, state: Any) -> None:
+        """Go back to what :meth:`get_state` gave."""
+
+
+def build(
+    task_type: type[Task], keywords: dict[str, Any], rows: int
+) -> tuple[CompiledScene, Batch, Task]:
+    """Scene, batch and task of an environment with these keywords."""
+    own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
+    try:
+        settings = Settings.from_keywords(task_type.defaults, keywords)
+    except ValueError as error:
+        if own and str(error).startswith("keyword "):
+            raise ValueError(f"{error}, {', '.join(own)}") from None
+        raise
+    default, moved = frozenset(task_type.defaults) - keywords.keys(), dict[str, float]()
+    for _ in range(MOVES + 1):
+        compiled = compile_scene(settings, task_type, task_type.arms, moved, default)
+        batch = Batch(compiled, rows)
+        task = task_type(batch, **own)
+        movable = _movable(settings, default, task_type)
+        overlap = _overlap(task, set() if compiled.layout.own else movable)
+        if overlap is None or overlap.kind not in movable:
+            break
+        step = STEP * max(1.0, compiled.layout.scale)
+        moved[overlap.kind] = moved.get(overlap.kind, 0.0) + step
+    if overlap is not None:
+        raise overlap
+    return compiled, batch, task
+
+
+def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
+    """What the arm overlaps in beginnings: kinds in ``strict`` in few, others in all of a seed."""
+    missed = 0
+    for seed in range(ARRANGED):
+        rng = np.random.default_rng(seed)
+        for _ in range(BEGINNINGS):
+            try:
+                task.start(0, rng)
+                break
+            except StartsInContact as error:
+                missed += 1
+                if missed > (DRAWN_AGAIN if error.kind in strict else BEGINNINGS):
+                    return error
+    return None
+
+
+def _movable(settings: Settings, default: frozenset[str], task_type: type[Task]) -> set[str]:
+    """Kinds of things that the environment places itself."""
+    kinds = set(default & {"table", "cloth"})
+    kinds |= {item for item in settings.obstacles if isinstance(item, str)}
+    return kinds | ({"second arm"} if task_type.arms == 2 else set())
