@@ -83,7 +83,7 @@ largest one. Where several act at once, J^T f of the largest one is not the whol
 ```python
 import polars as pl  # pandas, DuckDB and pyarrow read the same files
 
-rows = pl.scan_parquet("data/{first}-*.parquet")
+rows = pl.scan_parquet("data/{first}-[0-9]*.parquet")
 print(rows.filter(pl.col("collision") >= 0).group_by("episode").agg(pl.col("t").min()).collect())
 ```
 
@@ -157,8 +157,7 @@ def card(
 ) -> str:
     """The text of ``README.md``."""
     files = "".join(
-        f"  - split: {name.replace('-', '_')}\n    path: data/{name}-*.parquet\n"
-        for name in summary
+        f"  - split: {name.replace('-', '_')}\n    path: {shards(name)}\n" for name in summary
     )
     rows, first = sum(one.rows for one in summary.values()), next(iter(summary))
     return CARD_TEXT.format(
@@ -238,6 +237,11 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
     return json.dumps(content, indent=1) + "\n"
 
 
+def shards(split: str) -> str:
+    """Pattern of a split's files: of "test" not those of "test-arm"."""
+    return f"data/{split}-[0-9]*.parquet"
+
+
 def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], dict[str, Any]]:
     """The files of a split, and the columns of their rows."""
     files = {
@@ -245,7 +249,7 @@ def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], 
         "@id": f"{split}-files",
         "name": f"{split}-files",
         "encodingFormat": "application/x-parquet",
-        "includes": f"data/{split}-*.parquet",
+        "includes": shards(split),
     }
     fields = []
     for field in schema(configuration.most_joints, configuration.residual):

@@ -7,6 +7,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from tauguard.datasets.card import shards
+from tauguard.datasets.configuration import load
 from tauguard.datasets.dataset_folder import CARD, CROISSANT, lines
 from tauguard.datasets.exports.lerobot import Moments, write_lerobot
 from tauguard.datasets.exports.minari import write_minari
@@ -85,4 +87,15 @@ def test_the_card_and_croissant_name_every_file_and_column(tiny):
         assert [field["name"] for field in records["field"]] == columns
     card = (tiny / CARD).read_text()
     assert card.startswith("---\nlicense: ")
-    assert "path: data/train-*.parquet" in card
+    assert f"path: {shards('train')}" in card
+
+
+def test_the_pattern_of_a_split_has_no_file_of_another(tmp_path):
+    """The splits of the shipped benchmark, some of whose names begin as others do."""
+    (tmp_path / "data").mkdir()
+    names = [split.name for split in load("tauguard-collisions-v2").splits]
+    own = {n: {f"{n}-000000.parquet", f"{n}-000012.parquet"} for n in names}
+    for name in {file for files in own.values() for file in files}:
+        (tmp_path / "data" / name).touch()
+    assert {"test", "test-arm"} <= set(names)
+    assert {n: {p.name for p in tmp_path.glob(shards(n))} for n in names} == own
