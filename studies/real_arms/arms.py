@@ -1,5 +1,6 @@
 """The real arms of the data folder: their logs, and the pushes in them."""
 
+import csv
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -51,9 +52,6 @@ class ArmData:
     columns: str = ""  #: preset
     parts: int = 1  #: that a free log is cut into
     loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, where there were any
-    pushes: dict[str, tuple[Push, ...]] = field(default_factory=dict)
-    """By log, where there is no sensor: the torque less that of an untouched run at the same place
-    of the program, from 3 N m to its peak."""
 
     @property
     def file(self) -> Path:
@@ -62,47 +60,30 @@ class ArmData:
         return PUBLISHED / self.robot if self.robot else own
 
 
-def _pushes(moving: bool, *spans: tuple[float, float]) -> tuple[Push, ...]:
-    return tuple(Push(start, peak, moving) for start, peak in spans)
-
-
 ARMS = (
     ArmData(
         "ur10e",
         ("free", "jointwise", "validation"),
         "ur10e_pushed",
         loads={"ur-20_01_13-load_2600": Load(2.6), "ur-20_01_31-load": None},
-        # For seconds, from the change of the currents; half a second of each.
-        pushes={
-            "ur-static": _pushes(
-                False,
-                *((3.2, 3.7), (11.6, 12.1), (17.1, 17.6), (25.4, 25.9), (38.0, 38.5), (43.9, 44.4)),
-            )
-        },
     ),
-    ArmData(
-        "ur5",
-        ("free",),
-        "ur5/contact",
-        pushes={
-            "no10_standing_pushed": _pushes(
-                False, (3.22, 3.42), (5.25, 5.45), (6.15, 6.47), (7.95, 8.27), (9.7, 10.4)
-            ),
-            "no5_pushed": _pushes(
-                True,
-                *((12.54, 12.79), (18.9, 19.12), (21.14, 21.44), (21.8, 22.06), (24.77, 24.98)),
-                *((25.5, 25.66), (26.17, 26.3), (27.29, 27.4), (27.8, 27.95)),
-            )
-            + _pushes(False, (20.5, 20.79)),
-            "no7_pushed": _pushes(True, (15.55, 16.05), (18.2, 18.9))
-            + _pushes(False, (8.38, 8.64), (11.52, 11.83), (13.9, 14.12)),
-        },
-    ),
+    ArmData("ur5", ("free",), "ur5/contact"),
     ArmData("ur3", ("free",)),
     # The Med 7's own file is not there.
     ArmData("kuka_med7", ("",), robot="iiwa14.xml", columns="lbr", parts=3),
     ArmData("panda_touch", (), "panda_touch", robot="panda.xml", columns="franka"),
 )
+
+
+def by_eye(log: str) -> tuple[Push, ...]:
+    """Pushes of a log without a sensor, from ``pushes.csv``; its first lines say how it was made."""
+    lines = Path(__file__).with_name("pushes.csv").read_text().splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return tuple(
+        Push(float(row["start"]), float(row["peak"]), row["state"] == "moving")
+        for row in rows
+        if row["log"] == log
+    )
 
 
 def thinned(trace: Trace, rate: float) -> Trace:
@@ -151,7 +132,7 @@ def touched(arm: ArmData) -> dict[str, Touched]:
         table = np.genfromtxt(path, delimiter=",", names=True)
         if "label" in (table.dtype.names or ()):
             found[path.stem] = _labelled(Recording(trace), table)
-        elif known := _by_sensor(table) or arm.pushes.get(path.stem, ()):
+        elif known := _by_sensor(table) or by_eye(path.stem):
             found[path.stem] = Touched(Recording(trace), known)
     return found
 
