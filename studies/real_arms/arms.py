@@ -76,7 +76,7 @@ ARMS = (
 
 
 def by_eye(log: str) -> tuple[Push, ...]:
-    """Pushes of a log without a sensor, from ``pushes.csv``; its first lines say how it was made."""
+    """Pushes of a log without a sensor, from ``pushes.csv``, which says how it was made."""
     lines = Path(__file__).with_name("pushes.csv").read_text().splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return tuple(
