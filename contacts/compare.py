@@ -59,12 +59,7 @@ def compare(
             checker that is not asked for, a timestep or duration that is not above 0, a ``fine``
             below 1.
     """
-    if isinstance(scene, str):
-        if scene not in SCENES:
-            raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
-        scene = SCENES[scene]()
-    if isinstance(scene, mujoco.MjModel):
-        scene = ContactScene("model", scene, scene.qpos0.copy(), np.zeros(scene.nv))
+    scene = _scene(scene)
     duration = scene.seconds if seconds is None else seconds
     if not 0 < duration < np.inf:
         raise ValueError(f"seconds {duration}: expected a time above 0")
@@ -89,6 +84,17 @@ def compare(
     if first is not None:
         scores = tuple(_beside(s, first, chosen[s.checker].covers) for s in scores)
     return _report(scene, run, scores, first[0] if first is not None else None, keep)
+
+
+def _scene(scene: ContactScene | mujoco.MjModel | str) -> ContactScene:
+    """The scene of a name or a model."""
+    if isinstance(scene, str):
+        if scene not in SCENES:
+            raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
+        return SCENES[scene]()
+    if isinstance(scene, mujoco.MjModel):
+        return ContactScene("model", scene, scene.qpos0.copy(), np.zeros(scene.nv))
+    return scene
 
 
 def _report(

@@ -37,6 +37,7 @@ def test_ppo_learns_and_its_policy_is_the_one_that_was_trained(tmp_path):
     again, _, _ = example["train"]("React-v1", steps=64, copies=1, start=tmp_path / "policy.npz")
     seen = np.random.default_rng(0).normal(size=30)
     assert again(seen) == pytest.approx(policy(seen), abs=0.3)
-    _, dear, cost = example["train"]("TwoArms-v1", budget=1e-6, steps=4096, copies=4)
-    assert dear > 0.3  # no episode keeps such a budget
+    start = SOURCE.with_name("policies") / "TwoArms-v1.npz"  # its arms meet
+    _, dear, cost = example["train"]("TwoArms-v1", budget=1e-6, steps=4096, copies=4, start=start)
+    assert dear > 0.25  # it grows by .1 a round, and at most one round of four keeps the budget
     assert cost > 0
