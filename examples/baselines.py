@@ -104,8 +104,11 @@ def learned(file):
     return lambda env, info: policy(env.unwrapped.batch.observation[0])
 
 
-def baselines(task, files=()):
-    """By name: what acts, keywords and a wrapper of the environment; policy files come last."""
+def baselines(task, files=(), robot="cura6"):
+    """By name: what acts, keywords and a wrapper of the environment; policy files come last.
+
+    The shipped policies belong to the package's arm.
+    """
     found = {
         "zero": (zero, {}, None),
         "random": (random, {}, None),
@@ -117,7 +120,7 @@ def baselines(task, files=()):
     if task in ("ClothReach-v1", "TwoArms-v1"):  # nobody is there
         del found["separation"]
     for name, end in (("ppo", ""), ("ppo, budget", "-budget")):
-        if (file := POLICIES / f"{task}{end}.npz").is_file():
+        if robot == "cura6" and (file := POLICIES / f"{task}{end}.npz").is_file():
             found[name] = (learned(file), {}, None)
     return found | {str(file): (learned(file), {}, None) for file in files}
 
@@ -156,7 +159,7 @@ def main(episodes, first, names, robot):
     )
     print("|---|---|---|---|---|---|---|---|")
     for task in tasks or TASKS:
-        for name in baselines(task, files):
+        for name in baselines(task, files, robot):
             rows = play(task, name, episodes, first, files, robot=robot)
             interval = rate(int(rows[:, 0].sum()), len(rows))
             low, high = interval["low"], interval["high"]

@@ -178,7 +178,8 @@ def test_two_arms_push_one_another_with_equal_and_opposite_forces():
             break
         both = {int(model.body_rootid[model.geom_bodyid[g]]) for g in data.contact.geom.ravel()}
         if data.ncon and len(both) == 2 and 0 not in both:  # nothing but the arms
-            assert info["cost"] == pytest.approx(info["force"], rel=0.5)
+            period = 1 / env.compiled.settings.control_rate
+            assert 0 < info["cost"] <= info["force"] * period * (1 + 1e-9)
     assert checked > 20
     assert info["cost_sum"] > 0
 
