@@ -131,7 +131,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     def _own_file(self) -> bool:
         """Whether the path is a regular file inside the folder and not reached through a link."""
         file, folder = Path(self.translate_path(self.path)), Path(self.directory)
-        if file == folder:
+        if self.path.partition("?")[0] == "/":  # other names of the folder would be redirected
             file = folder / "index.html"
         if file.suffix not in SERVED or not file.is_relative_to(folder):
             return False

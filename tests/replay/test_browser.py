@@ -67,6 +67,13 @@ def test_the_folders_recordings_and_its_page_are_served_and_nothing_else(replay)
         assert answer(replay, path)[0].status == 404
 
 
+def test_only_one_name_of_the_folder_is_its_page(replay):
+    """Another one would be redirected to itself with a slash, which a browser may call a host."""
+    for path in ("/a/..", "/\\evil.example/..", "/%2f/evil.example/..%2f", "/./", "/?x/.."):
+        status = answer(replay, path)[0].status
+        assert status == (200 if path[1] == "?" else 404), path
+
+
 def test_no_link_leads_out_of_the_folder(tmp_path):
     outside, folder = tmp_path / "outside", tmp_path / "served"
     for place in (outside, folder, folder / "own"):
