@@ -7,6 +7,7 @@ memory and time first.
 import os
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 
 from tauguard.models.robot_trial import Trial
@@ -14,6 +15,9 @@ from tauguard.untrusted_input import read_text, reading
 
 #: Files that include one another, at most.
 MOST_INCLUDES = 100
+
+#: Attributes that name a file; the six are those of a cube's texture.
+FILES = ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
 
 #: What tries the files.
 TRIAL = Trial()
@@ -77,17 +81,15 @@ def _check_names(path: Path) -> None:
                 if key in compiler.attrib:
                     dirs.append(_inside(path, folder, folder, compiler.attrib[key]))
         for element in root.iter():
-            name = element.attrib.get("file")
-            if name is None:
-                continue
-            for where in dirs:
+            names = [element.attrib[key] for key in FILES if key in element.attrib]
+            for name, where in product(names, dirs):
                 target = _inside(path, folder, where, name)
                 if element.tag == "include" and target.is_file():
                     waiting.append(target)
 
 
 def _inside(robot: Path, folder: Path, where: Path, name: str) -> Path:
-    target = (where / name).resolve()
+    target = (where / name.replace("\\", "/")).resolve()  # MuJoCo takes both for a separator
     if not target.is_relative_to(folder):
         raise ValueError(f"{robot}: names {name!r}, a file outside its folder {folder}")
     return target

@@ -138,6 +138,12 @@ ARM = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="0.1" mas
         '<include file="../secret.xml"/>',
         '<asset><mesh name="m" file="../../x.stl"/></asset>',
         '<compiler meshdir="/etc"/>',
+        '<asset><mesh name="m" file="..\\x.stl"/></asset>',
+        '<include file="..\\secret.xml"/>',
+        *(
+            f'<asset><texture name="t" type="cube" file{side}="../x.png"/></asset>'
+            for side in ("right", "left", "up", "down", "front", "back")
+        ),
     ],
 )
 def test_a_robot_file_names_nothing_outside_its_folder(part, tmp_path):
