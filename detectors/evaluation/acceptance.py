@@ -9,6 +9,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.card_page import times
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.features.free_bound import friction_levels
@@ -38,11 +39,12 @@ def check_own_alarms(
     low = poisson_rate(alarms, seconds / 3600)["low"]
     if low <= asked:
         return
-    own = ", ".join(f"{len(log.alarms)} in {log.name}" for log in logs if log.alarms)
+    own = ", ".join(f"{log.name}: {times(log)}" for log in logs if log.alarms)
     raise ValueError(
         f"{alarms} alarms in {seconds / 60:.1f} min of logs without a contact, each judged by the "
-        f"others{own and f' ({own})'}: at least {low:.0f} an hour where {asked:g} are accepted; "
-        "more logs of such motion would help"
+        f"others{own and f' ({own})'}: at least {low:.0f} an hour where {asked:g} are accepted; if "
+        "something touched the arm there, leave these logs out or cut the touches out, else more "
+        "logs of such motion would help"
     )
 
 

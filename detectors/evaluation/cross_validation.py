@@ -36,6 +36,7 @@ from tauguard.detectors.scores.free_motion import (
     FittedFreeMotion,
     Judged,
     learned,
+    standing_detector,
     with_load_of,
 )
 from tauguard.traces.trace import Alarm
@@ -94,12 +95,13 @@ def cross_validate(
         accepted: names that are kept in any case.
     """
     names, out = list(recordings), list[CrossValidatedLog]()
+    least = min(KEPT, motion_length(list(recordings.values())))
     while True:
         judged = judge_logs({name: recordings[name] for name in names}, arm)
         odd = standing_out(judged)
         worst = next((log for log in odd if log.name not in accepted), None)
         rest = [recordings[n] for n in names if worst is None or n != worst.name]
-        if worst is None or 2 * len(rest) < len(recordings) or motion_length(rest) < KEPT:
+        if worst is None or 2 * len(rest) < len(recordings) or motion_length(rest) < least:
             vouched = tuple(log for log in odd if log.name in accepted)
             return CrossValidation(tuple(judged), tuple(out), vouched)
         out.append(worst)
@@ -153,6 +155,9 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
 
 def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, ...], float]]:
     """Alarms and level of each part, under calibration and bounds from the parts of other turns."""
+    if not any(moves(part.trace) for part in parts):  # one bound for all, of their calmest pieces
+        still = standing_detector(arm, parts)
+        return [_alarms_and_level(with_load_of(part, still).judge(part.trace)) for part in parts]
     bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
     moving = [k for k, part in enumerate(parts) if moves(part.trace)]
     data = {

@@ -405,3 +405,19 @@ def test_a_standing_arm_alone_is_watched_while_it_stands(folder, tmp_path, capsy
     assert "moves here, but in none of the training logs: nothing is watched" in (
         capsys.readouterr().out
     )
+
+
+def test_a_standing_log_that_is_touched_all_along_is_refused(folder, tmp_path, capsys):
+    """There is no other log to stand out from, and the touches fill more than half of it."""
+    trace = record(5, dwell=(-1.0, 99.0))
+    for start in np.arange(2.0, 24.0, 0.8):
+        trace = add_contact(trace, GAIN, Added(start, 0.5, (2.0, -2.0, 1.0), "push"))
+    log, model = written(tmp_path, "touched.csv", trace), tmp_path / "m.skops"
+    train = ["train", "--free", log, *flags(folder), "--gains", *GAINS, "--model", str(model)]
+    line = fails(capsys, *train)
+    assert "touched.csv: 28 alarms at 2." in line
+    assert "something touched the arm" in line
+    assert not model.exists()
+    main([*train, "--accept", "alarms"])
+    assert "accepted as --accept alarms says" in capsys.readouterr().out
+    assert model.exists()

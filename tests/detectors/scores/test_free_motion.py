@@ -13,7 +13,7 @@ from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
-from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion, standing_detector
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
 
@@ -47,6 +47,20 @@ def test_each_push_of_a_series_on_a_standing_arm_is_an_alarm_and_ends(alarm):
     starts = [one.start for one in alarm.detect(trace).alarms]
     assert all(any(s < x < s + 0.3 for x in starts) for s in (12.0, 14.0, 16.0))
     assert max(one.end for one in alarm.detect(trace).alarms) < 18.0
+
+
+@pytest.mark.parametrize("size", [3.0, 10.0, 30.0])
+def test_touches_in_a_standing_log_are_alarms_in_it(size):
+    """Touches for 5 of 8 tenths of a second, all along; without them there is no alarm."""
+    free = record(3, dwell=(-1.0, 99.0), noise=0.03)
+    touched = free
+    for start in np.arange(1.0, 24.0, 0.8):
+        touched = add_contact(
+            touched, GAIN, Added(start, 0.5, (1.8 * size, -1.8 * size, 0.6), "push")
+        )
+    arm = ArmModel(nominal(), GAIN)
+    assert standing_detector(arm, [Recording(free)]).alarms == 0
+    assert standing_detector(arm, [Recording(touched)]).alarms > 20
 
 
 def test_what_a_push_leaves_is_taken_up(alarm):
