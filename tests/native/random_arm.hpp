@@ -132,7 +132,9 @@ struct MonitoredArm {
     TorqueBounds bounds;
     bounds.opposed = Numbers(n, -0.4), bounds.least = Numbers(n, 0.4);
     bounds.most = Numbers(n, 1.7);
-    Alarm alarm(scores_of(random, kind, chain, basis), {dt, 0.1, 0.5, 2, 250, levels, levels});
+    // Only the score of a kernel has plain thresholds beneath it.
+    const Levels floor = kind == 2 ? levels : Levels{};
+    Alarm alarm(scores_of(random, kind, chain, basis), {dt, 0.1, 0.5, 2, 250, levels, floor});
     Estimator observer(chain, basis, settings_of(random, n, basis.columns(), false));
     monitor.reset(new Monitor(FaultCheck(usual), std::move(alarm), std::move(observer),
                               TorqueCheck(one, one, bounds), {dt, 0.1, 0.02, 0.1, 2}));
