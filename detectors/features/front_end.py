@@ -257,7 +257,7 @@ def plain_residual(arm: ArmModel, trace: Trace) -> Array:
     front, known = _ESTIMATES.get(id(trace), (None, None))
     if front is not None and known is not None and front.arm is arm:
         return known.plain
-    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none())
+    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none(), sampled=trace.dt > SLOWEST)
     return estimator.run(trace.t, trace.q, trace.qd, trace.current).residual
 
 

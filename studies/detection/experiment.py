@@ -194,7 +194,8 @@ def _fleets(
 
 
 def _train(job: tuple[int, int, tuple[str, ...], Training]) -> dict[str, FittedDetector]:
-    return trained(*job, Conditions())
+    seed, arm, names, training = job
+    return trained(training.traces(seed, arm), names, Conditions())
 
 
 def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tallies:

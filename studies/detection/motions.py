@@ -23,7 +23,7 @@ from tauguard.datasets.plans import (
 from tauguard.detectors.events import detection_window
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import Mismatch
-from tauguard.traces import STRATA, Collision, Trace, resampled
+from tauguard.traces import STRATA, Collision, Trace
 
 #: Percent of the maximum speed in the training slices.
 TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
@@ -57,7 +57,6 @@ class Conditions:
     robot: str = "cura6"  #: a name or a file
     joints: int = 6  #: of the robot
     share: float = 1.0  #: of the payloads, torques and least forces that are for the CURA6-like arm
-    hz: float | None = None  #: rate of the log [Hz]; None: the simulation's
 
     def arm(self, seed: int) -> Mismatch:
         """The arm ``seed`` under these conditions."""
@@ -94,11 +93,7 @@ class Conditions:
 
     def simulated(self, episode: Episode) -> Trace:
         """``episode`` under these conditions."""
-        return self.logged(simulate(self.applied(episode)))
-
-    def logged(self, trace: Trace) -> Trace:
-        """A trace at the rate of the log."""
-        return trace if self.hz is None else resampled(trace, self.hz)
+        return simulate(self.applied(episode))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from itertools import islice
 
 import numpy as np
 
-from studies.detection.motions import CALIBRATE, Conditions, Struck, Training, free_pool, stream
+from studies.detection.motions import CALIBRATE, Conditions, Struck, free_pool, stream
 from tauguard.arrays import Array
 from tauguard.datasets.plans import BEGIN, TRAINING_PAYLOADS
 from tauguard.detectors import (
@@ -68,10 +68,10 @@ Fleet = Mapping[str, Operated]
 
 
 def trained(
-    seed: int, arm: int, names: Sequence[str], training: Training, under: Conditions
+    traces: Sequence[Trace], names: Sequence[str], under: Conditions
 ) -> dict[str, FittedDetector]:
     """The detectors of one arm, trained on its slices."""
-    traces, robot = training.traces(seed, arm, under), nominal_design(under.robot)
+    robot = nominal_design(under.robot)
     return {name: make_detector(name).fit(traces, robot) for name in names}
 
 

@@ -38,7 +38,7 @@ from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.report import Row, rate
-from tauguard.traces import STRATA
+from tauguard.traces import STRATA, Trace, resampled
 
 #: How a threshold is chosen: expected to give a rate, or guaranteed not to exceed it.
 AIMED, GUARANTEED = "aimed at", "guaranteed"
@@ -125,19 +125,33 @@ def point(way: str, asked: float) -> str:
 
 def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
     """Train, set thresholds and judge on the arm ``job[2]``, with the study's seed ``job[1]``."""
-    size, seed, arm = job
+    return tallies_by_rate((*job, (None,)))[0]
+
+
+def tallies_by_rate(job: tuple[Size, int, int, Sequence[float | None]]) -> list[Tallies]:
+    """:func:`arm_tallies` of one motion logged at each sample rate [Hz]; None: as simulated."""
+    size, seed, arm, rates = job
     payloads = tuple(sorted(map(float, set(TRAINING_PAYLOADS))))
     known, hours = replace(size.under, payloads=payloads), size.calibration_hours / len(SPEEDS)
-    detectors = trained(seed, arm, size.names, size.training, size.under)
+    slices = size.training.traces(seed, arm, size.under)
+    logs = [trained([_logged(t, hz) for t in slices], size.names, size.under) for hz in rates]
+    del slices
     pools = [free_pool(stream(seed, CALIBRATE, 9), v, (arm,), hours, known) for v in SPEEDS]
-    scores = joined(
-        [free_scores(detectors, size.under.logged(simulate(e))) for pool in pools for _, e in pool]
-    )
-    fleet = {
-        name: Operated(detector, dict(_alarms(detector, scores[name], size.asked)))
-        for name, detector in detectors.items()
-    }
-    return merged(_judged(size, seed, arm, fleet))
+    parts = []
+    for trace in (simulate(episode) for pool in pools for _, episode in pool):
+        parts.append(
+            [free_scores(d, _logged(trace, hz)) for d, hz in zip(logs, rates, strict=True)]
+        )
+    fleets = [
+        {n: Operated(d, dict(_alarms(d, scores[n], size.asked))) for n, d in detectors.items()}
+        for detectors, scores in zip(logs, map(joined, zip(*parts, strict=True)), strict=True)
+    ]
+    judged = list(_judged(size, seed, arm, [*zip(fleets, rates, strict=True)]))
+    return [merged(own) for own in zip(*judged, strict=True)]
+
+
+def _logged(trace: Trace, hz: float | None) -> Trace:
+    return trace if hz is None else resampled(trace, hz)
 
 
 def _alarms(
@@ -156,13 +170,18 @@ def _alarms(
         yield point(GUARANTEED, per_hour), CollisionAlarm(detector, held)
 
 
-def _judged(size: Size, seed: int, arm: int, fleet: dict[str, Operated]) -> Iterator[Tallies]:
+def _judged(
+    size: Size, seed: int, arm: int, fleets: Sequence[tuple[dict[str, Operated], float | None]]
+) -> Iterator[list[Tallies]]:
     fresh, struck = stream(seed, TEST, 9), stream(seed, TEST, 10, arm)
     for k, speed in enumerate(SPEEDS):
         for _, episode in free_pool(fresh, speed, (arm,), size.hours / len(SPEEDS), size.under):
-            yield on_free(fleet, size.under.logged(simulate(episode)))
+            trace = simulate(episode)
+            yield [on_free(fleet, _logged(trace, hz)) for fleet, hz in fleets]
         if size.per_stratum:
             pool = struck_pool(
                 struck, speed, (arm,), size.per_stratum, conditions=size.under, first=k
             )
-            yield from (on_struck(fleet, one) for one in pool)
+            for one in pool:
+                logs = [(fleet, _logged(one.trace, hz)) for fleet, hz in fleets]
+                yield [on_struck(fleet, replace(one, trace=log)) for fleet, log in logs]

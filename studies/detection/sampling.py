@@ -6,12 +6,11 @@ trained and judged on what a slower controller would have logged of it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from studies.detection.motions import Conditions, Training
+from studies.detection.motions import Training
 from studies.detection.operating import merged
-from studies.detection.rates import AIMED, Size, arm_tallies, collisions, point
+from studies.detection.rates import AIMED, Size, collisions, point, tallies_by_rate
 from studies.framework import JobCache, Workers
 from tauguard.report import Row
 from tauguard.report.charts import errorbars
@@ -41,11 +40,11 @@ def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``sample rate``: one a rate and detector."""
     size, rates = (QUICK, RATES[:1] + RATES[3:4]) if quick else (FULL, RATES)
     arms = [71_000 + 100 * seed + k for k in range(size.arms)]
-    jobs = [(replace(size, under=Conditions(hz=hz)), seed, arm) for hz in rates for arm in arms]
+    jobs = [(size, seed, arm, rates) for arm in arms]
     with Workers() as each:
         cache = JobCache.of(keep, "detection_sampling", seed, (size, rates))
-        tallies = list(cache.over(each, "rate and arm")(arm_tallies, jobs))
-    by_rate = [merged(tallies[k : k + size.arms]) for k in range(0, len(jobs), size.arms)]
+        tallies = list(cache.over(each, "arm")(tallies_by_rate, jobs))
+    by_rate = [merged(own) for own in zip(*tallies, strict=True)]
     return [
         {"study": "sample rate", "hz": hz, "detector": name}
         | collisions(whole[name, point(AIMED, ASKED)], 1.0)
