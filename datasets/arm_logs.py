@@ -72,7 +72,7 @@ def read_one(
     if torque:
         notes = tuple(n.replace("taken as current [A]", "joint torque [N m]") for n in notes)
         trace = dataclasses.replace(trace, meta={**trace.meta, "effort": "torque"})
-    return Log(trace, tuple(f"{log.name}: {note}" for note in notes))
+    return Log(trace, tuple(f"{log.name}: {note}" for note in notes), read.touched)
 
 
 def reduced(log: Log, hz: float) -> Log:
@@ -90,7 +90,7 @@ def reduced(log: Log, hz: float) -> Log:
         f"{1 / own:.3g} Hz reduced to {hz:g} Hz by means: alarms come {500 / hz - 500 * own:.3g} "
         f"ms later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
     )
-    return Log(trace, (*log.notes, note))
+    return Log(trace, (*log.notes, note), log.touched)
 
 
 def read_logs(
@@ -110,10 +110,12 @@ def read_logs(
         reading: mends and rate (default: none).
 
     Raises:
-        ValueError: a saturated current, currents in one log and torques in another, joints that
-            the robot does not have, or what reading raises.
+        ValueError: labelled contacts, a saturated current, currents in one log and torques in
+            another, joints that the robot does not have, or what reading raises.
     """
     read = {path.name: read_one(path, columns, torque, reading) for path in log_files(logs)}
+    for name, log in read.items():
+        _refuse_touched(name, log)
     notes = [note for log in read.values() for note in log.notes]
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
@@ -122,6 +124,18 @@ def read_logs(
     if len({is_torque(trace) for trace in traces.values()}) > 1:
         raise ValueError("some logs hold currents, others torques: give those of one kind")
     return ArmLogs(traces, numbers, (*notes, *held))
+
+
+def _refuse_touched(name: str, log: Log) -> None:
+    if log.touched:
+        begin = float(log.trace.t[0])
+        times = ", ".join(f"{a - begin:.1f} to {b - begin:.1f} s" for a, b in log.touched[:3])
+        raise ValueError(
+            f"{name}: a column labels {len(log.touched)} contact"
+            f"{'' if len(log.touched) == 1 else 's'} ({times}"
+            f"{', ...' if len(log.touched) > 3 else ''} after the beginning); expected free "
+            "motion: leave this log out, or cut the free seconds out of it"
+        )
 
 
 def _refuse_saturated(log: str, trace: Trace) -> None:

@@ -20,6 +20,9 @@ from tauguard.untrusted_input import reading
 
 #: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
+#: Columns, in any case, that say whether something touches the arm, if each cell is a LABEL.
+LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
+LABEL = {"0": False, "false": False, "1": True, "true": True}
 #: Rows that repeat the state are left out where they are this share, or more: a recorder that is
 #: faster than its robot. Below it, a standing arm repeats its numbers by chance.
 REPEATED = 0.2
@@ -31,6 +34,8 @@ class Log:
 
     trace: Trace
     notes: tuple[str, ...]  #: one line for each repair, empty if there was none
+    touched: tuple[tuple[float, float], ...] | None = None
+    """First and last time [s] of each contact that a column labels; None: there is no such column"""
 
 
 def read_log(
@@ -163,7 +168,33 @@ def read_csv(
     names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
-    return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")))
+    touched = labelled(header, dict(rows), kept, trace.t)
+    return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")), touched)
+
+
+def labelled(
+    header: Sequence[str], cells: dict[int, list[str]], lines: NDArray[np.int64], t: Array
+) -> tuple[tuple[float, float], ...] | None:
+    """When a column of labels says that something touches the arm.
+
+    Args:
+        header: names of the columns.
+        cells: rows of the file by their line.
+        lines: line of each sample, shape (T,).
+        t: its time [s], shape (T,).
+
+    Returns:
+        Times of the first and last sample of each contact; None without a column in LABELS, or
+        where it holds something else than 0 and 1, or false and true.
+    """
+    columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
+    for column in columns:
+        marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
+        if None in marks:
+            continue
+        edges = np.flatnonzero(np.diff(np.array([False, *marks, False], dtype=int)))
+        return tuple((float(t[a]), float(t[b - 1])) for a, b in edges.reshape(-1, 2))
+    return None
 
 
 def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:

@@ -1,6 +1,7 @@
 """Logs of real arms: the numbers that are in the file, and one line for every fault."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from mcap.opcode import Opcode
 from mcap_ros2.writer import Writer
 
 from tauguard.datasets import PRESETS, ColumnMap, read_log
+from tauguard.datasets.arm_logs import read_logs
 from tauguard.datasets.columns import UR_JOINTS
 from tauguard.traces import Trace, write_mcap
 from tauguard.traces.mcap_container import walk
@@ -45,6 +47,32 @@ def test_numbers_by_name(tmp_path):
     np.testing.assert_array_equal(log.trace.qd, [[3, 4], [9, 10], [1, 1]])
     np.testing.assert_array_equal(log.trace.current, [[5, 6], [11, 12], [1, 1]])
     assert log.trace.truth is None
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "touched"),
+    [
+        ("Label", ["0", "1.0", "1"], ((0.1, 0.3),)),
+        ("collision", ["true", "False", "TRUE"], ((0.0, 0.0), (0.3, 0.3))),
+        ("contact", ["0", "0", "0"], ()),
+        ("contact", ["0", "0.4", "1"], None),  # a measured number is no label
+        ("labels", ["0", "1", "1"], None),
+    ],
+)
+def test_a_column_of_labels_says_when_something_touched(tmp_path, name, cells, touched):
+    lines = [f"{line},{cell}" for line, cell in zip(TEXT.split(), [name, *cells], strict=True)]
+    assert read_log(write(tmp_path, "\n".join(lines)), TWO).touched == touched
+
+
+def test_labelled_contacts_are_no_free_motion(tmp_path):
+    lines = [
+        f"{line},{cell}" for line, cell in zip(TEXT.split(), ["label", "0", "1", "1"], strict=True)
+    ]
+    write(tmp_path, "\n".join(lines))
+    columns = tmp_path / "columns.json"
+    columns.write_text(json.dumps(dataclasses.asdict(TWO) | {"repair": []}))
+    with pytest.raises(ValueError, match=r"log.csv: a column labels 1 contact \(0.1 to 0.3 s"):
+        read_logs([tmp_path / "log.csv"], str(columns), tmp_path / "no.urdf")
 
 
 def test_indices_units_and_names(tmp_path):

@@ -48,6 +48,9 @@ def command(
     nothing may touch the arm, and watches the rest. More motion makes a better detector: `tauguard
     train --free` learns from whole logs.
 
+    A column called label, contact, collision or touch that holds 0 and 1 is taken as truth: what
+    was found of its contacts, how late, and the alarms outside of them are printed.
+
     Torques that the motion does not explain are refused: currents in a wrong unit or of the other
     sign. Currents of exchanged joints are noticed only as far as gravity loads those joints.
 
@@ -76,6 +79,7 @@ def command(
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_one
     from tauguard.detectors.alarms.log_detection import detect_in_log
+    from tauguard.detectors.evaluation.labelled_log import beside_labels
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
@@ -91,11 +95,21 @@ def command(
         trace, alarm = trained(model, trace, payload, robot)
     else:
         seconds = QUIET if quiet is None else quiet
+        early = [a for a, _ in read.touched or () if a < trace.t[0] + seconds]
+        if early:
+            raise ValueError(
+                f"{log}: a column labels a contact {early[0] - trace.t[0]:.2f} s after the "
+                f"beginning, within the first {seconds:g} s (--quiet) that are learned from; give "
+                "a shorter --quiet, or a --model"
+            )
         trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
     found = detect_in_log(alarm, trace)
     causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
+    if read.touched is not None:
+        begin, end = found.begin, float(trace.t[-1])
+        result["labels"] = beside_labels(found.detection.alarms, read.touched, begin, end)
     report(result)
     if json is not None:
         write_json(json, result)
@@ -275,6 +289,7 @@ def summary(
 def report(result: dict[str, Any]) -> None:
     """The figures as text."""
     from tauguard.detectors.evaluation.card_page import printed_from, rate_text
+    from tauguard.detectors.evaluation.labelled_log import labels_text
 
     print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     since = printed_from(result["begin"])
@@ -290,6 +305,10 @@ def report(result: dict[str, Any]) -> None:
     if result["fault_seconds"]:
         print(f"faults hide collisions in {result['fault_seconds']:.2f} s of this log")
     count, seconds = result["alarms"], result["watched_seconds"]
+    if labels := result.get("labels"):
+        print(f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched")
+        print(labels_text(labels, since))
+        return
     print(
         f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; where "
         "nothing touched the arm, each is a false one"

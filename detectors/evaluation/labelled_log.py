@@ -1,0 +1,82 @@
+"""Alarms in a log beside the contacts that a column of it labels."""
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Any
+
+from tauguard.traces import Alarm
+
+#: An alarm within so long after the onset of a contact is that contact's [s].
+LATE = 0.5
+
+
+def beside_labels(
+    alarms: Sequence[Alarm], touched: Sequence[tuple[float, float]], begin: float, end: float
+) -> dict[str, Any]:
+    """What was found of the labelled contacts, ready for JSON.
+
+    A contact is found by an alarm that begins while it lasts, or within 0.5 s of its onset, and
+    before the next contact. Where none does, an alarm from before may still be up. An alarm that
+    begins elsewhere is false.
+
+    Args:
+        alarms: in order of time.
+        touched: first and last labelled time of each contact [s], in order.
+        begin: since when the detector watches [s]; contacts that begin before do not count.
+        end: of the log [s].
+
+    Returns:
+        ``contacts``, ``found``, ``still_up`` (in an alarm that began before), ``missed`` (their
+        onsets [s]), ``delays`` [s] of those found, ``false_alarms``, ``free_seconds``.
+    """
+    onsets = [a for a, _ in touched]
+    windows = [
+        (a, min(max(b, a + LATE), after))
+        for (a, b), after in zip(touched, [*onsets, end][1:], strict=True)
+    ]
+    delays, missed, still_up, contacts = [], [], 0, 0
+    for a, last in windows:
+        if a < begin:
+            continue
+        contacts += 1
+        own = [alarm.start - a for alarm in alarms if a <= alarm.start <= last]
+        if own:
+            delays.append(own[0])
+        elif any(alarm.start < a <= alarm.end for alarm in alarms):
+            still_up += 1
+        else:
+            missed.append(a)
+    outside = [x for x in alarms if not any(a <= x.start <= last for a, last in windows)]
+    covered = sum(last - max(a, begin) for a, last in windows if last > begin)
+    return {
+        "contacts": contacts,
+        "found": len(delays),
+        "still_up": still_up,
+        "missed": missed,
+        "delays": delays,
+        "false_alarms": len(outside),
+        "free_seconds": max(end - begin - covered, 0.0),
+    }
+
+
+def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
+    """The figures of :func:`beside_labels` in a line or two; times count from ``since`` [s]."""
+    delays = found["delays"]
+    when = (
+        f" ({1e3 * median(delays):.0f} ms after the onset in the median, at most "
+        f"{1e3 * max(delays):.0f} ms)"
+        if delays
+        else ""
+    )
+    text = f"labels: {found['contacts']} contacts, {found['found']} found{when}"
+    if found["still_up"]:
+        text += f", {found['still_up']} while an alarm was still up"
+    missed = [f"{onset - since:.2f}" for onset in found["missed"]]
+    text += f", {len(missed)} missed"
+    if missed:
+        text += f" (at {', '.join(missed[:8])}{', ...' if len(missed) > 8 else ''} s)"
+    count = found["false_alarms"]
+    return (
+        f"{text}; {count} alarm{'' if count == 1 else 's'} outside of them in "
+        f"{found['free_seconds']:.1f} s"
+    )
