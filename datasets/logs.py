@@ -35,7 +35,7 @@ class Log:
     trace: Trace
     notes: tuple[str, ...]  #: one line for each repair, empty if there was none
     touched: tuple[tuple[float, float], ...] | None = None
-    """First and last time [s] of each contact that a column labels; None: there is no such column"""
+    """First and last time [s] of each contact that a column labels; None: no such column"""
 
 
 def read_log(
