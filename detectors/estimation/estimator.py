@@ -149,10 +149,10 @@ class Estimate:
     unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
     motion: Array
     """What the noise grows with, shape (T, 4, n). 0 without unknowns, with the mass matrix M of arm
-    and tracked payload: the torque of accelerations, sum_k |M_jk qdd_k| (velocities differentiated
-    at 30/s) [N m]; the norm of row j of M [kg m^2]; the largest change of the joint's friction of
-    late (forgotten with 0.3 s) [N m]. In a slow log (``sampled``) half the change of the
-    joint's torque since the last sample [N m], else 0."""
+    and tracked payload: the torque of accelerations, ``sum_k |M_jk qdd_k|`` (of velocities
+    differentiated at 30/s) [N m]; the norm of row j of M [kg m^2]; the largest change of the
+    joint's friction of late (forgotten with 0.3 s) [N m]. In a slow log (``sampled``) half the
+    change of the joint's torque since the last sample [N m], else 0."""
     plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
