@@ -127,6 +127,7 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
         "sig_pose": POSE,
         "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
         "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+        "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
         "runge_kutta": int(mujoco.mjtIntegrator.mjINT_RK4),
         "override": int(mujoco.mjtEnableBit.mjENBL_OVERRIDE),
         "refused": sum(int(bit) for bit in REFUSED.values()),

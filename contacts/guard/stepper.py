@@ -198,8 +198,9 @@ class GuardedStepper:
         Raises:
             ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
                 ``speculative`` or ``sleep`` (their state or distances cannot be taken back); the
-                integrator RK4; a contact filter (``mjcb_contactfilter``); a mocap pose that is not
-                finite; a shape that is none. Nothing was stepped.
+                integrator RK4; an unknown friction cone; a contact filter
+                (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none.
+                Nothing was stepped.
             mujoco.FatalError: an error of MuJoCo's; the state is that of before.
             RuntimeError: called within a step of this guard: by another thread, or in a callback.
         """
@@ -313,6 +314,8 @@ def _refuse(model: Any, data: Any) -> None:
             raise ValueError(f"option flag {name}: a guarded step cannot take it back; disable it")
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ValueError("integrator RK4: expected Euler, implicit, implicitfast or discrete")
+    if model.opt.cone not in [int(cone) for cone in mujoco.mjtCone.__members__.values()]:
+        raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
         raise ValueError("mjcb_contactfilter: a guard cannot know the pairs it leaves; remove it")
     for name in ("mocap_pos", "mocap_quat"):

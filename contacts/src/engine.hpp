@@ -76,7 +76,7 @@ struct Engine {
   const double *other_xpos, *other_xmat, *other_flexvert;
 
   // Values of MuJoCo's enumerations; flags that are refused.
-  int discrete, runge_kutta, pyramidal, refsafe, newton, equality, override_flag, refused;
+  int discrete, runge_kutta, pyramidal, elliptic, refsafe, newton, equality, override_flag, refused;
   void* const* contact_filter;      // MuJoCo's global callback
   std::size_t at_stack, at_frames;  // mjData's pointers into its stack
 

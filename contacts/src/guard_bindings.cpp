@@ -78,7 +78,8 @@ void set_model(const Addresses& a, Engine* e) {
   a.set("ntendon", &e->ntendon), a.set("interpolated", &e->interpolated);
   a.set("state_size", &e->state_size), a.set("sig_integration", &e->signature.integration);
   a.set("sig_pose", &e->signature.pose), a.set("discrete", &e->discrete);
-  a.set("pyramidal", &e->pyramidal), a.set("refsafe", &e->refsafe);
+  a.set("pyramidal", &e->pyramidal), a.set("elliptic", &e->elliptic);
+  a.set("refsafe", &e->refsafe);
   a.set("newton", &e->newton), a.set("equality", &e->equality);
 }
 

@@ -103,8 +103,9 @@ void Stepper::follow(Verdict verdict, std::vector<Partners> pairs, std::vector<i
 bool Stepper::acceptable() const {
   const double h = *e_.timestep;
   return h > 0 && h <= std::numeric_limits<double>::max() && !(*e_.enableflags & e_.refused) &&
-         *e_.integrator != e_.runge_kutta && !(e_.contact_filter && *e_.contact_filter) &&
-         mocap_.finite();
+         *e_.integrator != e_.runge_kutta &&
+         (*e_.cone == e_.pyramidal || *e_.cone == e_.elliptic) &&
+         !(e_.contact_filter && *e_.contact_filter) && mocap_.finite();
 }
 
 void Stepper::abandon() {

@@ -111,6 +111,7 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.other_mocap_pos = other->mocap_pos, e.other_mocap_quat = other->mocap_quat;
   e.other_flexvert = other->flexvert_xpos;
   e.discrete = mjINT_DISCRETE, e.pyramidal = mjCONE_PYRAMIDAL;
+  e.elliptic = mjCONE_ELLIPTIC;
   e.refsafe = mjDSBL_REFSAFE, e.newton = mjSOL_NEWTON, e.equality = mjCNSTR_EQUALITY;
   return e;
 }

@@ -59,6 +59,7 @@ PADDLE = '<body mocap="true" pos="0 0 3"><geom size=".1"/></body>'
     ("edit", "message"),
     [
         (option("integrator", mujoco.mjtIntegrator.mjINT_RK4), "integrator RK4"),
+        (option("cone", 5), "cone 5"),  # of which MuJoCo's own step crashes at a contact
         (option("enableflags", mujoco.mjtEnableBit.mjENBL_IPC), "option flag ipc"),
         (option("enableflags", mujoco.mjtEnableBit.mjENBL_SPECULATIVE), "option flag speculative"),
         (option("enableflags", mujoco.mjtEnableBit.mjENBL_SLEEP), "option flag sleep"),
@@ -79,7 +80,7 @@ def test_what_cannot_be_followed_is_refused_by_name_until_it_is_taken_back(edit,
     guard.step()
     kept = [getattr(model, name).copy() for name in ("geom_pos", "geom_size", "geom_quat")]
     poses = data.mocap_pos.copy(), data.mocap_quat.copy()
-    flags, integrator = model.opt.enableflags, model.opt.integrator
+    flags, integrator, cone = model.opt.enableflags, model.opt.integrator, model.opt.cone
     edit(model, data)
     before = bits(model, data)
     for _ in range(2):
@@ -89,6 +90,7 @@ def test_what_cannot_be_followed_is_refused_by_name_until_it_is_taken_back(edit,
     with pytest.raises(ValueError, match=re.escape(message)):
         GuardedStepper(model, data)
     model.opt.timestep, model.opt.enableflags, model.opt.integrator = 2e-3, flags, integrator
+    model.opt.cone = cone
     for name, value in zip(("geom_pos", "geom_size", "geom_quat"), kept, strict=True):
         getattr(model, name)[:] = value
     data.mocap_pos[:], data.mocap_quat[:] = poses
