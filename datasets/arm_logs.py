@@ -72,7 +72,8 @@ def read_one(
     if torque:
         notes = tuple(n.replace("taken as current [A]", "joint torque [N m]") for n in notes)
         trace = dataclasses.replace(trace, meta={**trace.meta, "effort": "torque"})
-    return Log(trace, tuple(f"{log.name}: {note}" for note in notes), read.touched)
+    notes = tuple(f"{log.name}: {note}" for note in notes)
+    return dataclasses.replace(read, trace=trace, notes=notes)
 
 
 def reduced(log: Log, hz: float) -> Log:
@@ -90,7 +91,7 @@ def reduced(log: Log, hz: float) -> Log:
         f"{1 / own:.3g} Hz reduced to {hz:g} Hz by means: alarms come {500 / hz - 500 * own:.3g} "
         f"ms later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
     )
-    return Log(trace, (*log.notes, note), log.touched)
+    return dataclasses.replace(log, trace=trace, notes=(*log.notes, note))
 
 
 def read_logs(

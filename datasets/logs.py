@@ -168,18 +168,21 @@ def read_csv(
     names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
-    touched = labelled(header, dict(rows), kept, trace.t)
+    touched = labelled(header, rows, kept, trace.t)
     return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")), touched)
 
 
 def labelled(
-    header: Sequence[str], cells: dict[int, list[str]], lines: NDArray[np.int64], t: Array
+    header: Sequence[str],
+    rows: Sequence[tuple[int, list[str]]],
+    lines: NDArray[np.int64],
+    t: Array,
 ) -> tuple[tuple[float, float], ...] | None:
     """When a column of labels says that something touches the arm.
 
     Args:
         header: names of the columns.
-        cells: rows of the file by their line.
+        rows: lines of the file, each with its cells.
         lines: line of each sample, shape (T,).
         t: its time [s], shape (T,).
 
@@ -188,6 +191,7 @@ def labelled(
         where it holds something else than 0 and 1, or false and true.
     """
     columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
+    cells = dict(rows) if columns else {}
     for column in columns:
         marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
         if None in marks:

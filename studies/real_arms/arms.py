@@ -128,26 +128,29 @@ def touched(arm: ArmData) -> dict[str, Touched]:
     """Logs with pushes by name."""
     found = {}
     for path in sorted((folder() / arm.contact).glob("*.csv")) if arm.contact else ():
-        trace = read_log(path, arm.columns or "ur5").trace
+        log = read_log(path, arm.columns or "ur5")
         table = np.genfromtxt(path, delimiter=",", names=True)
-        if "label" in (table.dtype.names or ()):
-            found[path.stem] = _labelled(Recording(trace), table)
+        if log.touched:
+            found[path.stem] = _labelled(Recording(log.trace), log.touched, table)
         elif known := _by_sensor(table) or by_eye(path.stem):
-            found[path.stem] = Touched(Recording(trace), known)
+            found[path.stem] = Touched(Recording(log.trace), known)
     return found
 
 
-def _labelled(recording: Recording, table: np.ndarray) -> Touched:
+def _labelled(
+    recording: Recording, spans: tuple[tuple[float, float], ...], table: np.ndarray
+) -> Touched:
     """Touches by the switch on the hand, and Franka's estimate at the trace's times."""
     t = recording.trace.t
-    on = np.interp(t, table["time"], table["label"]) > 0.5
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    last = len(t) - 1
-    spans = zip(edges[::2], np.minimum(edges[1::2], last), strict=True)
-    pushes = tuple(Push(float(t[a] - t[0]), float(t[b] - t[0]), False, True) for a, b in spans)
+    starts = np.searchsorted(t, [start for start, _ in spans])
+    ends = np.minimum(np.searchsorted(t, [end for _, end in spans], side="right"), len(t) - 1)
+    pushes = tuple(
+        Push(float(t[a] - t[0]), float(t[b] - t[0]), False, True)
+        for a, b in zip(starts, ends, strict=True)
+    )
     names = [f"tau_ext{k}" for k in range(7)]
     own = np.column_stack([np.interp(t, table["time"], table[name]) for name in names])
-    return Touched(recording, pushes, max(int(edges[0]) - 20, 0), own)
+    return Touched(recording, pushes, max(int(starts[0]) - 20, 0), own)
 
 
 def _by_sensor(table: np.ndarray) -> tuple[Push, ...]:

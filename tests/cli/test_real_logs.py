@@ -46,6 +46,16 @@ def fails(capsys, *arguments):
     return capsys.readouterr().err
 
 
+def refused_until_accepted(capsys, asked, model):
+    """Alarms in a detector's own logs: no file without --accept alarms. Returns the refusal."""
+    line = fails(capsys, *asked)
+    assert not model.exists()
+    main([*asked, "--accept", "alarms"])
+    assert "note: accepted as --accept alarms says" in capsys.readouterr().out
+    assert model.exists()
+    return line
+
+
 @pytest.fixture(scope="module")
 def calibrated(folder):
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
@@ -189,12 +199,9 @@ def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
         logs.append(written(tmp_path, f"pushed{seed}.csv", trace))
     model = tmp_path / "model.skops"
     asked = ["train", "--free", *logs, *flags(folder, calibrated.name), "--model", str(model)]
-    line = fails(capsys, *asked)
+    line = refused_until_accepted(capsys, asked, model)
     assert "an hour where 10 are accepted" in line
     assert "say --accept alarms" in line
-    assert not model.exists()
-    main([*asked, "--accept", "alarms"])
-    assert "note: accepted as --accept alarms says" in capsys.readouterr().out
     model.unlink()
     main([*asked, "--false-alarms-per-hour", "1000"])
     assert model.exists()
@@ -414,10 +421,6 @@ def test_a_standing_log_that_is_touched_all_along_is_refused(folder, tmp_path, c
         trace = add_contact(trace, GAIN, Added(start, 0.5, (2.0, -2.0, 1.0), "push"))
     log, model = written(tmp_path, "touched.csv", trace), tmp_path / "m.skops"
     train = ["train", "--free", log, *flags(folder), "--gains", *GAINS, "--model", str(model)]
-    line = fails(capsys, *train)
+    line = refused_until_accepted(capsys, train, model)
     assert "touched.csv: 28 alarms at 2." in line
     assert "something touched the arm" in line
-    assert not model.exists()
-    main([*train, "--accept", "alarms"])
-    assert "accepted as --accept alarms says" in capsys.readouterr().out
-    assert model.exists()

@@ -1,10 +1,10 @@
 """The cost of a step: impulse beyond the limits, of what the arm does itself, at any rate."""
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 import pytest
 
+from oracles.contact_forces import contact_forces
 from tauguard.models import BodyProxy, SceneObject, Shape
 
 REACH = "tauguard:tauguard/Reach-v0"
@@ -30,12 +30,7 @@ def sinking(rate):
 
 def force_on_block(env):
     """By MuJoCo's own contacts [N]."""
-    model, data, total = env.model, env.data, np.zeros(3)
-    for k in range(data.ncon):
-        force = np.zeros(6)
-        mujoco.mj_contactForce(model, data, k, force)
-        total += data.contact[k].frame.reshape(3, 3).T @ force[:3]
-    return float(np.linalg.norm(total))
+    return float(np.linalg.norm(sum(force for _, force in contact_forces(env.model, env.data))))
 
 
 def press(rate, seconds=1.4):

@@ -14,6 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import tauguard
+from oracles.contact_forces import contact_torques
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.reach import ReachEnv
 from tauguard.envs.gym.settings import CONTROLS
@@ -226,18 +227,7 @@ def struck():
     for _ in range(1500):
         env.step(np.zeros(6))
         infos.append(env._info(env._metrics(), {}, False, ""))
-        # The engine's own account of the same step: J^T of every contact.
-        tau = np.zeros(model.nv)
-        for c in range(data.ncon):
-            local = np.zeros(6)
-            mujoco.mj_contactForce(model, data, c, local)
-            frame = data.contact[c].frame.reshape(3, 3)
-            for side, sign in ((0, -1), (1, 1)):  # the force acts on the second geom
-                body = int(model.geom_bodyid[data.contact[c].geom[side]])
-                jac = np.zeros((3, model.nv))
-                mujoco.mj_jac(model, data, jac, None, data.contact[c].pos, body)
-                tau += sign * jac.T @ (frame.T @ local[:3])
-        forces.append(tau[env.compiled.scene.dof_adr])
+        forces.append(contact_torques(model, data)[env.compiled.scene.dof_adr])
     return env, infos, np.array(forces)
 
 

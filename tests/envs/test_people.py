@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
 
+from oracles.contact_forces import contact_forces
 from oracles.reaction_swings import planned
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.people import draw_script
@@ -167,13 +168,10 @@ def test_forces_on_a_person_are_the_engines():
         way = env.batch.observation[0, 21:24]
         _, _, _, _, info = env.step(np.append(np.clip(way / 0.02, -1, 1), np.zeros(3)))
         total = {}
-        for c in range(data.ncon):
-            local = np.zeros(6)
-            mujoco.mj_contactForce(model, data, c, local)
-            frame = data.contact[c].frame.reshape(3, 3)
-            for side, sign in ((0, -1), (1, 1)):
-                body = int(model.geom_bodyid[data.contact[c].geom[side]])
-                total[body] = total.get(body, 0) + sign * frame.T @ local[:3]
+        for contact, on_second in contact_forces(model, data):
+            for geom, sign in zip(contact.geom, (-1, 1), strict=True):
+                body = int(model.geom_bodyid[geom])
+                total[body] = total.get(body, 0) + sign * on_second
         for k, region in enumerate(env.regions):
             force = total.get(region.body, np.zeros(3))
             ours = info["region_force"][k] * info["region_direction"][k]

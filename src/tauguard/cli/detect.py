@@ -305,15 +305,12 @@ def report(result: dict[str, Any]) -> None:
     if result["fault_seconds"]:
         print(f"faults hide collisions in {result['fault_seconds']:.2f} s of this log")
     count, seconds = result["alarms"], result["watched_seconds"]
+    text = f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched"
     if labels := result.get("labels"):
-        print(f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched")
-        print(labels_text(labels, since))
+        print(f"{text}\n{labels_text(labels, since)}")
         return
-    print(
-        f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; where "
-        "nothing touched the arm, each is a false one"
-        + rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
-    )
+    most = rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
+    print(f"{text}; where nothing touched the arm, each is a false one{most}")
 
 
 def leave(
