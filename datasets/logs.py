@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
+from tauguard.datasets.labels import labelled
 from tauguard.datasets.log_checks import checked
 from tauguard.datasets.recognition import described, recognised
 from tauguard.traces.trace import Trace
@@ -20,9 +21,6 @@ from tauguard.untrusted_input import reading
 
 #: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
-#: Columns, in any case, that say whether something touches the arm, if each cell is a LABEL.
-LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
-LABEL = {"0": False, "false": False, "1": True, "true": True}
 #: Rows that repeat the state are left out where they are this share, or more: a recorder that is
 #: faster than its robot. Below it, a standing arm repeats its numbers by chance.
 REPEATED = 0.2
@@ -170,35 +168,6 @@ def read_csv(
     kept = lines[keep]
     touched = labelled(header, rows, kept, trace.t)
     return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")), touched)
-
-
-def labelled(
-    header: Sequence[str],
-    rows: Sequence[tuple[int, list[str]]],
-    lines: NDArray[np.int64],
-    t: Array,
-) -> tuple[tuple[float, float], ...] | None:
-    """When a column of labels says that something touches the arm.
-
-    Args:
-        header: names of the columns.
-        rows: lines of the file, each with its cells.
-        lines: line of each sample, shape (T,).
-        t: its time [s], shape (T,).
-
-    Returns:
-        Times of the first and last sample of each contact; None without a column in LABELS, or
-        where it holds something else than 0 and 1, or false and true.
-    """
-    columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
-    cells = dict(rows) if columns else {}
-    for column in columns:
-        marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
-        if None in marks:
-            continue
-        edges = np.flatnonzero(np.diff(np.array([False, *marks, False], dtype=int)))
-        return tuple((float(t[a]), float(t[b - 1])) for a, b in edges.reshape(-1, 2))
-    return None
 
 
 def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:

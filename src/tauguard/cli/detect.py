@@ -13,6 +13,7 @@ from tauguard.datasets.columns import AS_IS, Reading
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tauguard.datasets.logs import Log
     from tauguard.detectors import CollisionAlarm, Diagnosis
     from tauguard.detectors.alarms.log_detection import LogDetection
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
@@ -95,13 +96,7 @@ def command(
         trace, alarm = trained(model, trace, payload, robot)
     else:
         seconds = QUIET if quiet is None else quiet
-        early = [a for a, _ in read.touched or () if a < trace.t[0] + seconds]
-        if early:
-            raise ValueError(
-                f"{log}: a column labels a contact {early[0] - trace.t[0]:.2f} s after the "
-                f"beginning, within the first {seconds:g} s (--quiet) that are learned from; give "
-                "a shorter --quiet, or a --model"
-            )
+        refuse_touched(log, read, seconds)
         trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
     found = detect_in_log(alarm, trace)
     causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
@@ -115,6 +110,18 @@ def command(
         write_json(json, result)
     if out is not None:
         leave(out, trace, found, result, robot)
+
+
+def refuse_touched(log: Path, read: Log, quiet: float) -> None:
+    """Refuse a log whose labels say that something touches the arm in its first seconds."""
+    begin = read.trace.t[0]
+    early = [start - begin for start, _ in read.touched or () if start < begin + quiet]
+    if early:
+        raise ValueError(
+            f"{log}: a column labels a contact {early[0]:.2f} s after the beginning, within the "
+            f"first {quiet:g} s (--quiet) that are learned from; give a shorter --quiet, or a "
+            "--model"
+        )
 
 
 def trained(

@@ -1,0 +1,41 @@
+"""Columns of a log that label contacts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+
+#: Columns, in any case, that say whether something touches the arm, if each cell is a LABEL.
+LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
+LABEL = {"0": False, "false": False, "1": True, "true": True}
+
+
+def labelled(
+    header: Sequence[str],
+    rows: Sequence[tuple[int, list[str]]],
+    lines: NDArray[np.int64],
+    t: Array,
+) -> tuple[tuple[float, float], ...] | None:
+    """When a column of labels says that something touches the arm.
+
+    Args:
+        header: names of the columns.
+        rows: lines of the file, each with its cells.
+        lines: line of each sample, shape (T,).
+        t: its time [s], shape (T,).
+
+    Returns:
+        Times of the first and last sample of each contact; None without a column in LABELS, or
+        where it holds something else than 0 and 1, or false and true.
+    """
+    columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
+    cells = dict(rows) if columns else {}
+    for column in columns:
+        marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
+        if None in marks:
+            continue
+        edges = np.flatnonzero(np.diff(np.array([False, *marks, False], dtype=int)))
+        return tuple((float(t[a]), float(t[b - 1])) for a, b in edges.reshape(-1, 2))
+    return None
