@@ -19,6 +19,7 @@ from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score
 from tauguard.contacts.rigid_checker import RigidChecker
+from tauguard.contacts.scenes import ContactScene
 
 register("mujoco", MujocoChecker)
 register("cloth", ClothChecker)
@@ -28,6 +29,7 @@ __all__ = [
     "KINDS",
     "Checker",
     "ClothChecker",
+    "ContactScene",
     "Contacts",
     "Cut",
     "Disagreement",

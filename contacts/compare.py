@@ -24,6 +24,9 @@ from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
 from tauguard.contacts.scoring import judge, score
 
+#: By how much the length of a checker's normal may differ from 1.
+UNIT = 1e-6
+
 
 def compare(
     scene: ContactScene | mujoco.MjModel | str,
@@ -55,9 +58,9 @@ def compare(
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the ground truth
-            cannot handle, a checker's contact that is not of the model or the step, options of a
-            checker that is not asked for, a timestep or duration that is not above 0, a ``fine``
-            below 1.
+            cannot handle, a checker's contact that is not of the model or the step, whose distance
+            is not finite or whose normal is no unit vector, options of a checker that is not asked
+            for, a timestep or duration that is not above 0, a ``fine`` below 1.
     """
     scene = _scene(scene)
     duration = scene.seconds if seconds is None else seconds
@@ -154,7 +157,8 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
     """Check that a report fits this model and this step, and return it.
 
     Raises:
-        ValueError: a geom or flex that is none, or a time outside the step.
+        ValueError: a geom or flex that does not exist, a time outside the step, a distance that is
+            not finite, or a normal that is neither NaN nor of length 1.
     """
     limits = (("geom", found.geom, -1, model.ngeom - 1), ("flex", found.flex, -1, model.nflex - 1))
     for field, value, low, high in (*limits, ("time", found.time, 0, 1)):
@@ -162,6 +166,16 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
         if not good.all():
             said = value[~good][0]
             raise ValueError(f"checker {name!r}: {field} {said}, expected {low} to {high}")
+    if not np.isfinite(found.distance).all():
+        said = found.distance[~np.isfinite(found.distance)][0]
+        raise ValueError(f"checker {name!r}: distance {said}, expected a finite number [m]")
+    length = np.linalg.norm(found.normal, axis=1)
+    bad = ~(np.abs(length - 1) <= UNIT) & ~np.isnan(found.normal).all(axis=1)
+    if bad.any():
+        raise ValueError(
+            f"checker {name!r}: normal {found.normal[bad][0].tolist()}, expected length 1, or NaN "
+            "in all entries where it is not known"
+        )
     if ((found.geom < 0) == (found.flex < 0)).any():
         raise ValueError(f"checker {name!r}: each partner is a geom or a flex, the other is -1")
     return found

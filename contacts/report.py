@@ -1,5 +1,7 @@
 """The result of a comparison: a score for every checker, events and disagreements."""
 
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -54,10 +56,12 @@ class Score:
         lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
+        normals: How many normals were compared.
+        opposite: How many of these are more than 90 degrees from MuJoCo's.
         us_per_step: Processor time of a call, median [us].
         us_low: 10 % quantile.
         us_high: 90 % quantile.
-        share: Of the processor time of ``mj_step``.
+        over_mj_step: Processor time of a call over that of ``mj_step``.
         not_covered: Contacts that it reported of pairs it does not cover; they are not counted.
         disagreements: By time.
     """
@@ -75,10 +79,12 @@ class Score:
     lead_ms: float | None = None
     depth_mm: float | None = None
     normal_deg: float | None = None
+    normals: int = 0
+    opposite: int = 0
     us_per_step: float = 0.0
     us_low: float = 0.0
     us_high: float = 0.0
-    share: float = 0.0
+    over_mj_step: float = 0.0
     not_covered: int = 0
     disagreements: tuple[Disagreement, ...] = ()
 
@@ -101,7 +107,7 @@ class Report:
     true. recall: fraction of the true contacts that it reported within a step. events: contacts of
     the pairs that it covers. delay_ms: from the touch to its first report; lead_ms: how much
     earlier than MuJoCo. depth_mm, normal_deg: difference from MuJoCo's. us_per_step: of one check;
-    share: the same over ``mj_step``'s.
+    over_mj_step: the same over ``mj_step``'s.
 
     Attributes:
         scene: Its name.
@@ -161,7 +167,7 @@ class Report:
 
     def __str__(self) -> str:
         shown = ["checker", "precision", "recall", "events", "delay_ms", "lead_ms", "depth_mm"]
-        shown += ["normal_deg", "us_per_step", "share"]
+        shown += ["normal_deg", "us_per_step", "over_mj_step"]
         table = [shown] + [[_cell(row[name]) for name in shown] for row in self.rows()]
         widths = [max(len(line[i]) for line in table) for i in range(len(shown))]
         lines = [
@@ -181,10 +187,25 @@ class Report:
             for one in self.scores
             if one.not_covered
         ]
-        lines += [f"{one.time:8.4f} s  {one}" for one in self.disagreements[:20]]
-        if len(self.disagreements) > 20:
-            lines.append(f"... and {len(self.disagreements) - 20} more disagreements")
-        return "\n".join(lines)
+        lines += [
+            f"{one.checker}: {one.opposite} of {one.normals} normals are opposite to MuJoCo's; a "
+            "normal points from the first partner to the second"
+            for one in self.scores
+            if one.opposite
+        ]
+        return "\n".join(lines + _by_partners(self.disagreements))
+
+
+def _by_partners(disagreements: Sequence[Disagreement]) -> list[str]:
+    """A line for each checker, kind and pair: the first time, and how often it occurs again."""
+    found: dict[tuple[Any, ...], list[Disagreement]] = defaultdict(list)
+    for one in disagreements:
+        found[one.checker, one.kind, one.partners].append(one)
+    return [
+        f"{same[0].time:8.4f} s  {same[0]}"
+        + (f", and {len(same) - 1} more" if len(same) > 1 else "")
+        for same in found.values()
+    ]
 
 
 def pair_names(model: Any, pair: Pair) -> tuple[str, str]:

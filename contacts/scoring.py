@@ -55,19 +55,22 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
             for e, ok in zip(truth, seen, strict=True)
             if not ok
         ] + [Disagreement(name, "false", t, pair_names(model, p), d) for t, p, d in false]
-    depth, angle = _differences(mine, run.contacts["mujoco"])
+    theirs = run.contacts["mujoco"]
+    depth, angle = _differences(mine, theirs) if given is not theirs else ([], [])
     low, middle, high = 1e6 * np.quantile(run.seconds[name], [0.1, 0.5, 0.9])
     return Score(
         checker=name,
         **counted,
         first=min((times[0] for times in reports.values()), default=None),
-        lead_ms=_lead(reports, _reports(model, run.times, run.contacts["mujoco"])),
-        depth_mm=depth,
-        normal_deg=angle,
+        lead_ms=_lead(reports, _reports(model, run.times, theirs)),
+        depth_mm=1e3 * float(np.median(depth)) if depth else None,
+        normal_deg=float(np.degrees(np.median(angle))) if angle else None,
+        normals=len(angle),
+        opposite=sum(one > np.pi / 2 for one in angle),
         us_per_step=float(middle),
         us_low=float(low),
         us_high=float(high),
-        share=float(np.median(run.seconds[name]) / np.median(run.step_seconds)),
+        over_mj_step=float(np.median(run.seconds[name]) / np.median(run.step_seconds)),
         not_covered=sum(map(len, given)) - sum(map(len, mine)),
         disagreements=tuple(sorted(wrong, key=lambda d: d.time)),
     )
@@ -205,32 +208,35 @@ def _lead(mine: dict[Pair, list[float]], theirs: dict[Pair, list[float]]) -> flo
 
 def _differences(
     mine: Sequence[Contacts], theirs: Sequence[Contacts]
-) -> tuple[float | None, float | None]:
-    """Medians of the depth's [mm] and the normal's [deg] difference from MuJoCo.
+) -> tuple[list[float], list[float]]:
+    """Differences of depth [m] from MuJoCo, and angles between both normals [rad].
 
-    At the same state: rows that touch from the start of a step beside the rows that MuJoCo listed
-    at the end of the step before; of each pair (and element) the deepest.
+    At the same state, of each pair (and element) the deepest row that MuJoCo listed at the end of a
+    step: beside it the rows at the end of that step, and those at the start of the next one.
     """
     depth, angle = [], []
-    steps = zip(mine[1:], theirs[:-1], strict=True) if mine is not theirs else []
-    for here, there in steps:
-        ours = _deepest(here.where((here.time == 0) & (here.distance < 0)))
+    for k, there in enumerate(theirs):
+        late = mine[k].where(mine[k].time == 1)
+        early = [one.where(one.time == 0) for one in mine[k + 1 : k + 2]]
+        both = Contacts.concatenate([late, *early])
+        ours = _deepest(both.where(both.distance < 0))
         for key, (distance, normal) in _deepest(there.where(there.distance < 0)).items():
             if key in ours:
                 depth.append(abs(distance - ours[key][0]))
-                angle.append(np.arccos(np.clip(abs(normal @ ours[key][1]), -1, 1)))
-    if not depth:
-        return None, None
-    return 1e3 * float(np.median(depth)), float(np.degrees(np.nanmedian(angle)))
+                angle.append(float(np.arccos(np.clip(normal @ ours[key][1], -1, 1))))
+    return depth, [one for one in angle if not np.isnan(one)]
 
 
-def _deepest(contacts: Contacts) -> dict[tuple[int, ...], tuple[float, NDArray[np.float64]]]:
-    out: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
+def _deepest(contacts: Contacts) -> dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]]:
+    """Distance and normal of the deepest row of each two partners, the lower number first."""
+    out: dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]] = {}
+    element = np.where(contacts.flex >= 0, contacts.feature, -1)
+    partners = np.stack([contacts.geom, contacts.flex, element], axis=2).tolist()
     for k in np.argsort(-contacts.distance):
-        key = (*contacts.geom[k].tolist(), *contacts.flex[k].tolist())
-        if (contacts.flex[k] >= 0).any():
-            key = (*key, *contacts.feature[k].tolist())
-        out[key] = (float(contacts.distance[k]), contacts.normal[k])
+        first, second = map(tuple, partners[k])
+        sign = 1 if first <= second else -1
+        key = (first, second)[::sign]
+        out[key] = (float(contacts.distance[k]), sign * contacts.normal[k])
     return out
 
 

@@ -38,6 +38,7 @@ def test_one_bounce_is_one_event_seen_at_its_time():
     assert rigid.depth_mm == pytest.approx(0, abs=1e-9)
     assert rigid.normal_deg == pytest.approx(0, abs=1e-6)
     assert report["mujoco"].lead_ms == 0
+    assert report["mujoco"].depth_mm is report["mujoco"].normal_deg is None
     assert report["cloth"].events == 0
     assert report["cloth"].recall is None
     assert not report.disagreements
@@ -79,7 +80,7 @@ def test_a_blind_and_a_jumpy_checker_are_told_apart():
     assert sum(d.kind == "false" for d in jumpy.disagreements) == 250 - jumpy.correct
     text = str(report)
     assert "blind missed: body wall and body ball" in text
-    assert "more disagreements" in text
+    assert text.count("jumpy false: body wall and body ball, 10 mm, and ") == 1
     assert {row["checker"] for row in report.rows()} == {"blind", "jumpy"}
 
 
@@ -106,6 +107,9 @@ def test_pairs_that_a_checker_does_not_cover_are_not_counted():
         ({"flex": [[-1, 0]]}, "flex 0, expected -1 to -1"),
         ({"time": [1.5]}, "time 1.5, expected 0 to 1"),
         ({"time": [np.nan]}, "time nan"),
+        ({"distance": [np.nan]}, "distance nan, expected a finite number"),
+        ({"normal": [[0, 0, 2]]}, r"normal \[0.0, 0.0, 2.0\], expected length 1, or NaN"),
+        ({"normal": [[0, 0, np.nan]]}, r"normal \[0.0, 0.0, nan\], expected length 1, or NaN"),
         ({"geom": [[0, -1]]}, "each partner is a geom or a flex"),
     ],
 )
@@ -119,6 +123,30 @@ def test_a_contact_of_another_model_or_step_is_refused(change, said):
     register("wrong", Wrong, replace=True)
     with pytest.raises(ValueError, match=f"checker 'wrong': {said}"):
         compare(bounce(2.0), ["wrong"], seconds=0.01)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(("known", "angle"), [(1.0, 0.0), (-1.0, 180.0), (np.nan, None)])
+def test_depth_and_normal_of_a_checker_that_looks_at_the_end_of_a_step(order, known, angle):
+    class Late(Blind):
+        """Closed form: the wall's face is at x = 1, the ball's radius is .1."""
+
+        def check(self, before, after):
+            distance = 1 - after.geom_xpos[1, 0] - 0.1
+            if distance > 0:
+                return Contacts.empty()
+            normal = [-order * known, *((np.nan, np.nan) if np.isnan(known) else (0, 0))]
+            pair, none = [[0, 1][::order]], [[-1, -1]]
+            return Contacts([1], pair, none, none, [[np.nan] * 3], [normal], [distance])
+
+    register("late", Late, replace=True)
+    late = compare(bounce(2.001), ["late"])["late"]
+    assert late.depth_mm == pytest.approx(0, abs=1e-9)
+    assert late.normal_deg == (None if angle is None else pytest.approx(angle, abs=1e-6))
+    assert late.opposite == (late.normals if angle else 0)
+    assert (late.normals > 1) == (angle is not None)
+    said = f"late: {late.opposite} of {late.normals} normals are opposite to MuJoCo's"
+    assert (said in str(compare(bounce(2.001), ["late"]))) == bool(angle)
 
 
 @pytest.mark.parametrize(
