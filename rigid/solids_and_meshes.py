@@ -71,10 +71,10 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Dist
 
     The sign is never wrong, even for degenerate bodies: it agrees with :func:`overlap`, and the
     distance is 0 exactly where the bodies touch. The error of the length is at most 3e-14 of the
-    pair's extent and distance. The method is Gilbert, Johnson and Keerthi's descent (1988) with
-    the expanding polytope (van den Bergen 2001) in floating point; a certificate checks each
-    answer. If the certificate fails, or the bodies are within 1e-10 of contact, both algorithms
-    run in exact arithmetic, which takes about a millisecond a pair.
+    pair's extent, which is the diagonal of the box around both. The method is Gilbert, Johnson and
+    Keerthi's descent (1988) with the expanding polytope (van den Bergen 2001) in floating point; a
+    certificate checks each answer. If the certificate fails, or the bodies are within 1e-10 of
+    contact, both algorithms run in exact arithmetic, which takes about a millisecond a pair.
 
     Args:
         a: N bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not its

@@ -71,7 +71,12 @@ OPTIONS = (
     *("timestep", "disableflags", "enableflags", "integrator", "cone", "solver", "iterations"),
     *("o_margin", "o_solref"),
 )
-_NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "nflex", "nflexvert", "ntendon")
+#: Options of physics; like a model's other numbers, they must be finite.
+PHYSICS = (
+    *("gravity", "wind", "magnetic", "density", "viscosity", "impratio", "tolerance"),
+    *("o_margin", "o_solref", "o_solimp", "o_friction"),
+)
+_NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "npair", "nflex", "nflexvert", "ntendon")
 #: mjLOG_ERROR of mjtLogLevel, which the Python binding does not show.
 _LOG_ERROR = 3
 _TYPES = {
@@ -113,7 +118,10 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
-    out |= {name: option + int(getattr(_layout("mjOption"), name).offset) for name in OPTIONS}
+    out |= {
+        name: option + int(getattr(_layout("mjOption"), name).offset)
+        for name in (*OPTIONS, *PHYSICS)
+    }
     _compare(model, data, out, base + int(fields.qpos.offset))
     return out | {
         "model": model._address,

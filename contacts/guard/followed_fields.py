@@ -1,12 +1,21 @@
-"""Fields of a model that a guard copies or derives from; it reads all others at each step."""
+"""Fields of a model that a guard compares between two steps, and the values that it refuses.
 
+It starts anew where a field has changed that it has copied from. Other numbers only have to be
+valid. Contact parameters that the guard writes itself are looked at by the native part.
+"""
+
+import functools
+import re
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
+from tauguard.contacts.guard.engine import PHYSICS
 
 #: Which pairs there are.
 _PAIRS = (
@@ -25,8 +34,15 @@ _MOTION = (
     *("flex_stiffness", "flexedge_length0", "jnt_type", "eq_type", "eq_objtype"),
     *("eq_obj1id", "eq_obj2id", "body_mocapid", "site_bodyid"),
 )
-#: Of these each row must be finite.
-_FINITE = ("geom_size", "geom_pos", "geom_quat", "body_ipos", "body_iquat", "flex_radius")
+#: Numbers of contacts' directions.
+_DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
+_CONDIM = (1, 3, 4, 6)
+#: Objects whose numbers must be valid, by the rules of followed_fields.hpp: limits may be infinite.
+_OBJECTS = re.compile("(body|jnt|dof|geom|pair|flex|eq|tendon|actuator)_")
+_FINITE, _NOT_NAN, _NOT_NEGATIVE = range(3)
+_LIMITS = re.compile("range|yield|_user")
+_MASSES = ("body_mass", "body_inertia", "flex_radius")
+_WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # by the guard itself
 #: MuJoCo normalizes quaternions when it compiles, and takes them for unit ones afterwards.
 _UNIT = 1e-6
 
@@ -41,7 +57,7 @@ def followed_fields(model: Any, options: Regions) -> Regions:
         options: of fields that are no arrays.
     """
     out = list(options)
-    for name in (*_PAIRS, *_SHAPES, *_MOTION):
+    for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS):
         array = getattr(model, name)
         if array.size:
             out.append((array.ctypes.data, array.nbytes))
@@ -65,27 +81,74 @@ def hull_rows(model: Any) -> NDArray[np.int64]:
     return np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
 
 
-def refuse_shapes(model: Any) -> None:
-    """Refuse shapes with which no guard can work.
+@functools.cache
+def _rules() -> dict[str, int]:
+    """The rule of each field of doubles of the objects."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    fields = {name: getattr(model, name) for name in dir(model) if _OBJECTS.match(name)}
+    rules = {}
+    for name, field in fields.items():
+        if isinstance(field, np.ndarray) and field.dtype == np.float64:
+            rules[name] = _NOT_NAN if _LIMITS.search(name) else _FINITE
+    return rules | dict.fromkeys(_MASSES, _NOT_NEGATIVE)
+
+
+def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
+    """Address, size in bytes and rule of the numbers that must be valid.
+
+    Args:
+        model: MjModel.
+        physics: of options, all of which must be finite.
+    """
+    out = [(*region, _FINITE) for region in physics]
+    for name, rule in _rules().items():
+        array = getattr(model, name)
+        if array.size and not _WRITTEN.match(name):
+            out.append((array.ctypes.data, array.nbytes, rule))
+    return out
+
+
+def refuse_values(model: Any) -> None:
+    """Refuse numbers and shapes with which MuJoCo or a guard cannot step.
 
     Raises:
-        ValueError: a number that is not finite, a negative size or a quaternion that is not of
-            unit length (field and row).
+        ValueError: a number that is not finite (limits may be infinite), a negative mass, moment of
+            inertia, radius or size, a quaternion that is not of unit length, an unknown type of
+            geom or number of contact dimensions (field, row and value).
     """
-    for name in _FINITE:
-        rows = getattr(model, name)
-        rows = rows[:, None] if rows.ndim == 1 else rows
-        for row in np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist():
-            raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, not finite")
+    for name, rule in _rules().items():
+        _refuse_rows(model, name, np.isnan if rule == _NOT_NAN else _infinite, "not finite")
+    for name in PHYSICS:
+        value = getattr(model.opt, name)
+        if not np.isfinite(value).all():
+            raise ValueError(f"opt.{name}: {np.array(value).tolist()}, not finite")
+    for name in _MASSES:
+        _refuse_rows(model, name, lambda rows: rows < 0, "negative")
+    for name in _DIMENSIONS:
+        _refuse_rows(model, name, lambda rows: ~np.isin(rows, _CONDIM), "not 1, 3, 4 or 6")
+    kinds = [int(kind) for kind in mujoco.mjtGeom.__members__.values()]
+    _refuse_rows(model, "geom_type", lambda rows: ~np.isin(rows, kinds), "no type of MuJoCo's")
     for name in ("geom_quat", "body_iquat"):
-        rows = getattr(model, name)
-        for row in np.flatnonzero(np.abs(np.linalg.norm(rows, axis=1) - 1) > _UNIT).tolist():
-            raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, not of unit length")
+        _refuse_rows(model, name, _not_unit, "not of unit length")
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    for row in np.flatnonzero((model.geom_size < 0).any(axis=1) & ~plane).tolist():
-        raise ValueError(f"geom_size: row {row} is {model.geom_size[row].tolist()}, negative")
-    for row in np.flatnonzero(model.flex_radius < 0).tolist():
-        raise ValueError(f"flex_radius: row {row} is {model.flex_radius[row]}, negative")
+    _refuse_rows(model, "geom_size", lambda rows: (rows < 0) & ~plane[:, None], "negative")
     hulls = hull_rows(model)
     for row in hulls[~np.isfinite(model.mesh_vert[hulls]).all(axis=1)].tolist():
         raise ValueError(f"mesh_vert: row {row} is {model.mesh_vert[row].tolist()}, not finite")
+
+
+def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str) -> None:
+    """The first row of a field with a wrong entry."""
+    rows = getattr(model, name)
+    found = np.argwhere(wrong(rows))
+    if len(found):
+        row = int(found[0, 0])
+        raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, {defect}")
+
+
+def _infinite(rows: Array) -> NDArray[np.bool_]:
+    return ~np.isfinite(rows)
+
+
+def _not_unit(rows: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(np.linalg.norm(rows, axis=1) - 1) > _UNIT)

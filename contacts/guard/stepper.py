@@ -15,8 +15,8 @@ from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
-from tauguard.contacts.guard.engine import INTEGRATION, REFUSED, addresses
-from tauguard.contacts.guard.followed_fields import followed_fields, refuse_shapes
+from tauguard.contacts.guard.engine import INTEGRATION, PHYSICS, REFUSED, addresses
+from tauguard.contacts.guard.followed_fields import followed_fields, numbers, refuse_values
 from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
@@ -92,7 +92,10 @@ class GuardedStepper:
         other = mujoco.MjData(model) if model.nmocap else end
         held = (model, self._data, end, other)
         found = addresses(*held)
-        self._options = [(found[name], 4) for name in ("disableflags",)]
+        self._flags = [(found["disableflags"], 4)]
+        self._physics = [
+            (found[name], np.array(getattr(model.opt, name)).nbytes) for name in PHYSICS
+        ]
         self._guard = Guard(found, settings, held)
         self._quiet: dict[int, StepReport] = {}  # by the number of contacts
         self._cover()
@@ -100,7 +103,6 @@ class GuardedStepper:
     def _cover(self) -> None:
         """Tell the native guard the pairs and shapes that the model has now."""
         model = self._model
-        refuse_shapes(model)
         self._guard.clear()
         covered = Covered(model, self._guard, self._rigid, self._cloth)
         self._pairs, self._uncovered = tuple(covered.pairs), tuple(covered.uncovered)
@@ -115,7 +117,8 @@ class GuardedStepper:
             self._tunnelling = TunnellingEvents(model, covered.sheets, first)
         self._meter: EnergyMeter | None = None
         self._guard.start(self._tunnelling is not None)
-        self._guard.follow(followed_fields(model, self._options))
+        self._guard.follow(followed_fields(model, self._flags))
+        self._guard.follow_numbers(numbers(model, self._physics))
 
     def _follow(self) -> None:
         """Go by what was changed since the last step, or refuse it."""
@@ -199,8 +202,9 @@ class GuardedStepper:
             ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
                 ``speculative`` or ``sleep`` (their state or distances cannot be taken back); the
                 integrator RK4; an unknown friction cone; a contact filter
-                (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none.
-                Nothing was stepped.
+                (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none;
+                a mass, contact parameter or other number of the model that is not finite, a
+                negative mass. Nothing was stepped.
             mujoco.FatalError: an error of MuJoCo's; the state is that of before.
             RuntimeError: called within a step of this guard: by another thread, or in a callback.
         """
@@ -318,6 +322,7 @@ def _refuse(model: Any, data: Any) -> None:
         raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
         raise ValueError("mjcb_contactfilter: a guard cannot know the pairs it leaves; remove it")
+    refuse_values(model)
     for name in ("mocap_pos", "mocap_quat"):
         rows = getattr(data, name)
         for row in np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist():

@@ -40,7 +40,7 @@ struct Engine {
   Call<const void*, const void*, double*, double*, int> jac_com;
   Call<const void*, double*, const double*, double> integrate;
 
-  int nq, nv, nbody, nmocap, ngeom, nflex, nflexvert, ntendon;
+  int nq, nv, nbody, nmocap, ngeom, npair, nflex, nflexvert, ntendon;
   Signatures signature;
   int state_size;
   bool interpolated;  // some flex has vertices without bodies of their own
@@ -95,6 +95,16 @@ struct Engine {
   // The number of rows of a contact that act along its normal, counted from its first row.
   int normal_rows(const Contact& c) const {
     return *cone == pyramidal && c.dim > 1 ? 2 * (c.dim - 1) : 1;
+  }
+  // Whether the contact parameters that a guard writes are finite.
+  bool parameters_finite() const {
+    const int count[3] = {npair, ngeom, nflex};
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < 2 * count[k]; ++i) sum += solref[k][i] - solref[k][i];
+      for (int i = 0; i < 5 * count[k]; ++i) sum += solimp[k][i] - solimp[k][i];
+    }
+    return sum == 0;
   }
   bool is_discrete() const { return *integrator == discrete; }
 };

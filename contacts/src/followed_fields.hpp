@@ -1,39 +1,83 @@
-// Detects changes of the model's fields that a guard has copied or derived something from.
+// Detects changes of the model's fields, and numbers in them that are not valid.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 namespace tauguard::contacts {
 
 class FollowedFields {
  public:
-  void clear() { fields_.clear(), copy_.clear(); }
-  // Follows `size` bytes from `from` on; their present values are the reference.
-  void add(const char* from, std::size_t size) {
-    if (!fields_.empty() && fields_.back().from + fields_.back().size == from)
-      fields_.back().size += size;
-    else
-      fields_.push_back({from, size});
-    copy_.insert(copy_.end(), from, from + size);
+  FollowedFields() = default;
+  // Addresses and sizes in bytes; their present values are the reference. Arrays that are
+  // neighbours in MuJoCo's buffer, where each begins at a multiple of 64 bytes, are compared as
+  // one.
+  explicit FollowedFields(std::vector<std::pair<std::uintptr_t, std::size_t>> regions) {
+    std::sort(regions.begin(), regions.end());
+    for (const auto& [at, size] : regions) {
+      const char* from = reinterpret_cast<const char*>(at);
+      if (!fields_.empty() && from - fields_.back().end < 64)
+        fields_.back().end = std::max(fields_.back().end, from + size);
+      else
+        fields_.push_back({from, from + size});
+    }
+    for (const Field& field : fields_) copy_.insert(copy_.end(), field.from, field.end);
   }
   bool changed() const {
     const char* before = copy_.data();
     for (const Field& field : fields_) {
-      if (std::memcmp(field.from, before, field.size) != 0) return true;
-      before += field.size;
+      const std::size_t size = field.end - field.from;
+      if (std::memcmp(field.from, before, size) != 0) return true;
+      before += size;
     }
     return false;
   }
 
  private:
   struct Field {
-    const char* from;
-    std::size_t size;
+    const char *from, *end;
   };
   std::vector<Field> fields_;
   std::vector<char> copy_;
+};
+
+// Numbers of the model that only have to be valid.
+class Numbers {
+ public:
+  enum Rule { finite, not_nan, not_negative };
+  using Region = std::tuple<std::uintptr_t, std::size_t, int>;  // address, bytes, rule
+  Numbers() = default;
+  explicit Numbers(std::vector<Region> regions) : regions_(std::move(regions)) { compare(); }
+
+  // Whether all are valid; they are looked at only where one has changed.
+  bool valid() {
+    if (!followed_.changed()) return true;
+    for (const auto& [at, size, rule] : regions_) {
+      const double* x = reinterpret_cast<const double*>(at);
+      for (std::size_t i = 0; i < size / sizeof *x; ++i)
+        if (!obeys(x[i], rule)) return false;
+    }
+    compare();
+    return true;
+  }
+
+ private:
+  static bool obeys(double x, int rule) {
+    if (rule == not_nan) return x == x;
+    return std::isfinite(x) && (rule == finite || x >= 0);
+  }
+  void compare() {
+    std::vector<std::pair<std::uintptr_t, std::size_t>> fields;
+    for (const auto& [at, size, rule] : regions_) fields.emplace_back(at, size);
+    followed_ = FollowedFields(std::move(fields));
+  }
+  std::vector<Region> regions_;
+  FollowedFields followed_;
 };
 
 }  // namespace tauguard::contacts

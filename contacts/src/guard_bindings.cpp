@@ -1,6 +1,7 @@
 // Binding of the guarded stepper: the pairs that it covers, and its steps.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
@@ -74,7 +75,8 @@ void set_model(const Addresses& a, Engine* e) {
   a.set("geom_bodyid", &e->geom_bodyid), a.set("body_rootid", &e->body_rootid);
   a.set("body_mocapid", &e->body_mocapid), a.set("nmocap", &e->nmocap);
   a.set("nq", &e->nq), a.set("nv", &e->nv), a.set("nbody", &e->nbody);
-  a.set("ngeom", &e->ngeom), a.set("nflex", &e->nflex), a.set("nflexvert", &e->nflexvert);
+  a.set("ngeom", &e->ngeom), a.set("npair", &e->npair), a.set("nflex", &e->nflex);
+  a.set("nflexvert", &e->nflexvert);
   a.set("ntendon", &e->ntendon), a.set("interpolated", &e->interpolated);
   a.set("state_size", &e->state_size), a.set("sig_integration", &e->signature.integration);
   a.set("sig_pose", &e->signature.pose), a.set("discrete", &e->discrete);
@@ -167,12 +169,11 @@ class Guard {
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
-  // The fields of the model that the guard depends on; their present values are the reference.
-  void follow(const std::vector<std::pair<std::uintptr_t, std::size_t>>& fields) {
-    fields_.clear();
-    for (const auto& [from, size] : fields) fields_.add(reinterpret_cast<const char*>(from), size);
-  }
-  // Whether the model's fields have changed since follow().
+  // The fields of the model that the guard has copied from (their present values are the
+  // reference), and numbers that only have to be valid: address, size [bytes], Numbers::Rule.
+  using Regions = std::vector<std::pair<std::uintptr_t, std::size_t>>;
+  void follow(const Regions& fields) { fields_ = FollowedFields(fields); }
+  void follow_numbers(std::vector<Numbers::Region> rows) { numbers_ = Numbers(std::move(rows)); }
   bool changed() const { return fields_.changed(); }
   // Removes all that was added since the last start.
   void clear() {
@@ -203,7 +204,7 @@ class Guard {
     refuse_within_step();
     const Stepping stepping(this);
     owner_ = owner;
-    if (fields_.changed() || !stepper_->acceptable()) owner.attr("_follow")();
+    if (fields_.changed() || !numbers_.valid() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {
@@ -267,17 +268,12 @@ class Guard {
       if (hit.passed) through.push_back(std::move(hit));
     return rows_of(through);
   }
-  Integers stiffened() const {
-    return listed([this] { return stepper_->stiffened(); });
-  }
-  Integers sunk() const {
-    return listed([this] { return stepper_->sunk(); });
-  }
-  template <class Ask>
-  Integers listed(const Ask& ask) const {
+  Integers stiffened() const { return listed(&Stepper::stiffened); }
+  Integers sunk() const { return listed(&Stepper::sunk); }
+  Integers listed(std::vector<int> (Stepper::*ask)() const) const {
     if (stepping_ != std::this_thread::get_id()) refuse_within_step();
     Integers out;
-    for (const int pair : ask()) out.append(pair);
+    for (const int pair : ((*stepper_).*ask)()) out.append(pair);
     return out;
   }
   void close() { refuse_within_step(), stepper_->close(); }
@@ -347,6 +343,7 @@ class Guard {
 
   Engine engine_;
   FollowedFields fields_;
+  Numbers numbers_;
   nb::object held_;   // what the addresses point into
   nb::handle owner_;  // of the step that is being made
   Settings s_{};
@@ -390,6 +387,7 @@ void bind_guard(nb::module_& m) {
       .def("stiffened", &Guard::stiffened)
       .def("sunk", &Guard::sunk)
       .def("follow", &Guard::follow, "fields"_a)
+      .def("follow_numbers", &Guard::follow_numbers, "rows"_a)
       .def("changed", &Guard::changed)
       .def("clear", &Guard::clear)
       .def("saved", &Guard::saved)

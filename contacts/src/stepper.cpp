@@ -105,7 +105,7 @@ bool Stepper::acceptable() const {
   return h > 0 && h <= std::numeric_limits<double>::max() && !(*e_.enableflags & e_.refused) &&
          *e_.integrator != e_.runge_kutta &&
          (*e_.cone == e_.pyramidal || *e_.cone == e_.elliptic) &&
-         !(e_.contact_filter && *e_.contact_filter) && mocap_.finite();
+         !(e_.contact_filter && *e_.contact_filter) && mocap_.finite() && e_.parameters_finite();
 }
 
 void Stepper::abandon() {

@@ -42,7 +42,8 @@ def command(
 
     One of --ur, --play, --stdin and --ros names where the samples come from. It ends after
     --seconds, with Ctrl-C, or when the robot has been gone for --reconnect seconds (exit code 3).
-    When no sample comes for 20 ms the state is `fault: no samples`.
+    When no sample comes for 20 ms (2.5 sample intervals where that is longer), the state is
+    `fault: no samples`.
 
     Args:
         model: a detector that `tauguard train` wrote, for this arm and this rate.

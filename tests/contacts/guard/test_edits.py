@@ -1,5 +1,6 @@
 """What is changed between two steps is honoured at the next one, or refused there by name."""
 
+import copy
 import re
 
 import mujoco
@@ -70,6 +71,20 @@ PADDLE = '<body mocap="true" pos="0 0 3"><geom size=".1"/></body>'
         (put("geom_pos", 2, [0, np.nan, 0]), "geom_pos: row 2 is"),
         (put("geom_size", 2, [-1, 0, 0]), "geom_size: row 2 is"),
         (put("geom_quat", 0, [2, 0, 0, 0]), "geom_quat: row 0 is"),
+        (put("body_mass", 2, np.nan), "body_mass: row 2 is nan, not finite"),
+        (put("body_mass", 2, -0.02), "body_mass: row 2 is -0.02, negative"),
+        (put("body_inertia", 2, [1, np.nan, 1]), "body_inertia: row 2 is"),
+        (put("body_inertia", 2, [1e-3, -1e-3, 1e-3]), "body_inertia: row 2 is"),
+        (put("geom_margin", 0, np.inf), "geom_margin: row 0 is inf, not finite"),
+        (put("geom_solref", 2, [np.nan, 1]), "geom_solref: row 2 is"),
+        (put("geom_solimp", 2, np.nan), "geom_solimp: row 2 is"),
+        (put("geom_friction", 2, np.nan), "geom_friction: row 2 is"),
+        (put("dof_damping", 0, np.nan), "dof_damping: row 0 is nan, not finite"),
+        (option("gravity", [0, 0, np.nan]), "opt.gravity: [0.0, 0.0, nan], not finite"),
+        (option("density", np.inf), "opt.density: inf, not finite"),
+        (option("o_solref", [np.nan, 1]), "opt.o_solref: [nan, 1.0], not finite"),
+        (put("geom_condim", 0, 7), "geom_condim: row 0 is 7, not 1, 3, 4 or 6"),
+        (put("geom_type", 0, 99), "geom_type: row 0 is 99, no type of MuJoCo's"),
         (put("mocap_pos", 0, np.nan, of="data"), "mocap_pos: row 0 is"),
         (put("mocap_quat", 0, np.inf, of="data"), "mocap_quat: row 0 is"),
     ],
@@ -78,9 +93,7 @@ def test_what_cannot_be_followed_is_refused_by_name_until_it_is_taken_back(edit,
     model = model_of(FLOOR + PADDLE)
     data, guard = falling(model)
     guard.step()
-    kept = [getattr(model, name).copy() for name in ("geom_pos", "geom_size", "geom_quat")]
-    poses = data.mocap_pos.copy(), data.mocap_quat.copy()
-    flags, integrator, cone = model.opt.enableflags, model.opt.integrator, model.opt.cone
+    kept, poses = copy.copy(model), (data.mocap_pos.copy(), data.mocap_quat.copy())
     edit(model, data)
     before = bits(model, data)
     for _ in range(2):
@@ -89,10 +102,13 @@ def test_what_cannot_be_followed_is_refused_by_name_until_it_is_taken_back(edit,
         assert bits(model, data) == before
     with pytest.raises(ValueError, match=re.escape(message)):
         GuardedStepper(model, data)
-    model.opt.timestep, model.opt.enableflags, model.opt.integrator = 2e-3, flags, integrator
-    model.opt.cone = cone
-    for name, value in zip(("geom_pos", "geom_size", "geom_quat"), kept, strict=True):
-        getattr(model, name)[:] = value
+    for name in dir(kept):
+        array = getattr(kept, name)
+        if isinstance(array, np.ndarray) and getattr(model, name).flags.writeable:
+            getattr(model, name)[:] = array
+    for name in dir(kept.opt):
+        if not name.startswith("_"):
+            setattr(model.opt, name, getattr(kept.opt, name))
     data.mocap_pos[:], data.mocap_quat[:] = poses
     assert lowest(guard) > 0
 
