@@ -292,6 +292,7 @@ def small(rng: np.random.Generator) -> Drawn:
     body = free_body(spec, "body")
     kind = str(rng.choice(["box", "capsule", "cylinder", "sphere", "ellipsoid"]))
     size = between(rng, 3e-3, 0.03) * scale * np.exp(rng.uniform(-0.5, 1, 3))
+    size = np.maximum(size, 6e-5)  # MuJoCo refuses moments of inertia below 1e-15 kg m^2
     if kind in ("capsule", "cylinder"):
         size = np.array([size[0], size[2], 0])
     solid(body, "body", kind, size, mass=max(1e-6, 10 * scale**3))
