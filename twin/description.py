@@ -9,7 +9,10 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors.calibration.arm_file import save_arm
-from tauguard.twin.identify import Twin
+from tauguard.twin.identify import NUMBERS, Twin
+
+#: The ten inertial numbers of a body, in its joint's frame.
+QUANTITIES = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
 def write_twin(
@@ -57,9 +60,10 @@ def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
     assert friction is not None
     assert friction.slope is not None
     assert friction.slope_velocity is not None
-    half = {name: _half_widths(values) for name, values in twin.intervals.items()}
+    half = {k: _half_widths(v) for k, v in twin.intervals.items() if k in NUMBERS}
     lines = [
         *(f"# {note}" for note in twin.notes),
+        *_bodies(twin),
         "# +- is half of a 95 % interval, from leaving out each part of the logs",
         f'file = "{bodies}"',
         f'source = "identified from {", ".join(logs)}"',
@@ -86,6 +90,25 @@ def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
         f'left_over = "{left_over}"  # errors of all this [A] along the logs, noise included',
     ]
     return "\n".join(lines) + "\n"
+
+
+def _bodies(twin: Twin) -> list[str]:
+    """The inertial numbers that the logs show, as comments: of one link a line."""
+    half = twin.intervals.get("inertial")
+    if half is None:
+        return []
+    units = ["kg"] + ["kg m"] * 3 + ["kg m^2"] * 6
+    lines = ["# inertial numbers of the moved links that the logs show, with 95 % intervals"]
+    for name, values, widths in zip(
+        twin.arm.robot.joint_names, twin.arm.robot.inertial, half, strict=True
+    ):
+        shown = [
+            f"{quantity} {value:.3g} +- {width:.2g} {unit}"
+            for quantity, value, width, unit in zip(QUANTITIES, values, widths, units, strict=True)
+            if not np.isnan(width)
+        ]
+        lines.append(f"# {name}: {', '.join(shown) or 'none'}; all others keep the robot file's")
+    return lines
 
 
 def _half_widths(values: Array) -> str:

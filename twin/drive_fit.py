@@ -1,4 +1,8 @@
-"""Friction of each joint: linear least squares with coefficients of 0 or more."""
+"""Friction of each joint: Bayesian linear least squares with coefficients of 0 or more.
+
+What the logs show too little of keeps its prior: friction at rest is that at low speed, and nothing
+else changes with speed. The deviation of each prior is :data:`BELIEF` of the joint's friction.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, Bools
 from tauguard.twin.signals import Motion
 
 #: Candidates of the Stribeck velocity [rad/s].
@@ -17,6 +21,12 @@ LOADS = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.8])
 SLOPES = (0.03, 0.1, 0.3, 1.0)
 #: A joint whose motion is shorter is not fitted [s].
 LEAST = 1.0
+#: Standard deviation of the priors, relative to the median friction.
+BELIEF = 0.3
+#: A sample counts 1/SOFTNESS^2, as in the calibration: the law's errors are not white.
+SOFTNESS = 5.0
+#: A number is the prior's where its variance is more than this fraction of the prior's.
+SHOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +39,7 @@ class FrictionFit:
     viscous: float  #: [N m s/rad]
     slope: tuple[float, ...]  #: rises of the level over each of :data:`SLOPES` [N m]
     stribeck_velocity: float  #: [rad/s]
+    priors: tuple[str, ...] = ()  #: fields that the logs hardly show
 
 
 def fit_friction(
@@ -50,27 +61,48 @@ def fit_friction(
     left = np.concatenate(
         [(tau - m.bodies)[r, joint] for m, tau, r in zip(motions, torques, rows, strict=True)]
     )
+    usual = float(np.median(np.abs(left)))
     fits = [
-        (*_solve(qd, load, left, width, rise), rise, width)
+        (*_solve(qd, load, left, width, rise, usual), rise, width)
         for width in STRIBECK
         for rise in LOADS / max(float(np.median(np.abs(load))), 1e-9)
     ]
-    x, _, rise, width = min(fits, key=lambda fit: fit[1])
+    x, _, shown, rise, width = min(fits, key=lambda fit: fit[1])
+    names = ("static", "viscous")
+    priors = tuple(name for name, seen in zip(names, shown, strict=True) if not seen)
     return FrictionFit(
-        float(x[0]), float(x[1]), rise, float(x[2]), tuple(x[3 : 3 + len(SLOPES)]), width
+        float(x[0]), float(x[1]), rise, float(x[2]), tuple(x[3 : 3 + len(SLOPES)]), width, priors
     )
 
 
 def _solve(
-    qd: Array, load: Array, left: Array, stribeck: float, rise: float
-) -> tuple[Array, float]:
-    """Coefficients, and the norm of what they leave; the last two are an offset of either sign."""
+    qd: Array, load: Array, left: Array, stribeck: float, rise: float, usual: float
+) -> tuple[Array, float, Bools]:
+    """Coefficients, the norm of what they leave with the priors, and which of two are seen.
+
+    The last two coefficients are an offset of either sign. Seen are static friction, relative to
+    Coulomb friction, and viscous friction.
+    """
     sign, slip, one = np.sign(qd), np.exp(-((qd / stribeck) ** 2)), np.ones_like(qd)
     more, rises = 1 + rise * np.abs(load), [np.tanh(qd / speed) for speed in SLOPES]
     level = [more * part for part in (sign * (1 - slip), sign * slip, *rises)]
     table = np.stack([*level[:2], qd, *level[2:], one, -one, left], axis=1)
     products = table.T @ table  # a small system of the same norms
     products[np.diag_indices_from(products)] *= 1 + 1e-9
+    # Rows of the priors: static less Coulomb friction, viscous friction, slopes.
+    about = np.zeros((2 + len(SLOPES), table.shape[1]))
+    about[0, :2], about[1:, 2 : 3 + len(SLOPES)] = (-1, 1), np.eye(1 + len(SLOPES))
+    noise = _norm(products) / np.sqrt(len(qd))
+    about *= SOFTNESS * noise / max(BELIEF * usual, 1e-9)
+    products += about.T @ about
     root = np.linalg.cholesky(products).T
     x, rest = nnls(root[:, :-1], root[:, -1])
-    return x, float(rest)
+    spread = np.linalg.pinv(products[:-2, :-2])  # without the offset's second sign
+    both = about[:2, :-2]
+    return x, float(rest), np.einsum("ij,jk,ik->i", both, spread, both) < SHOWN
+
+
+def _norm(products: Array) -> float:
+    """Norm of what least squares with coefficients of 0 or more leaves."""
+    root = np.linalg.cholesky(products).T
+    return float(nnls(root[:, :-1], root[:, -1])[1])

@@ -35,8 +35,8 @@ class Twin:
     fits: tuple[FrictionFit | None, ...]  #: of each joint; None: it did not move enough
     notes: tuple[str, ...]  #: what the logs do not show, one line each
     intervals: dict[str, Array] = field(default_factory=dict)
-    """Half the width of the 95 % interval of each of :data:`NUMBERS`, shape (n,) each; NaN: a
-    prior, 0: given."""
+    """Half the width of the 95 % interval of each of :data:`NUMBERS`, shape (n,) each, and of
+    ``inertial``, shape (n, 10); NaN: a prior, 0: given."""
 
     def number(self, name: str) -> Array:
         """One of :data:`NUMBERS`, shape (n,)."""
@@ -91,10 +91,15 @@ def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
     for name in NUMBERS:
         values = np.array([other.number(name) for other in others])
         deviation = np.sqrt((count - 1) * values.var(axis=0))
-        known = np.array([fit is not None for fit in twin.fits]) | (name == "gain")
+        known = np.array([f is not None and name not in f.priors for f in twin.fits])
+        known |= name == "gain"
         form = 0.0 if name == "gain" else FORM * np.abs(twin.number(name)).max()
         intervals[name] = np.where(known, np.maximum(wide * deviation, form), np.nan)
-    return replace(twin, intervals=intervals)
+    if "inertial" in twin.intervals:
+        bodies = np.array([other.arm.robot.inertial for other in others])
+        deviation = np.sqrt((count - 1) * bodies.var(axis=0))
+        intervals["inertial"] = np.maximum(twin.intervals["inertial"], wide * deviation)
+    return replace(twin, intervals=twin.intervals | intervals)
 
 
 def _notes(
@@ -105,6 +110,12 @@ def _notes(
         f"{names[j]}: hardly moves; its friction is a prior, like the other joints'"
         for j, fit in enumerate(fits)
         if fit is None
+    ]
+    notes += [
+        f"{names[j]}: the logs hardly show its {' and '.join(fit.priors)} friction; it is near its "
+        "prior (static: friction at low speed; viscous: none)"
+        for j, fit in enumerate(fits)
+        if fit is not None and fit.priors
     ]
     cuts = sum(len(without_gaps(trace, 0.0)) - 1 for trace in traces)
     if cuts:

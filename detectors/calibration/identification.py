@@ -88,6 +88,9 @@ class Identified:
     scale: str  #: "gains", "payload" or "masses": what fixed the scale of the torques
     gain_error: Array  #: relative standard deviation of each gain, 0 where it was given, (n,)
     notes: tuple[str, ...]  #: what a reader should know
+    inertial_error: Array
+    """Standard deviations of the inertial numbers, shape (n, 10); NaN where the recordings halve
+    the prior's variance at most, so that the number is mostly the prior's."""
 
 
 def _deviations(
@@ -254,7 +257,11 @@ def _fit(
         if not held:
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
             gain = gain / np.clip(1 + solution[system.gain : system.load], 0.5, 2.0)
-    return _result(arm, system, solution, gain, rms, friction), error
+    bodies = slice(INERTIAL * robot.joints)
+    spread = np.sqrt(np.diag(np.linalg.inv(matrix))[bodies])
+    spread[spread**2 > 0.5 * deviations[bodies] ** 2] = np.nan
+    found = _result(arm, system, solution, gain, rms, friction)
+    return replace(found, inertial_error=spread.reshape(-1, INERTIAL)), error
 
 
 def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:
@@ -288,4 +295,5 @@ def _result(
     weights: Array = solution[system.friction : system.gain].reshape(n, -1)
     loads: NDArray[Any] = solution[system.load :].reshape(-1, INERTIAL)
     identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(rms, 1e-6))
-    return Identified(identified, loads, rms, "gains", np.zeros(n), ())
+    unknown = np.full((n, INERTIAL), np.nan)
+    return Identified(identified, loads, rms, "gains", np.zeros(n), (), unknown)

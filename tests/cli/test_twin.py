@@ -103,6 +103,7 @@ def test_from_logs_to_detection(folder, capsys):
     assert "identified from log0.csv, log1.csv, log2.csv" in said
     run(folder, "detect", free / "log0.csv", "--robot", out)
     assert "the calibration in twin.bodies.xml" in capsys.readouterr().out
+    assert "\n# b: mx " in out.read_text()  # with its interval
 
 
 def test_contacts_are_learned_on_the_twin(folder, tmp_path, monkeypatch, capsys):

@@ -10,8 +10,9 @@ from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models import Friction, load_arm
 from tauguard.twin import compare, identify_twin, with_intervals
 from tauguard.twin.description import write_twin
+from tauguard.twin.drive_fit import fit_friction
 from tauguard.twin.play import friction_torque
-from tauguard.twin.signals import motion_of, quantum, without_gaps
+from tauguard.twin.signals import Motion, motion_of, quantum, without_gaps
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,
@@ -127,3 +128,27 @@ def test_intervals_hold_the_friction_of_a_known_arm(arm, logs, twin):
     assert (away < found.intervals["viscous"]).all()
     assert (found.intervals["gain"] == 0).all()
     assert with_intervals(twin, rest[:1]).intervals == {}
+
+
+def test_friction_at_rest_is_not_invented_from_rows_that_only_show_motion():
+    # Rows of .05 to 1 rad/s: exp(-(.05/.02)^2) of what is at rest stands in them, within noise.
+    rng = np.random.default_rng(0)
+    t = np.arange(3000) * 0.01
+    qd = np.where(t % 2 < 1, 1.0, -1.0) * (0.05 + 0.95 * rng.random(3000))
+    lost = 5 * np.sign(qd) + 2 * qd
+    rows = [column[:, None] for column in (qd, 0 * qd)]
+    motion = Motion(t, *rows, rows[1])
+    for _ in range(5):
+        fit = fit_friction(0, [motion], [(lost + rng.normal(size=3000))[:, None]])
+        assert fit.static == pytest.approx(5, abs=2.5)
+        assert fit.viscous + fit.slope[3] == pytest.approx(2, abs=0.6)
+    noise = 30 * rng.normal(size=3000)
+    fit = fit_friction(0, [motion], [(lost + noise)[:, None]])
+    assert "static" in fit.priors
+    assert fit.static == pytest.approx(fit.coulomb, rel=0.5)
+    slow = 0.3 * qd * np.exp(rng.uniform(-4, 0, 3000))  # down to .0003 rad/s: at rest it is 9
+    level = 5 + 4 * np.exp(-((slow / 0.1) ** 2))
+    torque = (level * np.sign(slow) + 0.1 * rng.normal(size=3000))[:, None]
+    fit = fit_friction(0, [Motion(t, slow[:, None], rows[1], rows[1])], [torque])
+    assert fit.static == pytest.approx(9, rel=0.15)
+    assert "static" not in fit.priors

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Parts of the logs of which each is left out in turn, for the intervals.
 PARTS = 5
+#: Half a 95 % interval in standard deviations.
+WIDE = 1.96
 
 
 def command(
@@ -134,11 +136,12 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     from tauguard.detectors.calibration.identification import identify
     from tauguard.twin import identify_twin
 
-    found = identify(given.arm, used, scale=given.scale).arm
+    found = identify(given.arm, used, scale=given.scale)
     bare = [r.trace for r in used if _unloaded(r)]
     if not bare:
         raise ValueError("all logs carry a load: a twin needs one without, at least")
-    return identify_twin(found, bare, limit / abs(found.drive_gain))
+    twin = identify_twin(found.arm, bare, limit / abs(found.arm.drive_gain))
+    return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 
 
 def _unloaded(recording: Recording) -> bool:

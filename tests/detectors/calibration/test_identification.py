@@ -161,3 +161,19 @@ def test_a_log_without_motion():
     still = record(1, dwell=(-1.0, 99.0))
     with pytest.raises(ValueError, match="no joint moves"):
         identify(ArmModel(nominal(), GAIN), [Recording(still)])
+
+
+def test_an_interval_of_the_bodies_holds_the_truth_and_shrinks_with_more_logs():
+    # By 3 standard deviations: the errors of records are their noise, and friction that tanh is.
+    truth = RobotNumbers.from_pin(true_model()).inertial
+    one, three = (
+        identify(ArmModel(nominal(), GAIN), [Recording(record(k)) for k in range(1, count)])
+        for count in (2, 4)
+    )
+    away = np.abs(three.arm.robot.inertial - truth)
+    shown = np.isfinite(three.inertial_error)
+    assert shown.any()
+    assert (away[shown] < 3 * three.inertial_error[shown]).all()
+    both = shown & np.isfinite(one.inertial_error)
+    assert (three.inertial_error[both] <= one.inertial_error[both] * 1.001).all()
+    assert np.isnan(three.inertial_error[0, 0])  # the mass on a vertical axis loads nothing
