@@ -1,5 +1,6 @@
-// From scores to an alarm: normalised over the speed, above the threshold for the confirmation
-// time, never before the detector has settled. The same as the batch form, to the bit.
+// From scores to an alarm. A score is normalised over the speed. The alarm is up after the score
+// has exceeded the threshold for the confirmation time, and never before the detector has settled.
+// The batch form gives the same bits.
 #pragma once
 
 #include <cmath>
@@ -12,7 +13,7 @@
 
 namespace tauguard::detectors {
 
-// The sum of |x| in the order of NumPy's sums over up to 128 numbers, so that the bits are its own.
+// The sum of |x|, added in the order in which NumPy sums up to 128 numbers: the same bits.
 inline double sum_of_sizes(const double* x, std::size_t n) {
   double sum = 0.0;
   std::size_t k = 0;
@@ -27,7 +28,7 @@ inline double sum_of_sizes(const double* x, std::size_t n) {
   return sum;
 }
 
-// The largest sum of |qd| within a sliding window of samples, by a queue of falling candidates.
+// The largest sum of |qd| within a sliding window of samples (a monotonic queue).
 class RecentSpeed {
  public:
   explicit RecentSpeed(std::int64_t samples)
@@ -58,7 +59,7 @@ class RecentSpeed {
   std::vector<Candidate> kept_;
 };
 
-// What the peaks of collision-free scores reach at K rising speeds; none: scores count as they are.
+// Peaks of collision-free scores at K increasing speeds. Without levels scores are not normalised.
 struct Levels {
   std::vector<double> speed, base, unit;
 
@@ -67,7 +68,7 @@ struct Levels {
   }
 
  private:
-  // Linear between the speeds and constant beyond them, by the operations of NumPy's interp.
+  // Linear between the speeds and constant beyond them; the same bits as NumPy's interp.
   double at(double now, const std::vector<double>& y) const {
     const std::size_t last = speed.size() - 1;
     if (std::isnan(now)) return now;
@@ -81,13 +82,13 @@ struct Levels {
 };
 
 struct AlarmSettings {
-  double dt = 0;             // of a sample that does not say its own [s]
-  double settle = 0;         // an alarm comes only after so long [s]
+  double dt = 0;             // sample interval where a sample has none of its own [s]
+  double settle = 0;         // time before the first alarm [s]
   double threshold = 0;      // of the normalised score
-  std::int64_t samples = 1;  // in a row above it
-  std::int64_t memory = 1;   // samples that a speed counts for
+  std::int64_t samples = 1;  // in a row above the threshold
+  std::int64_t memory = 1;   // window of the largest speed, in samples
   Levels levels;
-  Levels floor;  // of the plain thresholds beneath; none: they do not count
+  Levels floor;  // levels of the plain thresholds; without levels they are not used
 };
 
 class Alarm {

@@ -50,7 +50,7 @@ struct Joint {
   double armature = 0;
 };
 
-// What one evaluation writes to; one per thread.
+// Scratch space of one evaluation; each thread has its own.
 struct Workspace {
   struct Link {
     Mat3 rotation;  // link axes to parent axes

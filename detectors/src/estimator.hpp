@@ -1,9 +1,9 @@
-// The estimator: friction compensation, momentum observer, and a Kalman filter for what the model
-// does not know (payload, friction that has changed), so that the residual that is left is a
+// The estimator: friction compensation, the momentum observer, and a Kalman filter of what the
+// model does not know (payload, changed friction). The residual that remains is evidence of a
 // collision.
 //
-// The residual of a wrong model is linear in what is wrong: r = Phi theta + tau_ext with Phi the
-// columns of the unknowns, passed through the observer's own filter. theta holds the payload at the
+// The residual of a wrong model is linear in the unknowns: r = Phi theta + tau_ext. The columns of
+// Phi have passed the observer's own filter. theta holds the payload at the
 // last link (mass and first moment in that link's frame) and, per joint, a torque offset and the
 // relative errors of viscous and Coulomb friction; slow_errors.hpp tracks them.
 //
@@ -15,25 +15,26 @@
 // The friction of a joint at rest can hold any torque. If `started` is above 0, a joint corrects
 // the unknowns only after it has moved for that time.
 //
-// Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
-// fraction `transition` of the change: a variance that is added to the noise of a correction.
+// Where friction has just changed (a joint breaks away, stops or turns), the model is wrong by a
+// fraction `transition` of the change. Its square is added to the variance of a correction.
 //
-// What the unknowns do not explain counts less where the payload is uncertain (`weighted`): it is
-// divided by the deviation of noise and payload together, in units of the noise's.
+// With `weighted`, the unexplained residual counts less where the payload is uncertain. It is
+// multiplied by the noise's deviation over that of noise and payload together.
 //
-// What the noise of the residual grows with, beside the speed (`motion_numbers` a joint), if there
-// are unknowns: the torque of accelerations, sum_k |M_jk qdd_k|, since inertia is known to some
-// percent; the norm of the joint's row of the mass matrix M, since the noise of velocities, times
-// inertia, is most of what a joint at rest shows; how far friction was of late from its usual
-// value: a joint breaks away, stops or turns; and, in a slow log, half the change of torque since
-// the last sample. M is that of arm and tracked payload.
+// The noise of the residual grows with the speed and with `motion_numbers` more quantities of a
+// joint (only if there are unknowns; M is the mass matrix of arm and tracked payload):
+// * the torque of accelerations, sum_k |M_jk qdd_k|, because inertia is known to some percent;
+// * the norm of the joint's row of M, because at rest most of the noise is that of the velocities
+//   times inertia;
+// * the recent deviation of friction from its usual value (a joint breaks away, stops or turns);
+// * in a slow log, half the change of torque since the last sample.
 //
-// Torques act until the next sample, or with `sampled` are instants of a slow log: between two of
-// them torque and friction count with their mean, as gravity does. Half a sample of lag would
-// otherwise be, while an arm accelerates, as large as a collision. The mean of the two ends is
-// wrong by up to half of their difference: a brake acts at once, at an unknown time between them.
+// A torque acts until the next sample. With `sampled` (a slow log) torques are instants instead,
+// and the mean of two samples acts between them, as for gravity. Without it the lag of half a
+// sample is as large as a collision while an arm accelerates. The mean is wrong by up to half the
+// difference of the two samples, because a brake acts at an unknown time between them.
 //
-// The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
+// The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +53,7 @@ constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
 constexpr int motion_numbers = 4;           // torque of accelerations, inertia, change, half a step
 constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
-constexpr double slow = 0.02;               // a joint slower than this stands [rad/s]
+constexpr double slow = 0.02;               // a slower joint is at rest [rad/s]
 
 struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
@@ -63,10 +64,10 @@ struct EstimatorSettings {
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
   double every = 0.01;         // time between two corrections [s]
-  double inflation = 1.0;      // corrections that an error of the model lasts for
-  double transition = 0.0;     // relative error of friction that has just changed
+  double inflation = 1.0;      // number of corrections over which an error of the model lasts
+  double transition = 0.0;     // relative error of friction just after a change
   double started = 0.0;        // motion of a joint before its first correction [s]
-  bool weighted = false;       // see above; false: all of the unexplained residual counts
+  bool weighted = false;       // see above
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
   double plain_gain = 100.0;   // [1/s]
   bool sampled = false;        // torques are instants; false: they act until the next sample
@@ -104,9 +105,9 @@ class Estimator {
   bool started() const { return started_; }
   const std::vector<double>& theta() const { return errors_.state(); }
   const std::vector<double>& plain() const { return plain_; }
-  double moved(std::size_t j) const { return moved_[j]; }  // how long joint j has moved [s]
+  double moved(std::size_t j) const { return moved_[j]; }  // time for which joint j has moved [s]
   const std::vector<double>& acceleration() const { return acceleration_; }  // sizes [rad/s^2]
-  // Standard deviation that uncertain unknowns give the residual of joint j [N m].
+  // Standard deviation of joint j's residual because of uncertain unknowns [N m].
   double spread(std::size_t j) {
     return adapts_ ? std::sqrt(std::max(errors_.variance(j, load(j), own(j)), 0.0)) : 0.0;
   }
@@ -116,9 +117,9 @@ class Estimator {
     decay_dt_ = -1.0;
   }
 
-  // One sample: residual r of the observer, what the unknowns do not explain of it, and what its
-  // noise grows with, motion_numbers rows of n. Accelerations are velocities differentiated at the
-  // rate acceleration_rate.
+  // One sample. It gives the observer's residual r, the part of it that the unknowns do not
+  // explain, and the quantities with which its noise grows (motion_numbers rows of n).
+  // Accelerations are velocities differentiated at the rate acceleration_rate.
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
             double* unexplained, double* motion) {
     if (!started_) begin(q, qd);
@@ -186,7 +187,7 @@ class Estimator {
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
-  // Drive torques less friction, and what each unknown of a joint's own would add to them.
+  // Drive torques minus friction, and their derivatives by each joint's own unknowns.
   void drive(const double* q, const double* qd, const double* current) {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {
@@ -201,7 +202,7 @@ class Estimator {
       tau_[j] = tau - (viscous + coulomb + other);
       plain_tau_[j] = tau_[j];
       if (basis_.modelled && load != 0.0) {
-        double grows = 0.0;  // friction that is proportional to the load, here without the payload
+        double grows = 0.0;  // load-dependent friction without the payload
         for (std::size_t c = basis_.loaded_at(); c < smooth; ++c) grows += w[c] * column_[c];
         plain_tau_[j] += grows * (1.0 - std::fabs(beta_[j] / load));
       }
@@ -229,7 +230,7 @@ class Estimator {
       change_decay_ = std::exp(-dt / change_lasts);
       decay_dt_ = dt;
     }
-    const double now = set_.sampled ? 0.5 : 0.0;  // the part of this sample's torque
+    const double now = set_.sampled ? 0.5 : 0.0;  // weight of this sample's torque
     const auto acting = [now](double before, double after) {
       return before + now * (after - before);
     };
@@ -271,7 +272,7 @@ class Estimator {
     return more > 0 ? std::sqrt(noise / (noise + more)) : 1.0;
   }
 
-  // Variance of the residual because friction differs from its usual value of late [(N m)^2].
+  // Variance of the residual because of the recent deviation of friction [(N m)^2].
   double changed(std::size_t j) const {
     const double off = set_.transition * (own_[per_joint * j + coulomb_at] - usual_[j]);
     return off * off;

@@ -1,4 +1,4 @@
-// Faults of a stream that its samples show by themselves, without a model of the arm.
+// Faults of a stream that the samples alone show, without a model of the arm.
 #pragma once
 
 #include <algorithm>
@@ -30,18 +30,19 @@ enum class Fault : std::int32_t {
 
 // Usual values of one arm's samples; all arrays hold one entry a joint.
 struct Usual {
-  double dt = 0;                    // sample interval [s]
-  double longest = 0;               // longest interval that is not a gap [s]
-  std::int64_t odd = 0;             // intervals in a row that may be other than dt by a quarter
-  double speed = 0;                 // no joint turns faster [rad/s]
-  std::int64_t repeats = 0;         // samples in a row in which no signal changes
-  std::int64_t window = 0;          // samples over which velocities are summed
-  std::vector<double> current;      // largest |current| [A]
-  double fraction = 0;              // of the travel that position and velocity may differ by
-  double step_fraction = 0;         // the same over one sample, whose time stamp may be late
-  std::vector<double> step;         // |change of q less qd dt| beyond that, over one sample [rad]
-  std::vector<double> drift;        // the same summed over `window` samples [rad]
-  std::vector<std::int64_t> stuck;  // samples in a row with one joint's current unchanged
+  double dt = 0;         // sample interval [s]
+  double longest = 0;    // longest interval that is not a gap [s]
+  std::int64_t odd = 0;  // allowed number of successive intervals that differ from dt by a quarter
+  double speed = 0;      // highest speed of any joint [rad/s]
+  std::int64_t repeats = 0;     // allowed number of successive samples without any change
+  std::int64_t window = 0;      // samples over which velocities are summed
+  std::vector<double> current;  // largest |current| [A]
+  double fraction = 0;          // of the travel: allowed difference of position and summed velocity
+  double step_fraction = 0;     // the same over one sample, whose time stamp may be late
+  std::vector<double> step;     // |change of q less qd dt| beyond that, over one sample [rad]
+  std::vector<double> drift;    // the same summed over `window` samples [rad]
+  std::vector<std::int64_t>
+      stuck;  // allowed number of successive samples without a change of the current
 };
 
 struct Verdict {
@@ -50,7 +51,8 @@ struct Verdict {
   double value = 0;         // in the fault's own unit
 };
 
-// Looks at one sample after another; bounded work, nothing allocated after construction.
+// Checks one sample after another. The work is bounded, and nothing is allocated after
+// construction.
 class FaultCheck {
  public:
   explicit FaultCheck(Usual usual)
@@ -84,7 +86,7 @@ class FaultCheck {
     }
     const double dt = t - time_;
     if (dt < 0) {
-      // A late packet, or a clock that begins anew: either way nothing before it counts.
+      // A late packet or a clock that was reset: earlier samples are not used any more.
       reset();
       remember(t, q, qd, current);
       begun_ = true;
@@ -112,19 +114,19 @@ class FaultCheck {
     return {};
   }
 
-  // What it shows beside those before it.
+  // What it shows in comparison with earlier samples.
   Verdict differences(double dt, const double* q, const double* qd, const double* current) {
     Verdict found;
     const auto say = [&](Fault fault, std::int32_t joint, double value) {
       if (found.fault == Fault::none) found = {fault, joint, value};
     };
     if (dt > usual_.longest) {
-      // Nothing can be summed over a gap: begin again after it.
+      // Sums over a gap mean nothing, so they start again.
       reset();
       begun_ = true;
       return {Fault::gap, -1, dt};
     }
-    // No interval like training's for a while: a wrong rate, not samples that come late.
+    // No interval as in training for a while: the rate is wrong; late samples look different.
     const double ratio = dt / usual_.dt, late = std::fabs(dt - usual_.dt);
     odd_ = ratio > 0.8 && ratio < 1.25 ? 0 : odd_ + 1;
     if (odd_ > usual_.odd) say(Fault::rate, -1, dt);
@@ -139,7 +141,7 @@ class FaultCheck {
     for (std::size_t j = 0; j < n_; ++j) {
       const auto joint = static_cast<std::int32_t>(j);
       const double travel = dt * (qd[j] + lqd[j]) / 2, error = q[j] - lq[j] - travel;
-      // What a velocity that is a sample late differs by, and a time stamp that is.
+      // Differences that a velocity or a time stamp one sample late causes.
       const double bend =
           usual_.dt * std::fabs(qd[j] - lqd[j]) + std::min(late, usual_.dt) * std::fabs(qd[j]);
       sums_[j] += error - errors_[row + j];
@@ -156,7 +158,7 @@ class FaultCheck {
       unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
       if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);
     }
-    // Sums of differences gather rounding: begin them anew once a round of the window.
+    // Rounding accumulates in running sums, so they start again once per window.
     if (++filled_ % usual_.window == 0) sum_anew();
     return found;
   }

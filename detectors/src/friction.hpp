@@ -10,9 +10,8 @@
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
 //   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
 //   ripple frequency c, tau |tau| where the drive's torque per ampere changes with the current
-// The load is the drive's torque, or with `modelled` what the arm's own model says of it: a joint
-// without gravity needs hardly any torque but friction, and friction must not be predicted from
-// itself.
+// The load is the drive's torque, or with `modelled` the torque by the arm's model. A joint without
+// gravity needs hardly any torque but friction, and friction must not be predicted from itself.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +29,7 @@ class FrictionBasis {
   std::vector<double> slopes;    // tanh widths [rad/s]
   std::vector<double> loaded;    // tanh widths of load-dependent friction [rad/s]
   bool saturation = false;       // the column tau |tau|
-  bool modelled = false;         // whose torque the load is
+  bool modelled = false;         // the load is the modelled torque
   std::vector<double> cycles;    // per joint, `ripples` each [1/rad]
   std::size_t ripples = 0;
   double play = 0.0;  // [rad]
@@ -44,10 +43,10 @@ class FrictionBasis {
            loaded.size();
   }
 
-  // Columns [loaded_at, smooth()) are those of them that are proportional to the load.
+  // Columns [loaded_at, smooth()) are the load-dependent ones among them.
   std::size_t loaded_at() const { return smooth() - 1 - loaded.size(); }
 
-  // Numbers of memory a joint: the followed position, the bristles, the stops' rests.
+  // State variables of a joint: the followed position, the bristles, the stops' rests.
   std::size_t memory() const { return 1 + bristles.size() + stops.size(); }
 
   void reset(double q, double* memory) const {

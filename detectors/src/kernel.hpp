@@ -1,10 +1,10 @@
-// The SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and sums of it, the scaling of residuals and the
-// window over them: what turns residuals into the score of a kernel machine. Nothing here is of
-// Python, and nothing is allocated after construction.
+// From residuals to the score of a kernel machine: the scaling of residuals, the window over them,
+// the SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and its sums. Nothing here depends on Python, and
+// nothing is allocated after construction.
 //
-// Lanes run over support vectors: every lane does the same arithmetic in the same order whatever
-// the vector width, so that all code paths give the same bits. A result depends on its row alone,
-// so that any number of threads and online evaluation give the same bits too.
+// The lanes hold support vectors. Every lane does the same arithmetic in the same order at any
+// vector width, so all code paths give the same bits. A result depends on its row alone, so any
+// number of threads and online evaluation give the same bits, too.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace tauguard::detectors {
 
-// Four lanes at once; the compiler makes one or two machine vectors of it.
+// Four lanes; the compiler maps them to one or two machine vectors.
 typedef double Four __attribute__((vector_size(32)));
 constexpr std::size_t fours = 4, lanes = 4 * fours;
 
@@ -28,8 +28,7 @@ inline Four load_four(const double* p) {
   return v;
 }
 
-// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of lanes vectors of d numbers, lane
-// last.
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2. The z_i are stored as (blocks, d, lanes).
 double weighted_sum(const double* x, const double* vectors, const double* coef, std::size_t blocks,
                     std::size_t d, double inv);
 
@@ -37,7 +36,7 @@ double weighted_sum(const double* x, const double* vectors, const double* coef, 
 // coefficients.
 class KernelSum {
  public:
-  // `vectors` are rows of d numbers, one a coefficient; sigma > 0.
+  // `vectors`: one row of d numbers per coefficient; sigma > 0.
   KernelSum(const double* vectors, const double* coef, std::size_t count, std::size_t d,
             double intercept, double sigma)
       : d_(d),
@@ -64,15 +63,14 @@ class KernelSum {
   std::vector<double> vectors_, coef_;
 };
 
-// Terms of the noise model: 1, own speed, and what the estimator says of the motion, a row of n
-// each.
+// Terms of the noise model, a row of n each: 1, the joint's speed, and the estimator's motion rows.
 constexpr std::size_t motion_rows = 4, noise_terms = 2 + motion_rows;
 
-// Residuals of the chosen joints in units of their noise, row by row.
+// Residuals of the chosen joints in units of their noise, one row at a time.
 class Scaling {
  public:
-  // weights: of the noise model, a row of noise_terms a joint; none: the residual in N m times
-  // `factor`.
+  // weights: of the noise model, a row of noise_terms per joint. Without weights the result is the
+  // residual [N m] times `factor`.
   Scaling(std::vector<std::int64_t> joints, std::vector<double> weights, double units,
           double factor, bool compress)
       : joints_(std::move(joints)),
@@ -82,7 +80,7 @@ class Scaling {
         compress_(compress) {}
 
   std::size_t columns() const { return joints_.size(); }
-  // Whether it is made for an arm of n joints.
+  // Whether it fits an arm of n joints.
   bool fits(std::size_t n) const {
     for (const auto j : joints_)
       if (j < 0 || static_cast<std::size_t>(j) >= n) return false;
@@ -113,8 +111,8 @@ class Scaling {
   bool compress_;
 };
 
-// The window that ends with the latest row of a signal: `count` rows `lag` apart, oldest first, one
-// column after the other; rows before the first are the first.
+// The window that ends with the latest row of a signal: `count` rows, `lag` apart, oldest first,
+// stored column by column. The first row stands for the rows before it.
 class Window {
  public:
   Window(std::size_t columns, std::size_t lag, std::size_t count)

@@ -1,6 +1,5 @@
-// Free, collision or fault: a detector on samples that cannot always be believed. From a sample to
-// the answer nothing is allocated, and the work is bounded: at most `span` seconds of samples are
-// interpolated.
+// Free, collision or fault: a detector together with the checks of its samples. A sample allocates
+// nothing, and its work is bounded: at most `span` seconds of samples are interpolated.
 #pragma once
 
 #include <cmath>
@@ -17,18 +16,18 @@ enum class State : int { free, collision, fault };
 
 struct Thought {
   State state = State::free;
-  bool alarm = false;  // during a fault: it was up when the fault began
-  double score = 0;    // the last one known
-  Verdict why;         // what is wrong, or was
+  bool alarm = false;  // during a fault: whether it was up when the fault began
+  double score = 0;    // the last known score
+  Verdict why;         // the present or the last fault
   bool settling = false;
 };
 
 struct MonitorSettings {
   double dt = 0;       // of the samples [s]
   double settle = 0;   // of the detector [s]
-  double span = 0;     // an alarm so soon before a fault is the fault's own [s]
-  double window = 0;   // after a bridged fault nothing is judged for so long [s]
-  double bridged = 0;  // samples in a row that are interpolated at most
+  double span = 0;     // an alarm within this time before a fault is caused by it [s]
+  double window = 0;   // time after a bridged fault in which nothing is judged [s]
+  double bridged = 0;  // largest number of successive samples that are interpolated
 };
 
 class Monitor {
@@ -92,15 +91,15 @@ class Monitor {
     return torques_.step(out_.data(), current, dt);
   }
 
-  // Interpolates the samples that are missing before this one and returns their number; begins anew
-  // if they are too many.
+  // Interpolates the samples that are missing before this one and returns their number. If they are
+  // too many, the detector starts again.
   double bridge(double t, const double* q, const double* qd, const double* current) {
     if (!known_) {
       ready_ = t + set_.settle;
       bad_ = false;
       return 0;
     }
-    // To even where it lies between two, as the batch form rounds.
+    // Rounds half to even, as the batch form does.
     const double missing = std::max(0.0, std::nearbyint((t - time_) / set_.dt) - 1);
     if (t < time_ || missing > std::max(set_.bridged, set_.span / set_.dt)) {
       alarm_.reset();

@@ -34,7 +34,7 @@ class Observer {
   bool started() const { return started_; }
   const std::vector<double>& residual() const { return residual_; }
 
-  // Starts with a residual of 0. The next step uses these values as those of the last sample.
+  // Starts with a residual of 0; these values are those of the last sample.
   void reset(const double* q, const double* qd, const double* tau) {
     chain_.momentum(q, qd, p_before_.data(), beta_before_.data(), work_);
     for (std::size_t j = 0; j < gain_.size(); ++j) {
@@ -61,7 +61,7 @@ class Observer {
     return residual_.data();
   }
 
-  // What it remembers between two steps, as numbers.
+  // Its state between two steps, as numbers.
   std::vector<double> state() const {
     std::vector<double> out = {started_ ? 1.0 : 0.0};
     for (const auto* v : {&p_before_, &beta_before_, &tau_before_, &residual_})

@@ -38,21 +38,21 @@ namespace tauguard::detectors {
 
 struct RegimeBounds {
   static constexpr std::size_t terms = 5;  // of the bound in motion
-  std::vector<double> rest;                // of a joint that has long been at rest [N m], n
-  std::vector<double> stop;                // what motion of any joint adds to it [N m], n
-  std::vector<double> least;               // in motion at least [N m], n
+  std::vector<double> rest;       // bound of a joint that has been at rest for long [N m], n
+  std::vector<double> stop;       // added while any joint moves [N m], n
+  std::vector<double> least;      // least bound in motion [N m], n
   std::vector<double> moving;     // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
-  std::vector<double> start;      // what a start adds [N m], n
-  std::vector<double> turned;     // what a contact leaves on a joint that it turned [N m], n
+  std::vector<double> start;      // added at a start [N m], n
+  std::vector<double> turned;     // added after a contact has turned the joint [N m], n
   std::vector<double> low, high;  // positions of joints whose motion is not known [rad], n
   static constexpr double anywhere = 1e6;  // `high` of all others [rad]
 };
 
 class Regimes {
  public:
-  static constexpr double wait = 0.1;        // a joint that is slow for so long [s] is at rest
-  static constexpr double gives = 0.2;       // a standing arm yields to a push for so long [s]
-  static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
+  static constexpr double wait = 0.1;   // a joint that has been slow for this time is at rest [s]
+  static constexpr double gives = 0.2;  // time for which a standing arm yields to a push [s]
+  static constexpr double full_speed = 0.1;  // speed from which `stop` counts fully [rad/s]
   static constexpr double settling = 0.3;    // of the observer at the beginning [s]
   static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
@@ -60,8 +60,9 @@ class Regimes {
   static constexpr double after = 1.0;       // only change away counts, after a contact [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double released = 0.5;    // of a contact's peak
-  static constexpr double kept = 1.0;        // still for so long: static friction keeps it [s] ...
-  static constexpr double remembers = 10.0;  // ... and letting go so much later is no contact [s]
+  static constexpr double kept = 1.0;  // unchanged for this time: static friction keeps it [s] ...
+  static constexpr double remembers =
+      10.0;  // ... and a release within this time after it is no contact [s]
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s] ...
   static constexpr double forget = 1.05;  // rate at which the shortest interval is forgotten
   static constexpr int samples = 3;       // ... and in samples at least
@@ -249,9 +250,9 @@ class Regimes {
   bool touched_ = false;                // a contact with joints at rest lasts
   std::size_t lead_ = 0;                // the joint of its largest ratio ...
   double peak_ = 0.0, still_ = 0.0;     // ... and that ratio; unchanged for so long [s]
-  double stirred_ = 1.0, usual_ = 1.0;  // interval of samples, gaps aside [s]
-  double age_ = 0.0;                    // since the first sample [s]
-  double unknown_for_ = 0.0;            // nothing is judged for so long [s]
+  double stirred_ = 1.0, usual_ = 1.0;  // sample interval without gaps [s]
+  double age_ = 0.0;                    // time since the first sample [s]
+  double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]
   bool elsewhere_ = false;              // a joint stands where no log shows it
 };
 

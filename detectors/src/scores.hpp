@@ -1,4 +1,5 @@
-// Streams of scores: one number a sample, bounded work, nothing allocated after construction.
+// Streams of scores: one number per sample. The work is bounded, and nothing is allocated after
+// construction.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,7 @@ class Scores {
   virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
 };
 
-// The largest of some numbers; NaN where one is.
+// The largest of some numbers; NaN if one is NaN.
 inline double largest(const double* x, std::size_t n) {
   double most = x[0];
   for (std::size_t k = 1; k < n; ++k)
@@ -46,7 +47,7 @@ class FreeScores final : public Scores {
   FreeMotion stream_;
 };
 
-// What the estimator cannot explain, in units of its noise.
+// The residual that the estimator does not explain, in units of its noise.
 class ScaledResidual {
  public:
   ScaledResidual(Estimator estimator, Scaling scaling)
@@ -76,7 +77,7 @@ class ScaledResidual {
   std::vector<double> residual_, unexplained_, motion_, row_;
 };
 
-// The largest ratio of size to limit; `x` is overwritten.
+// The largest ratio of |x| to its limit; `x` is overwritten.
 inline double largest_ratio(std::vector<double>& x, const std::vector<double>& limits) {
   for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::fabs(x[k]) / limits[k];
   return largest(x.data(), x.size());
@@ -85,7 +86,7 @@ inline double largest_ratio(std::vector<double>& x, const std::vector<double>& l
 // The largest ratio of scaled residual to limit.
 class LimitScores final : public Scores {
  public:
-  // `limits`: one a column of the residual.
+  // `limits`: one per column of the residual.
   LimitScores(ScaledResidual residual, std::vector<double> limits)
       : residual_(std::move(residual)), limits_(std::move(limits)), ratio_(limits_.size()) {}
 
@@ -102,7 +103,7 @@ class LimitScores final : public Scores {
   std::vector<double> limits_, ratio_;
 };
 
-// The severity x that has the target x / (1 + x). Targets above 0.98 are taken as 0.98.
+// The severity x of a target x / (1 + x). Targets above 0.98 count as 0.98.
 inline double severity(double target) {
   const double bounded = std::min(target, 0.98);
   return bounded / (1 - bounded);
@@ -117,8 +118,8 @@ struct Floor {
 // A kernel machine on windows of the scaled residual.
 class KernelScores final : public Scores {
  public:
-  // The window has a column a column of the residual, the kernel the window's size. Of a graded
-  // machine the score is the severity.
+  // `window` has one column per column of the residual; the kernel takes the whole window. The
+  // score of a graded machine is the severity.
   KernelScores(ScaledResidual residual, Window window, KernelSum kernel, bool graded, Floor floor)
       : residual_(std::move(residual)),
         window_(std::move(window)),

@@ -1,5 +1,5 @@
-// The Kalman filter for what a model does not know and what changes slowly: a payload, which loads
-// every joint, and errors of each joint's own.
+// The Kalman filter of slowly changing errors of a model: a payload, which loads every joint, and
+// errors that concern one joint each.
 //
 // Each state is an Ornstein-Uhlenbeck process with a standard deviation and a time constant.
 // Without measurements it decays to zero, the calibrated model. A deviation of 0 removes a state. A

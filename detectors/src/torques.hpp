@@ -1,4 +1,4 @@
-// Whether the drives' torques are those of this arm's motion: signs, exchanged joints, gains, load.
+// Checks whether the drives' torques fit the arm's motion: signs, exchanged joints, gains, load.
 //
 // `given` is the drives' torque by the measured currents. `needed` = r + given is the torque that
 // the motion takes by the model. Both pass the observer's filter. The ratio E[given needed] /
@@ -20,7 +20,7 @@ struct TorqueBounds {
   double rate = 20;   // of the observer that gives the residual [1/s]
   double fast = 0.5;  // time constants of the averages [s]
   double slow = 4.0;
-  double heard = 8.0;           // times its noise that a joint needs for a ratio to mean anything
+  double heard = 8.0;           // least signal for a ratio, as a multiple of the joint's noise
   std::vector<double> opposed;  // fast ratio below which a torque works against the motion, n
   std::vector<double> least;    // slow ratios outside of which a torque has another size, n
   std::vector<double> most;
@@ -46,7 +46,7 @@ class TorqueCheck {
     for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) std::fill(v->begin(), v->end(), 1.0);
   }
 
-  // The least fast, the least slow and the largest slow ratio so far, n each; 1 where none counted.
+  // The smallest fast, smallest slow and largest slow ratio so far, n each; 1 where there was none.
   std::vector<double> extremes() const {
     std::vector<double> all(fast_least_);
     all.insert(all.end(), slow_least_.begin(), slow_least_.end());
