@@ -42,4 +42,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """All public names, loaded or not."""
-    return sorted({*globals(), *_MODULES})
+    return sorted({*globals(), *_MODULES} - {"Any", "importlib"})

@@ -90,9 +90,13 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
 
 
 def make_physics(model: mujoco.MjModel, data: mujoco.MjData) -> _plant.Physics:
-    """MuJoCo's step and kinematics of ``data`` for native code, which keeps both alive."""
+    """MuJoCo's functions on ``data`` for native code, which keeps both alive."""
     return _plant.Physics(
-        model, data, step=function_address("mj_step"), kinematics=function_address("mj_kinematics")
+        model,
+        data,
+        step=function_address("mj_step"),
+        kinematics=function_address("mj_kinematics"),
+        distance=function_address("mj_geomDistance"),
     )
 
 

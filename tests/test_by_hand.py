@@ -38,7 +38,8 @@ def test_dir_lists_every_public_name_and_loads_none(package):
     code = (
         f"import sys, tauguard.{package} as p; before = set(sys.modules); names = dir(p);"
         "assert set(p.__all__) <= set(names), set(p.__all__) - set(names);"
-        "assert set(sys.modules) == before"
+        "assert set(sys.modules) == before;"
+        "assert not {'Any', 'TYPE_CHECKING', 'importlib', 'on_demand'} & set(names)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -47,6 +48,7 @@ def test_the_package_itself_completes_without_loading_a_package():
     code = (
         "import sys, tauguard; names = dir(tauguard);"
         "assert {'cloth', 'envs', 'plot', 'residual'} <= set(names);"
+        "assert not {'Any', 'TYPE_CHECKING', 'importlib', 'version'} & set(names);"
         "assert 'mujoco' not in sys.modules and 'tauguard.envs' not in sys.modules;"
         "assert tauguard.rigid.__name__ == 'tauguard.rigid'"
     )

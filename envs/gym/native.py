@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.gym.actions import Entry, action_scale
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.people import anatomy
+from tauguard.envs.gym.placing import things_around
 from tauguard.envs.gym.regions import RegionInfo
 from tauguard.envs.gym.second_arm import ARMS
 from tauguard.envs.gym.settings import CONTROLS
 from tauguard.models import Person
+from tauguard.models.scene import people_parts
 
 
 def controls(compiled: CompiledScene) -> _plant.Controls:
@@ -49,7 +53,7 @@ def surroundings(
         )
         for i, joint in enumerate(compiled.ids())
     ]
-    labels = scene.spec.labels
+    labels, barriers = scene.spec.labels, things_around(scene, model) if people else []
     return _plant.Surroundings(
         links=links,
         gravity=model.opt.gravity.tolist(),
@@ -63,7 +67,17 @@ def surroundings(
         arms_sensor=_sensor(model, ARMS) if labels and compiled.arms == 2 else -1,
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],
+        people_geoms=[int(model.geom(part.name).id) for part in people_parts(scene.spec)],
+        barriers=barriers,
+        boxes=_boxes(model, barriers),
     )
+
+
+def _boxes(model: mujoco.MjModel, geoms: list[int]) -> Array:
+    """Centre and half extents of geoms in their own frames [m], (k, 6); a plane has no end."""
+    boxes: Array = model.geom_aabb[geoms].reshape(-1, 6)
+    boxes[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_PLANE, 3:] = np.inf
+    return boxes
 
 
 def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:

@@ -230,7 +230,7 @@ def check_clear(
     raise StartsInContact(kind, link, name, float(depth[k]))
 
 
-def _around(scene: Scene, model: mujoco.MjModel) -> list[int]:
+def things_around(scene: Scene, model: mujoco.MjModel) -> list[int]:
     """The geoms of the table and of objects, which people do not touch in the simulation."""
     spec = scene.spec
     around = [model.geom("table").id] if spec.table is not None else []
@@ -248,7 +248,7 @@ def blocked_ground(scene: Scene) -> Array:
     low = min((p.floor for p in scene.spec.people), default=0.0)
     high = max((p.floor + p.stature for p in scene.spec.people), default=0.0)
     rows = []
-    for geom in _around(scene, model):
+    for geom in things_around(scene, model):
         body, turned = int(model.geom_bodyid[geom]), data.geom_xmat[geom].reshape(3, 3)
         middle = data.geom_xpos[geom] + turned @ model.geom_aabb[geom, :3]
         half = np.abs(turned) @ model.geom_aabb[geom, 3:]
@@ -261,7 +261,7 @@ def blocked_ground(scene: Scene) -> Array:
 
 def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
     """Whether people overlap no table and no object."""
-    spec, around = scene.spec, _around(scene, model)
+    spec, around = scene.spec, things_around(scene, model)
     for part in people_parts(spec) if around else ():
         own = model.geom(part.name).id
         for geom in around:

@@ -1,80 +1,19 @@
-// A person's motion: reaches along minimum-jerk paths (Flash & Hogan 1985), walks between places,
-// draws back after a touch. It depends on a script, the time and the touches alone; the result is a
-// pose of every capsule of tauguard.models.person, in that order.
+// A person's motion: reaches, walks between places, drawing back after a touch. It depends on the
+// script, the time, the touches and what stands in the way; the result is a pose of every capsule
+// of tauguard.models.person, in that order.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
+#include <utility>
 
-#include "tauguard/geometry/vec3.hpp"
+#include "anatomy.hpp"
+#include "barriers.hpp"
 
 namespace tauguard::envs {
-
-using geometry::load;
-using geometry::norm;
-using geometry::Vec3;
-
-enum Segment { skull, neck, chest, abdomen, pelvis, limbs };
-// Of a limb, after `limbs`; the left ones come first.
-enum Limb { upper_arm, lower_arm, hand, thigh, lower_leg, per_side };
-constexpr int person_segments = limbs + 2 * per_side;
-
-// Lengths [m], place and habits; see tauguard.models.Person.
-struct Anatomy {
-  double hip_height, trunk, shoulder, hip_half, neck, head;
-  double upper_arm, lower_arm, hand, grip, thigh, shank;
-  double floor, facing, hand_speed, walk_speed, reaction_time;
-  double step_back;  // after a touch [m]
-  bool seated, hanging, reacts;
-};
-
-// The script, which is repeated. A row of `reaches` is one reach of a hand: wait [s], place [m],
-// hold [s]. A row of `walks` is one walk: wait [s], place [m]; the first row is where the person
-// starts.
-struct Script {
-  const double *reaches = nullptr, *walks = nullptr;
-  std::size_t reach_rows = 0, walk_rows = 0;
-};
-
-constexpr int reach_width = 5, walk_width = 3;
-// Peak over mean speed of a minimum-jerk path.
-constexpr double peak_over_mean = 1.875;
-// After a touch the hand withdraws at this multiple of its speed and stays away for this long [s].
-// The person steps back within this time, and stays there for this long [s].
-constexpr double startle = 1.6, quiet = 1.0;
-constexpr double step_time = 0.6, step_lasts = 2.0;
-// A seated person leans back instead, by this angle per metre of a step [rad/m], at most at this
-// rate [rad/s].
-constexpr double lean_back = 1.2, lean_rate = 1.2;
-// Smallest force that a person feels [N]; turning rate [rad/s]. The body leans towards a goal
-// farther than the fraction `comfort` of the arm's length, which stretches up to `stretch`.
-constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
-
-inline double minimum_jerk(double u) {
-  u = std::min(std::max(u, 0.0), 1.0);
-  return u * u * u * (10.0 + u * (6.0 * u - 15.0));
-}
-
-// Going from one value to another; done at `began + lasts`.
-struct Course {
-  double from = 0, to = 0, began = 0, lasts = 1;
-  double at(double t) const { return from + (to - from) * minimum_jerk((t - began) / lasts); }
-  bool done(double t) const { return t - began >= lasts; }
-  template <class Each>
-  void visit(Each&& each) {
-    each(from), each(to), each(began), each(lasts);
-  }
-};
-
-// A hand rests beside the body, goes to a place in the world, stays there and comes back.
-struct Reach {
-  enum Phase { resting, going, holding, returning };
-  int phase = resting, next = 0;
-  double until = 0, hold = 0, began = 0, lasts = 1;  // [s]
-  Vec3 from, goal;
-};
 
 class Person {
  public:
@@ -102,10 +41,16 @@ class Person {
       hands_[side].until = reach_row(side, 0)[0];
     }
     lean_ = 0;
+    held_up_.fill(false), raised_.fill(0.0);
     pose(0.0, 0.0);
   }
 
-  void bind(const Script& script) { script_ = script; }
+  // `geoms`: of the capsules, in their order, where there are barriers.
+  void bind(const Script& script, const Barriers* barriers, const int* geoms) {
+    script_ = script;
+    barriers_ = barriers && !barriers->all.empty() ? barriers : nullptr;
+    geoms_ = geoms;
+  }
 
   // The state at time t [s], dt after the last one.
   void advance(double t, double dt) {
@@ -142,6 +87,8 @@ class Person {
     each(turned_), each(stride_), each(swing_), each(lowered_), each(lean_);
     for (double& t : touched_) each(t);
     for (Vec3& g : grip_) visit(g, each);
+    for (bool& held : held_up_) each(held);
+    for (double& height : raised_) each(height);
     visit(axes_.forward, each), visit(axes_.left, each), visit(axes_.hip, each);
   }
 
@@ -160,6 +107,8 @@ class Person {
  private:
   Anatomy body_{};
   Script script_;
+  const Barriers* barriers_ = nullptr;
+  const int* geoms_ = nullptr;
   std::array<Reach, 2> hands_;
   std::array<Vec3, 2> grip_;  // where the hands are
   Vec3 from_, to_;            // of a walk
@@ -170,6 +119,8 @@ class Person {
   double turned_ = 0, stride_ = 0, swing_ = 0;  // yaw [rad], phase of the gait [rad], swing [rad]
   double lean_ = 0;                             // of the trunk, forward [rad]
   double lowered_ = 0;                          // the hands: 0 in front, 1 beside the body
+  std::array<bool, 2> held_up_{};               // an object keeps the hand from where it would be
+  std::array<double, 2> raised_{};  // so high the hand is above its way, to pass an object [m]
   std::array<double, person_segments> touched_{};  // when [s]; -1: not
 
   template <class Each>
@@ -221,6 +172,7 @@ class Person {
     } else if (h.phase == Reach::going && t - h.began >= h.lasts) {
       h.phase = Reach::holding;
       h.until = t + h.hold;
+      if (held_up_[side]) h.goal = grip_[side];
     } else if (h.phase == Reach::holding && t >= h.until) {
       withdraw(side, t, body_.hand_speed, reach_row(side, h.next)[0]);
     } else if (h.phase == Reach::returning && t - h.began >= h.lasts) {
@@ -229,7 +181,7 @@ class Person {
   }
 
   void walk(double t, double dt) {
-    if (!walking_ && t >= until_ && script_.walk_rows > 1) {
+    if (!walking_ && t >= until_ && script_.walk_rows > 1 && hands_are_back(t)) {
       next_walk_ = (next_walk_ + 1) % static_cast<int>(script_.walk_rows);
       from_ = to_;
       to_ = walk_place(next_walk_);
@@ -247,6 +199,18 @@ class Person {
     const double speed = walking_ ? norm(path) * (path_.at(t) - path_.at(t - dt)) / dt : 0.0;
     swing_ = 0.4 * std::min(1.0, speed / 1.0);
     stride_ += speed * dt * 4.0;  // [rad/m]: a step of 0.8 m
+  }
+
+  // Where there are objects, a person takes the hands back before walking off, or stays.
+  bool hands_are_back(double t) {
+    if (!barriers_) return true;
+    bool back = true;
+    for (int side = 0; side < 2; ++side) {
+      withdraw(side, t, body_.hand_speed, patience);
+      back = back && hands_[side].phase == Reach::resting && !held_up_[side];
+    }
+    if (!back && t > until_ + patience) until_ = t + patience;
+    return back;
   }
 
   void turn(double wanted, double dt) {
@@ -321,6 +285,7 @@ class Person {
     axes_.left = {-std::sin(turned_), std::cos(turned_), 0};
     axes_.hip = mix(from_, to_, walking_ ? path_.at(t) : 1.0);
     if (!body_.seated) axes_.hip += -back * axes_.forward;
+    const std::array<Vec3, 2> last = grip_;
     const Vec3 goals[2] = {hand_place(0, t), hand_place(1, t)};
     double lean = 0.0;
     for (int side = 0; side < 2; ++side) {
@@ -332,20 +297,77 @@ class Person {
       lean = std::max(lean, std::min(most_lean, far / body_.trunk));
     }
     if (body_.seated) lean -= lean_back * back;
-    lean_ += std::min(std::max(lean - lean_, -lean_rate * dt), lean_rate * dt);
-    const Vec3 up = std::sin(lean_) * axes_.forward + std::cos(lean_) * Vec3{0, 0, 1};
-    const Vec3 ahead = std::cos(lean_) * axes_.forward - std::sin(lean_) * Vec3{0, 0, 1};
-    trunk_and_head(up, ahead);
-    const Vec3 neck_base = axes_.hip + body_.trunk * up;
+    const double before = std::exchange(
+        lean_, lean_ + std::min(std::max(lean - lean_, -lean_rate * dt), lean_rate * dt));
+    trunk_and_head();
+    if (barriers_ && lean_ > before &&
+        nearest({skull, neck, chest, abdomen}).distance < clearance) {
+      lean_ = before;
+      trunk_and_head();
+    }
+    const Vec3 up = trunk_axis(), neck_base = axes_.hip + body_.trunk * up;
     for (int side = 0; side < 2; ++side) {
       const double sign = side == 0 ? 1.0 : -1.0;
-      arm(side, neck_base + sign * body_.shoulder * axes_.left - 0.04 * body_.trunk * up,
-          goals[side], sign);
+      const Vec3 shoulder =
+          neck_base + sign * body_.shoulder * axes_.left - 0.04 * body_.trunk * up;
+      arm(side, shoulder, goals[side], sign);
+      if (barriers_ && dt > 0) keep_clear(side, shoulder, goals[side], sign, last[side], dt);
       leg(side, sign);
     }
   }
 
-  void trunk_and_head(Vec3 up, Vec3 ahead) {
+  Vec3 trunk_axis() const {
+    return std::sin(lean_) * axes_.forward + std::cos(lean_) * Vec3{0, 0, 1};
+  }
+
+  // The nearest barrier to some of the capsules, within their clearance.
+  Gap nearest(std::initializer_list<int> segments) const {
+    Gap out;
+    for (const int k : segments) {
+      const Gap gap = barriers_->nearest(geoms_[k], centre[k], quat_wxyz[k], clearance);
+      if (gap.distance < out.distance) out = gap;
+    }
+    return out;
+  }
+
+  Gap nearest_to_arm(int side) const {
+    const int at = limbs + side * per_side;
+    return nearest({at + upper_arm, at + lower_arm, at + hand});
+  }
+
+  // An arm that has just been posed towards a goal, from where the palm was last. A palm that is
+  // held up follows its goal no faster than a startled hand, slides along what is in the way and
+  // climbs over it; so it passes through nothing.
+  void keep_clear(int side, Vec3 shoulder, Vec3 goal, double sign, Vec3 last, double dt) {
+    Vec3 want = goal;
+    if (held_up_[side]) {
+      want.z += raised_[side];
+      const Vec3 path = want - last;
+      const double far = norm(path), most = startle * body_.hand_speed * dt;
+      if (far > most) want = last + (most / far) * path;
+      arm(side, shoulder, want, sign);
+    }
+    Gap gap = nearest_to_arm(side);
+    const bool blocked = gap.distance < clearance;
+    for (int k = 0; k < 8 && gap.distance < clearance; ++k) {
+      want = grip_[side] + (clearance - gap.distance) * gap.away;
+      arm(side, shoulder, want, sign);
+      gap = nearest_to_arm(side);
+    }
+    if (gap.distance < 0) {
+      const double pushed = gap.distance;
+      arm(side, shoulder, last, sign);
+      if (nearest_to_arm(side).distance < pushed) arm(side, shoulder, want, sign);
+    }
+    const bool climbs = blocked && hands_[side].phase != Reach::holding;
+    const double height = raised_[side] + (climbs ? climb : -descend) * dt;
+    raised_[side] = std::min(std::max(height, 0.0), highest_climb);
+    held_up_[side] = blocked || raised_[side] > 0 || norm(grip_[side] - goal) > 1e-3;
+  }
+
+  void trunk_and_head() {
+    const Vec3 up = trunk_axis();
+    const Vec3 ahead = std::cos(lean_) * axes_.forward - std::sin(lean_) * Vec3{0, 0, 1};
     const auto across = [&](int segment, double height) {
       const Vec3 middle = axes_.hip + height * body_.trunk * up;
       place(segment, middle - 0.1 * axes_.left, middle + 0.1 * axes_.left);

@@ -1,8 +1,9 @@
-// MuJoCo as the plant sees it: two of its functions by address and arrays of one model's data.
+// MuJoCo as the plant sees it: three of its functions by address and arrays of one model's data.
 // Nothing here depends on MuJoCo's headers, on the layout of its structs or on Python; the owner
 // that comes with them keeps the arrays alive.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -43,11 +44,15 @@ struct Engine {
   const void* model = nullptr;
   void* data = nullptr;
   Function step = nullptr, kinematics = nullptr;
+  using Distance = double (*)(const void*, const void*, int, int, double, double*);
+  Distance distance = nullptr;
   std::size_t nq = 0, nv = 0;
   double *qpos = nullptr, *qvel = nullptr, *qfrc_applied = nullptr, *xfrc_applied = nullptr;
   double *sensordata = nullptr, *site_xpos = nullptr, *xpos = nullptr, *xquat = nullptr;
   double *xmat = nullptr, *xanchor = nullptr, *xaxis = nullptr;
   double *mocap_pos = nullptr, *mocap_quat = nullptr;
+  double *geom_xpos = nullptr, *geom_xmat = nullptr;
+  const double* geom_rbound = nullptr;
   std::shared_ptr<const void> owner;
 };
 
@@ -68,6 +73,42 @@ class Physics {
   double* mocap_position(int mocap) const { return e_.mocap_pos + 3 * mocap; }
   double* mocap_quaternion(int mocap) const { return e_.mocap_quat + 4 * mocap; }
   const double* axis(int joint) const { return e_.xaxis + 3 * joint; }
+
+  const double* geom_position(int geom) const { return e_.geom_xpos + 3 * geom; }
+  const double* geom_rotation(int geom) const { return e_.geom_xmat + 9 * geom; }
+  double bounding_radius(int geom) const { return e_.geom_rbound[geom]; }
+
+  // Between two geoms, up to `most` [m], and the nearest points of both.
+  double distance(int first, int second, double most, double* points) const {
+    return e_.distance(e_.model, e_.data, first, second, most, points);
+  }
+
+  // While one lives, a geom is elsewhere.
+  class Moved {
+   public:
+    Moved(const Physics& physics, int geom, const double* centre, const double* quat_wxyz)
+        : place_(physics.e_.geom_xpos + 3 * geom), turn_(physics.e_.geom_xmat + 9 * geom) {
+      std::copy_n(place_, 3, before_.data());
+      std::copy_n(turn_, 9, before_.data() + 3);
+      std::copy_n(centre, 3, place_);
+      const double w = quat_wxyz[0], x = quat_wxyz[1], y = quat_wxyz[2], z = quat_wxyz[3];
+      const double rows[9] = {
+          1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+      std::copy_n(rows, 9, turn_);
+    }
+    ~Moved() {
+      std::copy_n(before_.data(), 3, place_);
+      std::copy_n(before_.data() + 3, 9, turn_);
+    }
+    Moved(const Moved&) = delete;
+    Moved& operator=(const Moved&) = delete;
+
+   private:
+    double *place_, *turn_;
+    std::array<double, 12> before_;
+  };
 
   void step() const { e_.step(e_.model, e_.data); }
   void kinematics() const { e_.kinematics(e_.model, e_.data); }

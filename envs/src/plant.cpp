@@ -22,7 +22,7 @@ namespace {
 
 // The arrays that MuJoCo's Python binding shows; model and data are kept alive.
 Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
-                   std::uintptr_t kinematics) {
+                   std::uintptr_t kinematics, std::uintptr_t distance) {
   Engine e;
   const auto address = [](const nb::object& of) {
     return nb::cast<std::uintptr_t>(of.attr("_address"));
@@ -31,6 +31,7 @@ Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
   e.data = reinterpret_cast<void*>(address(data));
   e.step = reinterpret_cast<Engine::Function>(step);
   e.kinematics = reinterpret_cast<Engine::Function>(kinematics);
+  e.distance = reinterpret_cast<Engine::Distance>(distance);
   const auto array = [&](const char* name) { return nb::cast<Array>(data.attr(name)); };
   e.nq = array("qpos").size(), e.nv = array("qvel").size();
   e.qpos = array("qpos").data(), e.qvel = array("qvel").data();
@@ -39,6 +40,8 @@ Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
   e.xpos = array("xpos").data(), e.xquat = array("xquat").data(), e.xmat = array("xmat").data();
   e.xanchor = array("xanchor").data(), e.xaxis = array("xaxis").data();
   e.mocap_pos = array("mocap_pos").data(), e.mocap_quat = array("mocap_quat").data();
+  e.geom_xpos = array("geom_xpos").data(), e.geom_xmat = array("geom_xmat").data();
+  e.geom_rbound = nb::cast<Array>(model.attr("geom_rbound")).data();
   e.owner = std::make_shared<nb::tuple>(nb::make_tuple(std::move(model), std::move(data)));
   return Physics(std::move(e));
 }
@@ -156,7 +159,8 @@ void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
 
 void bind_plant(nb::module_& m) {
   nb::class_<Physics>(m, "Physics")
-      .def(nb::new_(&physics_of), "model"_a, "data"_a, nb::kw_only(), "step"_a, "kinematics"_a);
+      .def(nb::new_(&physics_of), "model"_a, "data"_a, nb::kw_only(), "step"_a, "kinematics"_a,
+           "distance"_a);
   nb::class_<Plant>(m, "Plant")
       .def(
           "__init__",

@@ -37,7 +37,10 @@ class Plant {
     around_ = std::move(around);
     around_.arms.physics = &physics_;
     rows_ = std::move(rows);
-    for (std::size_t p = 0; p < around_.people.size(); ++p) around_.people[p].bind(script(p));
+    around_.barriers.physics = &physics_;
+    for (std::size_t p = 0; p < around_.people.size(); ++p)
+      around_.people[p].bind(script(p), &around_.barriers,
+                             around_.people_geoms.data() + p * person_segments);
   }
 
   std::size_t joints() const { return drives_.size(); }

@@ -28,6 +28,8 @@ struct Surroundings {
   std::vector<double> low, high;  // of the observation
   int sensor_begin = -1;          // of the links' contact sensors; -1: none
   int arms_sensor = -1;           // of what two arms do to one another; -1: none
+  std::vector<int> people_geoms;  // of the people's capsules, person after person
+  Barriers barriers;              // which people's arms go round
 };
 
 // Where an environment's results go: rows of arrays that Python owns.

@@ -103,8 +103,17 @@ void bind_surroundings(nb::module_& m) {
           "__init__",
           [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
              std::vector<Region> regions, int people_begin, const std::vector<Anatomy>& people,
-             int sensor_begin, int arms_sensor, Numbers low, Numbers high) {
+             int sensor_begin, int arms_sensor, Numbers low, Numbers high,
+             std::vector<int> people_geoms, const std::vector<int>& barriers, Matrix boxes) {
             if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
+            const bool each = people.empty() || barriers.empty() ||
+                              people_geoms.size() == people.size() * person_segments;
+            if (!each || boxes.shape(0) != barriers.size() || boxes.shape(1) != 6)
+              throw nb::value_error("people_geoms, barriers: expected a geom a capsule and a box");
+            Barriers about;
+            for (std::size_t k = 0; k < barriers.size(); ++k)
+              about.all.push_back(
+                  {barriers[k], load(boxes.data() + 6 * k), load(boxes.data() + 6 * k + 3)});
             new (self) Surroundings{
                 Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
                 std::move(tools),
@@ -114,10 +123,13 @@ void bind_surroundings(nb::module_& m) {
                 std::move(low),
                 std::move(high),
                 sensor_begin,
-                arms_sensor};
+                arms_sensor,
+                std::move(people_geoms),
+                std::move(about)};
           },
           nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "people_begin"_a,
-          "people"_a, "sensor_begin"_a, "arms_sensor"_a, "low"_a, "high"_a);
+          "people"_a, "sensor_begin"_a, "arms_sensor"_a, "low"_a, "high"_a, "people_geoms"_a,
+          "barriers"_a, "boxes"_a);
 }
 
 void bind_outputs(nb::module_& m) {

@@ -48,4 +48,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """All public names, loaded or not."""
-    return sorted({*globals(), *_PACKAGES, *_FUNCTIONS})
+    return sorted({"__version__", "environments", *_PACKAGES, *_FUNCTIONS})

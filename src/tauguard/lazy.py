@@ -29,7 +29,8 @@ def on_demand(package: str) -> Callable[[str], Any]:
         return value
 
     module = sys.modules[package]
-    vars(module)["__dir__"] = lambda: sorted(vars(module).keys() | where.keys())
+    tools = {"TYPE_CHECKING", "on_demand"}
+    vars(module)["__dir__"] = lambda: sorted((vars(module).keys() | where.keys()) - tools)
     return __getattr__
 
 

@@ -80,6 +80,8 @@ Engine engine_of(const Scene& scene) {
   e.model = scene.model, e.data = scene.data;
   e.step = reinterpret_cast<Engine::Function>(&mj_step);
   e.kinematics = reinterpret_cast<Engine::Function>(&mj_kinematics);
+  e.distance = reinterpret_cast<Engine::Distance>(&mj_geomDistance);
+  e.geom_xpos = d->geom_xpos, e.geom_xmat = d->geom_xmat, e.geom_rbound = scene.model->geom_rbound;
   e.nq = scene.model->nq, e.nv = scene.model->nv;
   e.qpos = d->qpos, e.qvel = d->qvel, e.qfrc_applied = d->qfrc_applied;
   e.xfrc_applied = d->xfrc_applied, e.sensordata = d->sensordata, e.site_xpos = d->site_xpos;
@@ -139,6 +141,9 @@ Surroundings around(const Scene& scene) {
   }
   s.people.emplace_back(Anatomy{0.9,  0.5, 0.22, 0.1, 0.09, 0.22, 0.32, 0.25,  0.18,  0.09, 0.42,
                                 0.42, 0.0, M_PI, 1.0, 0.8,  0.2,  0.3,  false, false, true});
+  for (int k = 0; k < person_segments; ++k)
+    s.people_geoms.push_back(scene.id(mjOBJ_GEOM, "part" + std::to_string(k)));
+  s.barriers.all.push_back({scene.id(mjOBJ_GEOM, "table"), {0, 0, 0}, {1, 1, 0.01}});
   s.sensor_begin = scene.model->sensor_adr[scene.id(mjOBJ_SENSOR, "on_link1")];
   return s;
 }

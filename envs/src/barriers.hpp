@@ -1,0 +1,70 @@
+// What stands in a person's way: objects and the table, whose geoms people do not touch in the
+// simulation. How far a capsule of a person is from the nearest of them, and which way is out.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "physics.hpp"
+#include "tauguard/geometry/vec3.hpp"
+
+namespace tauguard::envs {
+
+using geometry::load;
+using geometry::norm;
+using geometry::Vec3;
+
+// Distance [m], negative inside, and the direction away from the barrier; infinite: nothing near.
+struct Gap {
+  double distance = std::numeric_limits<double>::infinity();
+  Vec3 away{0, 0, 1};
+};
+
+// A geom and its box in its own frame [m].
+struct Barrier {
+  int geom = -1;
+  Vec3 centre, half;
+};
+
+class Barriers {
+ public:
+  const Physics* physics = nullptr;
+  std::vector<Barrier> all;
+
+  // Of the geom of a person, were it at this place; the smallest below `margin` [m].
+  Gap nearest(int geom, Vec3 centre, const std::array<double, 4>& quat, double margin) const {
+    Gap out;
+    const double within = physics->bounding_radius(geom) + margin;
+    const Physics::Moved there(*physics, geom, centre.data(), quat.data());
+    for (const Barrier& b : all) {
+      if (outside(b, centre) > within) continue;
+      double between[6];
+      const double distance = physics->distance(geom, b.geom, margin, between);
+      if (distance >= std::min(margin, out.distance)) continue;
+      out.distance = distance;
+      const Vec3 path = load(between) - load(between + 3);
+      const double size = norm(path);
+      out.away = size > 1e-9 ? ((distance < 0 ? -1.0 : 1.0) / size) * path : Vec3{0, 0, 1};
+    }
+    return out;
+  }
+
+ private:
+  // A lower bound on the distance of a point from a barrier [m].
+  double outside(const Barrier& b, Vec3 point) const {
+    const Vec3 d = point - load(physics->geom_position(b.geom));
+    const double* r = physics->geom_rotation(b.geom);
+    Vec3 out;
+    for (int k = 0; k < 3; ++k) {
+      const double along = r[k] * d.x + r[3 + k] * d.y + r[6 + k] * d.z;
+      out[k] = std::max(std::fabs(along - b.centre[k]) - b.half[k], 0.0);
+    }
+    return norm(out);
+  }
+};
+
+}  // namespace tauguard::envs
