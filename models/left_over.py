@@ -45,7 +45,7 @@ STOPS, STANDS = 8, 64
 HELD, FORGET, RELEASE = 0.3, 1.6, 0.2
 #: Scales of speed [rad/s] and acceleration [rad/s^2]; weights of the features.
 SPEED, ACCELERATION = 0.05, 0.5
-WEIGHTS = np.array([1.0, 0.5, 0.5, 0.5, 0.3, 1.0])
+WEIGHTS = np.array([1.0, 0.5, 0.5, 0.5, 1.0, 1.0])
 #: The feature that says how long ago the joint moved; its values now, and after :data:`HELD`.
 MOVED = 3
 _UNMOVED, _LONG = (float(WEIGHTS[MOVED] * np.log10(0.02 + s)) for s in (1e-3, HELD))

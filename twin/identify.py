@@ -12,7 +12,7 @@ from tauguard.models import Drive, Friction, LeftOver, Sensors
 from tauguard.traces import Trace
 from tauguard.twin.drive_fit import SLOPES, FrictionFit, fit_friction
 from tauguard.twin.play import friction_torque, modelled
-from tauguard.twin.signals import Motion, motion_of, quantum, without_gaps
+from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 
 #: Candidates of the angle over which friction turns around with the joint [rad], and the prior.
 PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
@@ -73,7 +73,7 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
         electrical_time_constant=None,
         friction=_turning(_friction(fits, arm.drive_gain), motions, torques),
     )
-    sensors = replace(_sensors(traces, n), left_over=_left_over(arm, drive, parts))
+    sensors = replace(_sensors(traces, n), left_over=left_over(arm, drive, parts))
     return Twin(arm, replace(drive, sensors=sensors), fits, _notes(arm, fits, traces))
 
 
@@ -162,17 +162,32 @@ def _turning(friction: Friction, motions: Sequence[Motion], torques: Sequence[Ar
     return replace(friction, bristle_stiffness=level / np.where(turned, best, USUAL))
 
 
-def _left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
-    """What the logs report beyond the model, at even steps; nothing is smoothed."""
+def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
+    """What the logs report beyond the model, at even steps; nothing is smoothed.
+
+    Each sample goes to the nearest even time with its impulse, error times step. A late sample and
+    the early one after it would else leave an impulse that neither the arm nor an observer saw.
+
+    Args:
+        arm: calibrated.
+        drive: its gains and friction.
+        parts: logs without gaps, each with the number of the log that it is from.
+    """
     dt = float(np.median(np.concatenate([np.diff(part.t) for _, part in parts])))
     log, qd, errors = [], [], []
     for k, (_, part) in enumerate(parts):
         error = part.current - modelled(arm, drive.friction, drive.gain, part)
-        even = np.arange(part.t[0], part.t[-1], dt)
-        rows = np.minimum(np.searchsorted(part.t, even - 0.5 * dt), len(part.t) - 1)
+        error = bridged_stop(part, error)
+        place = np.rint((part.t - part.t[0]) / dt).astype(np.int64)
+        first = np.unique(place, return_index=True)[1]
+        impulse = np.cumsum(np.diff(part.t)[:, None] * error[:-1], axis=0)
+        impulse = np.vstack([0 * error[:1], impulse])[first]
+        even = np.arange(place[-1] + 1)
+        sums = np.stack([np.interp(even, place[first], column) for column in impulse.T], axis=1)
+        rows = first[np.searchsorted(place[first], even[:-1], side="right") - 1]
         log.append(np.full(len(rows), k))
         qd.append(part.qd[rows])
-        errors.append(error[rows])
+        errors.append(np.diff(sums, axis=0) / dt)
     return LeftOver(1 / dt, np.concatenate(log), np.concatenate(qd), np.concatenate(errors))
 
 

@@ -1,5 +1,6 @@
 """A twin beside its arm on logs that it has not seen: residuals, their peaks, and a classifier."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,8 @@ from tauguard.twin.signals import SLOW
 #: Lengths of what is compared [s]: windows of the classifier, spans of peaks, groups of windows
 #: that are kept together, and what the estimator needs to begin.
 WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
+#: Least duration of what an rms is computed from [s].
+SHORTEST = 1.0
 #: Fewest windows of each kind for an area under a curve.
 FEWEST = 40
 
@@ -56,6 +59,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     """
     real: list[Array] = []
     twin: list[Array] = []
+    times: list[Array] = []
     moves: list[Bools] = []
     still: list[Bools] = []
     for k, trace in enumerate(traces):
@@ -64,6 +68,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         begin = int(BEGIN / dt)
         real.append(residual_of(arm, trace)[begin:])
         twin.append(residual_of(arm, other)[begin:])
+        times.append(trace.t[begin:])
         fast = np.asarray(np.abs(trace.qd[begin:]) > SLOW)
         moves.append(fast)
         still.append(np.asarray(~fast.any(axis=1)))
@@ -71,52 +76,59 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     stand = [np.repeat(s[:, None], arm.robot.joints, axis=1) for s in still]
     real_, twin_ = np.concatenate(real), np.concatenate(twin)
     moving, standing = np.concatenate(moves), np.concatenate(stand)
+    seconds = np.concatenate([np.gradient(t) for t in times])
     lag = max(1, round(0.1 / dt))
     both = np.array([np.concatenate(real), np.concatenate(twin)])
     return Likeness(
-        _rms(twin_, moving) / _rms(real_, moving),
-        _peaks(twin, moves, dt) / _peaks(real, moves, dt),
-        _rms(twin_, standing) / _rms(real_, standing),
-        _peaks(twin, stand, dt) / _peaks(real, stand, dt),
+        _rms(twin_, moving, seconds) / _rms(real_, moving, seconds),
+        _peaks(twin, moves, times) / _peaks(real, moves, times),
+        _rms(twin_, standing, seconds) / _rms(real_, standing, seconds),
+        _peaks(twin, stand, times) / _peaks(real, stand, times),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        _auc(real, twin, [~s for s in still], dt, seed),
-        _auc(real, twin, still, dt, seed),
-        _real_auc(real, [~s for s in still], dt, seed),
+        _auc(real, twin, [~s for s in still], times, seed),
+        _auc(real, twin, still, times, seed),
+        _real_auc(real, [~s for s in still], times, seed),
         tuple(real),
         tuple(twin),
     )
 
 
-def _rms(values: Array, rows: Bools) -> Array:
-    """Of each joint's own rows, shape (n,); NaN where there are fewer than 100."""
-    count = rows.sum(axis=0)
-    square = (rows * values**2).sum(axis=0)
-    out: Array = np.where(count >= 100, np.sqrt(square / np.maximum(count, 1)), np.nan)
+def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
+    """Of each joint's own rows, shape (n,); NaN where they last for less than :data:`SHORTEST`."""
+    weight = rows * seconds[:, None]
+    total = weight.sum(axis=0)
+    square = (weight * values**2).sum(axis=0)
+    out: Array = np.where(total >= SHORTEST, np.sqrt(square / np.maximum(total, 1e-9)), np.nan)
     return out
 
 
-def _peaks(values: Sequence[Array], rows: Sequence[Bools], dt: float) -> Array:
+def _spans(t: Array, length: float) -> list[slice]:
+    """The samples of successive spans of time; those with fewer than four are left out."""
+    ends = np.searchsorted(t, np.arange(t[0], t[-1], length))
+    return [slice(a, b) for a, b in itertools.pairwise(ends) if b - a >= 4]
+
+
+def _peaks(values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array]) -> Array:
     """The 99 % quantile of the largest |residual| in spans, shape (n,)."""
-    size = max(1, round(SPAN / dt))
     peaks: list[list[float]] = [[] for _ in range(values[0].shape[1])]
-    for value, wanted in zip(values, rows, strict=True):
-        for k in range(0, len(value) - size + 1, size):
-            inside = wanted[k : k + size]
-            largest = np.abs(value[k : k + size]).max(axis=0)
-            for j in np.flatnonzero(inside.all(axis=0)):
+    for value, wanted, t in zip(values, rows, times, strict=True):
+        for span in _spans(t, SPAN):
+            largest = np.abs(value[span]).max(axis=0)
+            for j in np.flatnonzero(wanted[span].all(axis=0)):
                 peaks[j].append(float(largest[j]))
     return np.array([np.quantile(p, 0.99) if len(p) >= 10 else np.nan for p in peaks])
 
 
-def _windows(values: Sequence[Array], rows: Sequence[Bools], dt: float) -> tuple[Array, Array]:
+def _windows(
+    values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array]
+) -> tuple[Array, Array]:
     """Features of each window, and the group of windows that it belongs to."""
-    size, long = max(4, round(WINDOW / dt)), round(GROUP / dt)
     table, groups = [], []
-    for log, (value, wanted) in enumerate(zip(values, rows, strict=True)):
-        for k in range(0, len(value) - size + 1, size):
-            if wanted[k : k + size].all():
-                part = value[k : k + size]
+    for log, (value, wanted, t) in enumerate(zip(values, rows, times, strict=True)):
+        for span in _spans(t, WINDOW):
+            if wanted[span].all():
+                part = value[span]
                 steps = np.diff(part, axis=0)
                 table.append(
                     np.concatenate([
@@ -124,24 +136,28 @@ def _windows(values: Sequence[Array], rows: Sequence[Bools], dt: float) -> tuple
                         np.abs(steps).max(axis=0), np.abs(part).max(axis=0), part[-1] - part[0],
                     ])
                 )  # fmt: skip
-                groups.append(1000 * log + k // long)
+                groups.append(1000 * log + int((t[span.start] - t[0]) / GROUP))
     return np.array(table), np.array(groups)
 
 
 def _auc(
-    real: Sequence[Array], twin: Sequence[Array], rows: Sequence[Bools], dt: float, seed: int
+    real: Sequence[Array],
+    twin: Sequence[Array],
+    rows: Sequence[Bools],
+    times: Sequence[Array],
+    seed: int,
 ) -> tuple[float, float]:
-    a, groups = _windows(real, rows, dt)
-    b, _ = _windows(twin, rows, dt)
+    a, groups = _windows(real, rows, times)
+    b, _ = _windows(twin, rows, times)
     labels = np.repeat([0, 1], [len(a), len(b)])
     return _area(np.concatenate([a, b]), labels, np.concatenate([groups, groups]), seed)
 
 
 def _real_auc(
-    real: Sequence[Array], rows: Sequence[Bools], dt: float, seed: int
+    real: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array], seed: int
 ) -> tuple[float, float]:
     """Of windows of like motion: successive windows are given one label each in turn."""
-    a, groups = _windows(real, rows, dt)
+    a, groups = _windows(real, rows, times)
     return _area(a, np.arange(len(a), dtype=np.float64) % 2, groups, seed)
 
 

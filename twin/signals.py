@@ -18,6 +18,8 @@ SLOW = 0.02
 SMOOTHING = 0.02
 #: A log is split where two samples are this many intervals apart.
 GAP = 4.0
+#: Time around a log's last stop that is left out [s].
+STOP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,20 @@ def without_gaps(trace: Trace, shortest: float = 1.0) -> list[Trace]:
     ends = [0, *(np.flatnonzero(steps > GAP * np.median(steps)) + 1), len(trace.t)]
     parts = [slice(a, b) for a, b in itertools.pairwise(ends)]
     return [cut(trace, p) for p in parts if trace.t[p.stop - 1] - trace.t[p.start] > shortest]
+
+
+def bridged_stop(trace: Trace, error: Array) -> Array:
+    """The error along a log without that of its last stop, which is interpolated, shape (T, n).
+
+    A program that is cut off brakes all joints within a sample or two, which the log does not
+    resolve: hundreds of N m that are none of the arm.
+    """
+    moves = np.flatnonzero((np.abs(trace.qd) > SLOW).any(axis=1))
+    if not len(moves):
+        return error
+    used = np.abs(trace.t - trace.t[moves[-1]]) > STOP
+    rows = [np.interp(trace.t, trace.t[used], column[used]) for column in error.T]
+    return np.stack(rows, axis=1)
 
 
 def quantum(signal: Array) -> float:

@@ -11,8 +11,9 @@ from tauguard.models import Friction, load_arm
 from tauguard.twin import compare, identify_twin, with_intervals
 from tauguard.twin.description import write_twin
 from tauguard.twin.drive_fit import fit_friction
-from tauguard.twin.play import friction_torque
-from tauguard.twin.signals import Motion, motion_of, quantum, without_gaps
+from tauguard.twin.identify import left_over
+from tauguard.twin.play import friction_torque, modelled
+from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,
@@ -97,6 +98,35 @@ def test_friction_settles_at_its_level_and_stays_when_the_joint_stops():
     torque = friction_torque(friction, qd, 0 * qd, np.full(400, 0.01))
     assert torque[199, 0] == pytest.approx(2 + 3 * 0.5)
     assert torque[-1, 0] == pytest.approx(2)
+
+
+def test_the_left_over_has_the_impulse_of_the_logs_error_at_uneven_samples(arm, logs, twin):
+    # A late sample and the early one after it have errors of either sign whose impulse is nothing.
+    rng = np.random.default_rng(3)
+    keep = rng.random(len(logs[0].t)) > 0.02  # lost samples
+    t = (logs[0].t + 0.003 * rng.uniform(-1, 1, len(logs[0].t)))[keep]
+    whole = logs[0]
+    log = replace(whole, t=t, q=whole.q[keep], qd=whole.qd[keep], current=whole.current[keep])
+    error = rng.normal(size=log.q.shape)
+    model = modelled(arm, twin.drive.friction, twin.drive.gain, log)
+    found = left_over(arm, twin.drive, [(0, replace(log, current=model + error))])
+    given = np.cumsum(error[:-1] * np.diff(t)[:, None], axis=0)
+    got = np.cumsum(found.current, axis=0) / found.rate
+    assert found.rate == pytest.approx(100, rel=0.01)
+    # Up to the stop at the log's end, which is bridged, and half a step of an error of 5.
+    for seconds in (5.0, 10.0, 15.0):
+        k = np.searchsorted(t, t[0] + seconds)
+        np.testing.assert_allclose(got[round(seconds * 100) - 1], given[k - 1], atol=0.08)
+
+
+def test_the_error_of_a_programs_cut_off_is_bridged(logs):
+    qd = np.zeros_like(logs[0].qd)
+    qd[100:500] = 0.3
+    error = np.ones_like(qd)
+    error[495:503], error[300] = 200.0, 5.0
+    bridged = bridged_stop(replace(logs[0], qd=qd), error)
+    assert np.abs(bridged[400:] - 1).max() < 1e-12
+    np.testing.assert_array_equal(bridged[:490], error[:490])
 
 
 def test_quantum_of_a_signal():
