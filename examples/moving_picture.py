@@ -1,6 +1,6 @@
 """The moving picture of the README: an arm is struck, the residual rises, the alarm comes.
 
-    MUJOCO_GL=egl python examples/moving_picture.py [PICTURE.gif]
+    python examples/moving_picture.py [PICTURE.gif]
 
 Eight times slower than real time around the strike. Needs an OpenGL that MuJoCo finds.
 """

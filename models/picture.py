@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from typing import Any
 
 import mujoco
@@ -15,8 +18,9 @@ from numpy.typing import ArrayLike
 SKY, FLOOR_COLOUR = ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90)), (0.80, 0.82, 0.85, 1.0)
 #: Half extents of the floor and its grid [m].
 FLOOR = (8.0, 8.0, 1.0)
-#: The lamp that throws the shadows: where it stands [m], shining down, and how bright.
-LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
+#: The lamp that throws the shadows: where it stands [m], its direction and how bright it is. From
+#: straight above, the floor would throw thin shadows on itself.
+LAMP, DOWN, LAMP_COLOUR = (0.0, 0.0, 3.0), (0.06, 0.04, -1.0), 0.35
 #: Light of the camera: from everywhere, and from in front.
 AMBIENT, DIFFUSE = 0.35, 0.4
 #: Height of the floor where nothing stands lower [m].
@@ -65,7 +69,7 @@ def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -
     spec.worldbody.add_light(
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
         pos=LAMP,
-        dir=[0, 0, -1],
+        dir=DOWN,
         diffuse=[LAMP_COLOUR] * 3,
         castshadow=True,
     )
@@ -109,13 +113,30 @@ def check_opengl() -> None:
         mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
 
 
+def _choose_opengl() -> None:
+    """Without a display and a choice in MUJOCO_GL take EGL, else OSMesa, not a window's OpenGL."""
+    chosen = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+    if sys.platform != "linux" or any(os.environ.get(name) for name in chosen):
+        return
+    contexts: Any = vars(sys.modules[mujoco.Renderer.__module__])["gl_context"]
+    platform = os.environ.get("PYOPENGL_PLATFORM")
+    for name in ("egl", "osmesa"):
+        with suppress(Exception):  # PyOpenGL raises several kinds where a library is missing
+            contexts.GLContext = import_module(f"mujoco.{name}").GLContext
+            return
+        os.environ.pop("PYOPENGL_PLATFORM", None)
+    if platform is not None:
+        os.environ["PYOPENGL_PLATFORM"] = platform
+
+
 @contextmanager
 def opengl() -> Iterator[None]:
-    """Turn an error of OpenGL's start into one line.
+    """Choose an OpenGL, and turn an error of its start into one line.
 
     Raises:
         RuntimeError: the line, with what to install or to set.
     """
+    _choose_opengl()
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", module="glfw")
@@ -123,7 +144,7 @@ def opengl() -> Iterator[None]:
     except Exception as error:
         said = " ".join(str(error).split())[:200]
         raise RuntimeError(
-            "no picture: MuJoCo finds no OpenGL; without a display set MUJOCO_GL=egl (library "
-            "libegl1) or MUJOCO_GL=osmesa (libosmesa6) before Python starts, and use "
-            f"render_mode='rgb_array' ({type(error).__name__}: {said})"
+            "no picture: MuJoCo finds no OpenGL; without a display install libegl1 or libosmesa6 "
+            "and use render_mode='rgb_array'; MUJOCO_GL=egl, osmesa or glfw chooses one "
+            f"({type(error).__name__}: {said})"
         ) from error

@@ -19,6 +19,8 @@ from tauguard.traces import TARGETS, Trace
 PILLOW = (".gif", ".webp", ".png")
 #: Where the camera stands: azimuth and elevation [deg], distance in units of the arm's size.
 VIEW = (140.0, -18.0, 2.0)
+#: Of people and arms it is this far, in units of the diagonal of what they fill.
+AROUND = 1.6
 
 
 def frames(
@@ -63,10 +65,7 @@ def frames(
     place = _placer(model, data, trace)
     place(int(rows[0]))
     links = [int(model.joint(name).bodyid[0]) for name in trace.joint_names]
-    spread = float(np.linalg.norm(np.ptp(data.xpos[links], axis=0)))
-    camera.lookat[:] = data.xpos[links].mean(axis=0)
-    camera.azimuth, camera.elevation, distance = view
-    camera.distance = distance * max(spread, 0.2)
+    _look(camera, data.xpos[links], _people(model, data), view)
     with opengl():
         renderer = mujoco.Renderer(model, *size)
     try:
@@ -101,6 +100,24 @@ def _stage(trace: Trace, row: int) -> Any:
     floor = min(FLOOR_HEIGHT, float(low.min(initial=0.0)))
     spec = mujoco.MjSpec.from_string(text)
     return staged(spec, floor, [model.body_pos[root] for root in sorted(roots)])
+
+
+def _people(model: Any, data: Any) -> Array:
+    """Where the capsules of people are [m], shape (k, 3)."""
+    named = [g for g in range(model.ngeom) if model.geom(g).name.startswith("person")]
+    return np.array(data.geom_xpos[named])
+
+
+def _look(camera: Any, links: Array, people: Array, view: tuple[float, float, float]) -> None:
+    """At the links' middle; where there are people, so far away that all of them are seen."""
+    spread = float(np.linalg.norm(np.ptp(links, axis=0)))
+    camera.lookat[:] = links.mean(axis=0)
+    camera.azimuth, camera.elevation, distance = view
+    camera.distance = distance * max(spread, 0.2)
+    if len(people):
+        low, high = (end(np.concatenate([links, people]), axis=0) for end in (np.min, np.max))
+        camera.lookat[:] = (low + high) / 2
+        camera.distance = max(camera.distance, AROUND * float(np.linalg.norm(high - low)))
 
 
 def _targets(trace: Trace, t: float) -> Any:

@@ -30,8 +30,8 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
     | rgb | (height, width, 3) | uint8 | |
     | depth | (height, width, 1) | float32 | m along the optical axis, at most 10 |
 
-    Needs an OpenGL that MuJoCo finds (``MUJOCO_GL=egl`` without a display). The pixels depend on
-    the renderer: they are the same bits on one machine only.
+    Needs an OpenGL (without a display the library libegl1 or libosmesa6). The pixels depend on the
+    renderer: they are the same bits on one machine only.
     """
 
     def __init__(

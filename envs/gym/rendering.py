@@ -28,8 +28,8 @@ def _need_display() -> None:
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
         raise RuntimeError(
-            "render_mode 'human' needs a display and there is none; use 'rgb_array' with "
-            "MUJOCO_GL=egl, or `tauguard watch`"
+            "render_mode 'human' needs a display and there is none; use 'rgb_array' or "
+            "`tauguard watch`"
         )
 
 
@@ -58,14 +58,14 @@ class Stage:
         self.model.vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
 
     def look(self, camera: Any) -> None:
-        """From beside the first arm's front; two arms from the side, so that neither hides one."""
+        """From beside the first arm's front; two arms and people from the side: none hides one."""
         compiled, layout = self._world, self._world.layout
         reach = layout.reach
         if compiled.person is not None:
             places = np.array([*_bases(compiled), [*compiled.person.position, 0.0]])
             x, y = places[:, :2].mean(axis=0)
             camera.lookat[:] = (x, y, compiled.person.floor + 0.5 * compiled.person.stature)
-            camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
+            camera.distance, camera.azimuth, camera.elevation = 2.9, 102.0, -12.0
         elif compiled.arms == 1:
             camera.lookat[:] = layout.at((0.35 * reach, 0.0, 0.4 * reach))
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0

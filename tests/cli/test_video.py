@@ -6,12 +6,14 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from PIL import Image
 
 from tauguard.cli import main
 from tauguard.envs import Episode, simulate
+from tauguard.envs.wrappers import RecordMcap
 from tauguard.models import SceneObject, Shape
 from tauguard.replay.video import write_video
 from tauguard.traces import TARGETS, write_mcap
@@ -24,10 +26,13 @@ CART = SceneObject(
 )
 
 
-def run(*arguments, gl="egl"):
+def run(*arguments, **chosen):
+    """Without a display, and without MUJOCO_GL unless it is chosen."""
+    windows = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+    plain = {name: value for name, value in os.environ.items() if name not in windows}
     return subprocess.run(
         [sys.executable, "-c", MAIN, "video", *map(str, arguments)],
-        env={**os.environ, "MUJOCO_GL": gl},
+        env=plain | chosen,
         capture_output=True,
         text=True,
     )
@@ -59,6 +64,24 @@ def test_the_arm_and_what_moves_are_drawn_where_they_are(tmp_path):
     assert "--out" in again.stderr
 
 
+def test_a_whole_person_is_in_the_picture(tmp_path):
+    """Trousers are drawn, down to the feet, which the floor surrounds."""
+    env = RecordMcap(gym.make("tauguard:tauguard/Reach-v0", max_episode_steps=5), tmp_path)
+    env.reset(seed=0)
+    for _ in range(5):
+        env.step(np.zeros(6))
+    env.close()
+    out = run(tmp_path, "--rate", 20, "--out", tmp_path / "a.png")
+    if out.returncode == 2 and "no picture" in out.stderr:
+        pytest.skip("no OpenGL can draw here")
+    assert out.returncode == 0, out.stderr
+    with Image.open(tmp_path / "a.png") as file:
+        red, _, blue = np.moveaxis(np.asarray(file.convert("RGB")).astype(int), 2, 0)
+    dark = (red < 70) & (blue > red)
+    assert dark.sum() > 1000
+    assert not dark[-5:].any()
+
+
 def test_target_and_force_are_drawn_where_they_are(tmp_path):
     """A green ball is drawn until the target has moved on; a red arrow while something presses."""
     trace = simulate(Episode(3, seconds=0.5))
@@ -87,7 +110,7 @@ def test_target_and_force_are_drawn_where_they_are(tmp_path):
 
 def test_an_opengl_that_is_not_there_is_one_line(tmp_path):
     write_mcap(tmp_path / "a.mcap", simulate(Episode(3, seconds=0.5)))
-    out = run(tmp_path / "a.mcap", gl="osmesa")
+    out = run(tmp_path / "a.mcap", MUJOCO_GL="osmesa")
     if out.returncode == 0:
         pytest.skip("OSMesa is installed here")
     said = [line for line in out.stderr.splitlines() if line.startswith("tauguard video:")]

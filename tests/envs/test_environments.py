@@ -328,7 +328,7 @@ def test_human_mode_without_a_display_says_what_would_work(monkeypatch):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     env = gym.make(REACH, render_mode="human")
     if sys.platform == "linux":
-        with pytest.raises(RuntimeError, match="MUJOCO_GL=egl"):
+        with pytest.raises(RuntimeError, match="'rgb_array' or"):
             env.reset(seed=0)
     with pytest.raises(ValueError, match="rgb_array, human"):
         ReachEnv(render_mode="ascii")
@@ -361,7 +361,8 @@ print(green, moved, len(numpy.unique(a.reshape(-1, 3), axis=0)))
 assert min(green) > 50 and 100 < moved < 20000
 assert len(numpy.unique(a.reshape(-1, 3), axis=0)) > 100
 """
-    environment = {**os.environ, "MUJOCO_GL": "egl"}
+    windows = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")  # tauguard chooses without them
+    environment = {name: value for name, value in os.environ.items() if name not in windows}
     out = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment
     )

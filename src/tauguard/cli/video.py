@@ -19,8 +19,8 @@ def command(
 ) -> None:
     """Draw an MCAP recording of the simulation: the scene, the arm and what moves around it.
 
-    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Needs an OpenGL that MuJoCo
-    finds; without a display set MUJOCO_GL=egl or osmesa.
+    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Needs an OpenGL: without
+    a display the library libegl1 or libosmesa6.
 
     Args:
         recording: an MCAP file written by tauguard, or a folder, whose newest is taken.
