@@ -103,8 +103,9 @@ bool certified_apart(const Points<double>& a, const Points<double>& b, double si
   const Nearest ends = nearest(a, b);
   *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
-  const auto certified = [&] {
-    return out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
+  const auto certified = [&] {  // between_faces may have found points that are nearer than `near`
+    return out->distance > near * size &&
+           out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
   };
   return certified() || (ends.size == 3 && between_faces(a, b, ends, size, out) && certified());
 }

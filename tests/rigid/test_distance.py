@@ -1,5 +1,7 @@
 """Signed distance against rational arithmetic: right sign, right length, points that show it."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -147,6 +149,23 @@ def test_far_from_the_origin_nothing_is_lost():
     here = distance(Boxes(np.zeros((200, 3)), half, eye), Boxes(center, half, eye))
     there = distance(Boxes(np.tile(far, (200, 1)), half, eye), Boxes(center + far, half, eye))
     np.testing.assert_allclose(there.distance, here.distance, atol=1e-14)
+
+
+def test_axis_parallel_boxes_whose_edges_differ_by_up_to_1e24():
+    """Flat boxes, needles and points beside large ones: their intervals tell the truth."""
+    rng, count = np.random.default_rng(57), 8000
+    half = 10.0 ** rng.uniform(-12, 12, (2, count, 1)) * 10.0 ** rng.uniform(-12, 0, (2, count, 3))
+    half[0, ::5, 0], half[1, ::6] = 0, 0
+    center = half.sum(axis=0) * rng.normal(size=(count, 3))
+    identity = np.broadcast_to(np.eye(3), (count, 3, 3))
+    a, b = Boxes(center, half[0], identity), Boxes(np.zeros((count, 3)), half[1], identity)
+    sign = np.empty(count)
+    for i in range(count):
+        rows = (map(Fraction, x.tolist()) for x in (center[i], half[0, i], half[1, i]))
+        gap = max(abs(c) - p - q for c, p, q in zip(*rows, strict=True))
+        sign[i] = (gap > 0) - (gap < 0)
+    for first, second in ((a, b), (b, a)):
+        np.testing.assert_array_equal(np.sign(distance(first, second).distance), sign)
 
 
 def test_threads_change_nothing():
