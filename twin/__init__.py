@@ -1,7 +1,15 @@
 """A simulated arm that is like a real one: identified from free logs, judged on others."""
 
 from tauguard.twin.identify import Twin, identify_twin, with_intervals
-from tauguard.twin.judge import Likeness, compare
+from tauguard.twin.judge import Likeness, compare, with_alarms
 from tauguard.twin.play import played
 
-__all__ = ["Likeness", "Twin", "compare", "identify_twin", "played", "with_intervals"]
+__all__ = [
+    "Likeness",
+    "Twin",
+    "compare",
+    "identify_twin",
+    "played",
+    "with_alarms",
+    "with_intervals",
+]

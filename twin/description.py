@@ -107,7 +107,9 @@ def _bodies(twin: Twin) -> list[str]:
             for quantity, value, width, unit in zip(QUANTITIES, values, widths, units, strict=True)
             if not np.isnan(width)
         ]
-        lines.append(f"# {name}: {', '.join(shown) or 'none'}; all others keep the robot file's")
+        lines.append(
+            f"# {name}: {', '.join(shown) or 'none'}; the others stay near the robot file's"
+        )
     return lines
 
 

@@ -15,6 +15,9 @@ from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import ArmModel
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tauguard.models import Drive
 from tauguard.traces import Trace
 from tauguard.twin.play import played, residual_of
@@ -46,6 +49,37 @@ class Likeness:
     real_auc: tuple[float, float]  #: of real against real, moving
     real_residuals: tuple[Array, ...]  #: of each log [N m]
     twin_residuals: tuple[Array, ...]
+    times: tuple[Array, ...]  #: of the residuals [s]
+    played: tuple[Trace, ...]  #: the logs with the twin's currents
+    alarms: tuple[int, int] = (0, 0)
+    """Of free-motion on the logs and on the twin along them, see :func:`with_alarms`."""
+
+    @property
+    def seconds(self) -> float:
+        """Length of the logs in all."""
+        return sum(float(trace.t[-1] - trace.t[0]) for trace in self.played)
+
+
+def with_alarms(
+    likeness: Likeness, recordings: Sequence[Recording], arm: ArmModel, traces: Sequence[Trace]
+) -> Likeness:
+    """The comparison with the alarms that a detector of the twin's own logs raises.
+
+    Args:
+        likeness: of ``traces``.
+        recordings: the free logs that the twin is made from.
+        arm: what is believed of the arm, as :func:`tauguard.detectors.calibration.identify` has it.
+        traces: held-out logs without a load.
+
+    Raises:
+        ValueError: the recordings are too short.
+    """
+    free = FreeMotion().fit(list(recordings), arm).carrying(Load())
+    alarm = CollisionAlarm(free, 1.0, CONFIRMATION)
+    arms, twins = (
+        sum(len(alarm.detect(trace).alarms) for trace in logs) for logs in (traces, likeness.played)
+    )
+    return replace(likeness, alarms=(arms, twins))
 
 
 def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0) -> Likeness:
@@ -62,6 +96,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     times: list[Array] = []
     moves: list[Bools] = []
     still: list[Bools] = []
+    others: list[Trace] = []
     for k, trace in enumerate(traces):
         other = replace(trace, current=played(arm, drive, trace, seed + k))
         dt = float(np.median(np.diff(trace.t)))
@@ -69,6 +104,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         real.append(residual_of(arm, trace)[begin:])
         twin.append(residual_of(arm, other)[begin:])
         times.append(trace.t[begin:])
+        others.append(other)
         fast = np.asarray(np.abs(trace.qd[begin:]) > SLOW)
         moves.append(fast)
         still.append(np.asarray(~fast.any(axis=1)))
@@ -91,6 +127,8 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         _real_auc(real, [~s for s in still], times, seed),
         tuple(real),
         tuple(twin),
+        tuple(times),
+        tuple(others),
     )
 
 

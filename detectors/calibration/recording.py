@@ -101,6 +101,12 @@ def check_length(recordings: Sequence[Recording]) -> None:
         )
 
 
+def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:
+    """Whether there are two or more, and without each one :data:`LEAST` of motion is left."""
+    rests = ([*recordings[:k], *recordings[k + 1 :]] for k in range(len(recordings)))
+    return len(recordings) > 1 and all(motion_length(rest) >= LEAST for rest in rests)
+
+
 def is_known(recording: Recording) -> bool:
     """Whether mass and centre of what was carried are known."""
     load = recording.load

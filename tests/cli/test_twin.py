@@ -10,7 +10,7 @@ import pytest
 from tauguard.cli import main
 from tauguard.datasets.recordings import labelled
 from tauguard.detectors import load_model
-from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.calibration.recording import Load, cut
 from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.models import load_arm
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
@@ -93,7 +93,10 @@ def test_from_logs_to_detection(folder, capsys):
     page = folder / "twin.png"
     bodies = ("--robot", folder / "arm.xml")
     run(folder, "twin", free, *bodies, "--out", out, "--json", figures, "--figure", page)
-    assert "judged on log2.csv" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "judged on log2.csv" in said
+    # The arm is quiet in its own log; so is its twin along it.
+    assert "in 25 s: 0 on the arm, 0 on the twin along the same motion" in said
     found = json.loads(figures.read_text())
     assert found["judged_on"] == ["log2.csv"]
     assert found["rows"][-1]["residual"] == "area under the curve"
@@ -185,3 +188,14 @@ def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):
     assert "c: hardly moves; its friction is a prior" in said
     assert "not judged: give three logs or more" in said
     assert "# c: hardly moves" in (tmp_path / "t.toml").read_text()
+
+
+def test_short_logs_make_a_twin_without_intervals(folder, tmp_path, capsys):
+    for seed in (1, 2):
+        log = record(seed)
+        write(tmp_path / f"log{seed}.csv", cut(log, slice(0, round(len(log.t) * 7 / 25))))
+    logs, out = [tmp_path / f"log{seed}.csv" for seed in (1, 2)], tmp_path / "t.toml"
+    run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", out)
+    assert "not judged: give three logs or more" in capsys.readouterr().out
+    (viscous,) = (line for line in out.read_text().splitlines() if line.startswith("viscous"))
+    assert viscous.endswith("# N m s/rad")

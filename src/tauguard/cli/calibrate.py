@@ -70,6 +70,7 @@ def command(
     from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
+    from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.detectors.evaluation.acceptance import check_held_out
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
@@ -90,7 +91,7 @@ def command(
             f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
             "they held joint torques: if they are in N m, say --torque"
         )
-    held = left_out(arm, recordings, scale=given.scale) if len(recordings) > 1 else []
+    held = left_out(arm, recordings, scale=given.scale) if each_can_be_left_out(recordings) else []
     shown = not_shown(list(given.all_traces.values()))
     print_notes((*calibration_notes(found.arm, traces, recordings, held), *shown))
     within = (found.arm, list(traces), recordings, held)

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from tauguard.arrays import Array
     from tauguard.cli.free_logs import FreeLogs
     from tauguard.detectors.calibration.recording import Recording
-    from tauguard.traces import Trace
     from tauguard.twin import Likeness, Twin
 
 #: Parts of the logs of which each is left out in turn, for the intervals.
@@ -51,7 +50,7 @@ def command(
         torque: the logs hold joint torques in N m where they would hold currents.
         judge: free logs without a load of programs that LOGS do not have; without them, each third
             log of LOGS is left out for the judgement, and used for the twin afterwards.
-        figure: a PNG of residuals, real and simulated.
+        figure: a PNG of residuals, real and simulated, with the verdict.
         reading: how logs are read.
         json: write the figures here as JSON.
     """
@@ -60,11 +59,11 @@ def command(
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.assessment import left_out
-    from tauguard.detectors.calibration.recording import pieces
+    from tauguard.detectors.calibration.recording import each_can_be_left_out, pieces
     from tauguard.models import load_arm
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
-    from tauguard.twin import compare, with_intervals
+    from tauguard.twin import compare, with_alarms, with_intervals
     from tauguard.twin.description import write_twin
 
     if out.suffix != ".toml":
@@ -78,22 +77,28 @@ def command(
     twin = made(given, recordings, limit)
     parts = pieces(recordings, PARTS)
     rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
-    twin = with_intervals(twin, [made(given, some, limit) for some in rest if some])
-    judged, told, tried = twin, list[str](), list["Trace"]()
+    twin = with_intervals(twin, [one for some in rest if (one := _made(given, some, limit))])
+    held: list[int] = []
     if judge:
-        others = read_logs(judge, columns, robot, torque, reading)
-        tried, told = list(others.traces.values()), list(others.traces)
+        tried = read_logs(judge, columns, robot, torque, reading).traces
     else:
         held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
-        tried, told = [recordings[k].trace for k in held], [names[k] for k in held]
-        if held:
-            judged = made(given, [r for k, r in enumerate(recordings) if k not in held], limit)
-    likeness = compare(judged.arm, judged.drive, tried) if tried else None
-    apart = left_out(given.arm, recordings, scale=given.scale) if len(recordings) > 1 else []
+        tried = {names[k]: recordings[k].trace for k in held}
+    used = [r for k, r in enumerate(recordings) if k not in held]
+    judged = _made(given, used, limit) if held else twin
+    likeness = None
+    if judged is not None and tried:
+        likeness = compare(judged.arm, judged.drive, list(tried.values()))
+        likeness = with_alarms(likeness, used, given.arm, list(tried.values()))
+    apart = (
+        left_out(given.arm, recordings, scale=given.scale)
+        if each_can_be_left_out(recordings)
+        else []
+    )
     notes = (*left, *calibration_notes(twin.arm, given.traces, recordings, apart), *twin.notes)
     print_notes(notes)
     written = write_twin(replace(twin, notes=tuple(notes)), robot, out, names, given.source)
-    rows = report(twin.arm.robot.joint_names, likeness, told)
+    rows = report(twin.arm.robot.joint_names, likeness, list(tried))
     if figure is not None and likeness is not None:
         from tauguard.twin.figure import draw
 
@@ -102,7 +107,7 @@ def command(
     print(f"{', '.join(map(str, (out, *written)))}: written")
     if json is not None:
         result = {"name": "twin", "twin": str(out), "scale": given.source, "notes": list(notes)}
-        write_json(json, result | {"judged_on": told, "rows": rows})
+        write_json(json, result | {"judged_on": list(tried), "rows": rows})
 
 
 def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
@@ -144,6 +149,14 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 
 
+def _made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin | None:
+    """As :func:`made`; None where the logs are too short, or all carry a load."""
+    try:
+        return made(given, used, limit)
+    except ValueError:
+        return None
+
+
 def _unloaded(recording: Recording) -> bool:
     return recording.load is not None and recording.load.mass == 0
 
@@ -155,7 +168,7 @@ def report(
     from tauguard.report import table
 
     if likeness is None:
-        print("not judged: give three logs or more, or --judge")
+        print("not judged: give three logs or more, of which two have 10 s of motion, or --judge")
         return []
     kinds = {
         "rms, moving": likeness.rms,
@@ -183,8 +196,17 @@ def report(
         "area under the curve of a classifier that tells simulated from real (boosted trees, "
         f"logistic regression; .5: it cannot): {text}"
     )
+    print(
+        f"alarms of free-motion, trained on the twin's logs, in {likeness.seconds:.0f} s: "
+        f"{likeness.alarms[0]} on the arm, {likeness.alarms[1]} on the twin along the same motion"
+    )
     area = {k: f"{_two(a)}, {_two(b)}" for k, (a, b) in areas.items()}
-    return [*rows, {"residual": "area under the curve"} | area]
+    alarms = dict(zip(("arm", "twin"), likeness.alarms, strict=True))
+    return [
+        *rows,
+        {"residual": "alarms", "seconds": likeness.seconds} | alarms,
+        {"residual": "area under the curve"} | area,
+    ]
 
 
 def _two(value: float) -> str:
