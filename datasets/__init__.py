@@ -1,4 +1,4 @@
-"""Labelled datasets: described, generated, inspected and read; and loaders of real logs."""
+"""Labelled datasets (description, generation, inspection, reading) and loaders of real logs."""
 
 from typing import TYPE_CHECKING
 

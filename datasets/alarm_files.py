@@ -1,7 +1,7 @@
 """Alarms of a detector that runs elsewhere, in any language, judged on a dataset.
 
 The file is CSV with the columns ``episode`` (SPLIT/NUMBER, from 0), ``start`` and ``end`` [s of the
-episode's clock], a line an alarm. An episode without a line had no alarm.
+episode's clock], and one line for each alarm. An episode without a line had no alarm.
 """
 
 import csv
@@ -20,7 +20,7 @@ COLUMNS = ("episode", "start", "end")
 
 
 def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
-    """The alarms of each episode, in order; those less than 0.5 s apart are one.
+    """The alarms of each episode, in order; alarms less than 0.5 s apart are merged.
 
     Raises:
         ValueError: other columns, or a line with a wrong value; file and line are named.
@@ -46,9 +46,9 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
 def judged_alarms(
     folder: Path, path: Path, splits: Sequence[str] = ()
 ) -> Iterator[tuple[str, list[Matching]]]:
-    """Each split's episodes, their truth matched with the alarms of a file.
+    """Match the alarms of a file with the true collisions of each split's episodes.
 
-    The first 3 s of an episode do not count: no collision is planned there, and detectors settle.
+    The first 3 s of an episode are not counted: no collision is planned in them, and detectors
 
     Args:
         folder: a dataset.

@@ -1,4 +1,4 @@
-"""Logs of one real arm for the commands: files, joints, units, loads."""
+"""Read the logs of one real arm for the commands: files, joints, units and loads."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -26,12 +26,12 @@ class ArmLogs:
     """Logs of one arm, and the numbers of the robot that they were recorded on."""
 
     traces: dict[str, Trace]  #: by file name, joints in the robot's order
-    numbers: RobotNumbers  #: of the joints that the logs have
+    numbers: RobotNumbers  #: numbers of the joints that the logs have
     notes: tuple[str, ...]  #: one line for each repair and each joint that is held fixed
 
 
 def log_files(logs: Sequence[Path]) -> list[Path]:
-    """The files themselves; for a folder the ``.csv`` and ``.mcap`` files in it and below.
+    """The given files; a folder stands for all ``.csv`` and ``.mcap`` files below it.
 
     Raises:
         ValueError: there are none, or two have one name.
@@ -53,7 +53,7 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
 def read_one(
     log: Path, columns: str | None, torque: bool = False, reading: Reading | None = None
 ) -> Log:
-    """One log, its joints in the file's order; each note begins with the file's name.
+    """Read one log, with joints in the file's order; each note begins with the file's name.
 
     Args:
         log: CSV or MCAP.
@@ -150,7 +150,7 @@ def _refuse_saturated(log: str, trace: Trace) -> None:
 
 
 def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
-    """The trace with the robot's joints in the robot's order.
+    """The trace with its joints in the robot's order.
 
     Raises:
         ValueError: joints that do not match.
@@ -184,7 +184,7 @@ def moving(traces: dict[str, Trace]) -> tuple[dict[str, Trace], list[str]]:
 
 
 def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
-    """The log that a flag names by its file name, with or without the ending.
+    """The log that a flag names by its file name, with or without extension.
 
     Raises:
         ValueError: no such log, or two.

@@ -129,7 +129,7 @@ commanded motion, first without and then with collisions."""
 
 
 def write_cards(folder: Path) -> None:
-    """Write card, metadata and checksums; a file with the right content is left alone."""
+    """Write card, metadata and checksums; a file with the right content is not rewritten."""
     configuration = configuration_in(folder)
     summary = summarised(folder)
     _write(folder / CARD, card(configuration, read_head(folder), summary))
@@ -238,7 +238,7 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
 
 
 def shards(split: str) -> str:
-    """Pattern of a split's files: of "test" not those of "test-arm"."""
+    """Pattern of a split's files; that of "test" does not match the files of "test-arm"."""
     return f"data/{split}-[0-9]*.parquet"
 
 

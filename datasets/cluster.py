@@ -1,4 +1,4 @@
-"""Shards computed by a Ray cluster (extra ``distributed``): one task a shard, one core a task."""
+"""Compute shards on a Ray cluster (extra ``distributed``): a task computes a shard on a core."""
 
 import itertools
 import logging
@@ -19,18 +19,18 @@ def on_cluster(
 ) -> Generator[Result]:
     """The results of ``work`` in the order in which they are ready.
 
-    A task whose node or process is lost is done again elsewhere. All nodes see the folder that the
-    tasks write, under the same path, and have the same tauguard installed.
+    A task whose node or process is lost is repeated on another. All nodes must see the folder that
+    the tasks write under the same path, and must have the same version of tauguard.
 
     Args:
-        work: what to do with one task.
+        work: function of one task.
         tasks: taken one by one.
-        address: of the cluster, "auto" for the one that this machine belongs to, "local" to start
+        address: the cluster's; "auto" for the one that this machine belongs to, "local" to start
             one here.
 
     Raises:
         ValueError: Ray is not installed.
-        OSError: no cluster there, or it lost a task for good.
+        OSError: no cluster answers at the address, or it gave up on a task.
     """
     try:
         import ray

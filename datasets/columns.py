@@ -13,7 +13,7 @@ from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
 
-#: Fields of a map that name a column a joint.
+#: Fields of a map that name one column per joint.
 SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
 #: What :attr:`ColumnMap.repair` may name.
 REPAIRS = ("repeat", "tail", "nan", "state", "order")
@@ -31,7 +31,7 @@ UR_JOINTS = (
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """Columns by name (of the header line) or by 0-based index; one column a joint, in order.
+    """Columns by name (of the header line) or by 0-based index; one column per joint, in order.
 
     A map with indices only reads files without a header line as well as those with one.
     """
@@ -46,12 +46,12 @@ class ColumnMap:
     qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
     degrees: bool = False  #: angles, their speeds and accelerations are in degrees
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
-    current_scale: float | tuple[float, ...] = 1.0  #: amperes in one unit, a number or one a joint
+    current_scale: float | tuple[float, ...] = 1.0  #: A in one unit; may be per joint
     torque_scale: float | tuple[float, ...] = 1.0
     """N m in one unit, a number or one a joint; -1 where the log's sign is not the robot file's."""
-    clock: float = 0.0  #: rows a second, without a column of the time [Hz]
+    clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
-    joint_names: tuple[str, ...] = ()  #: empty: not known
+    joint_names: tuple[str, ...] = ()  #: empty: unknown
     width: int | None = None  #: number of columns of every row; None: not known
     headerless: bool = False  #: files have no header line; one with a header is refused
     repair: frozenset[str] = field(default_factory=frozenset)
@@ -154,7 +154,7 @@ class Reading:
     sample: half an interval late, and blurred to an interval; 0: as they are"""
 
 
-#: Logs as they are.
+#: Reads logs unchanged.
 AS_IS = Reading()
 
 

@@ -1,4 +1,4 @@
-"""The columns of a dataset's Parquet files: one row a sample, one row group an episode."""
+"""The columns of a dataset's Parquet files: one row per sample, one row group per episode."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -66,10 +66,10 @@ def schema(joints: int, residual: bool) -> pa.Schema:
 
 
 def stored(trace: Trace, every: int) -> Trace:
-    """The part of a trace that a shard stores: every ``every``-th sample in single precision.
+    """The part of a trace that a shard stores: each ``every``-th sample, in single precision.
 
-    Collision labels keep the physics' rate. Poses of obstacles and contacts of checkers are left
-    out; an MCAP recording of the episode has them.
+    Collision labels keep the time resolution of the physics. Obstacle poses and checker contacts
+    are left out; an MCAP recording of the episode has them.
     """
     rows = slice(None, None, every)
 
@@ -143,7 +143,7 @@ def table(trace: Trace, number: int, residual: Array | None, like: pa.Schema) ->
 
 
 def _column(values: Array, kind: pa.DataType, gaps: bool) -> pa.Array:
-    """A column, with nulls for NaN where ``gaps`` may be; ``pa.array`` would import pandas."""
+    """A column; with ``gaps``, NaN becomes null. (``pa.array`` would import pandas.)"""
     values = np.ascontiguousarray(values, kind.to_pandas_dtype())
     known = np.packbits(~np.isnan(values), bitorder="little") if gaps else None
     buffers = [None if x is None else pa.py_buffer(x) for x in (known, values)]

@@ -26,7 +26,7 @@ from tauguard.models import ROBOTS, SceneObject, cura6, load_objects
 
 #: The configurations that ship, by name.
 NAMED = ("tauguard-collisions-v2", "tauguard-collisions-v1", "cura6-twin")
-#: Keys of a split that came after the first datasets were published.
+#: Keys of a split that were added after the first datasets were published.
 LATER_KEYS = ("clamp_seconds", "paired")
 
 
@@ -36,12 +36,12 @@ class Split:
 
     name: str
     episodes: int  #: number of episodes
-    quick_episodes: int  #: number with ``--quick``: the first ones
+    quick_episodes: int  #: number with ``--quick``, counted from the first episode
     seconds: float  #: length of an episode [s]
-    arms: tuple[str, ...]  #: names of designs; this list and every one below is cycled
-    individuals: tuple[int, ...]  #: seeds of the mismatch to the design; -1: none
+    arms: tuple[str, ...]  #: names of arm models; this list and each list below is cycled
+    individuals: tuple[int, ...]  #: seeds of the model mismatch; -1: none
     speeds: tuple[float, ...]  #: percent of the largest joint speeds
-    payloads_g: tuple[float, ...]  #: carried, not known to the observer [g]
+    payloads_g: tuple[float, ...]  #: carried masses, unknown to the observer [g]
     struck: float  #: fraction of the episodes that have collisions
     collisions: int  #: planned in each episode that has collisions
     kinds: tuple[str, ...]  #: kinds of collisions; a kind listed twice occurs twice as often
@@ -49,9 +49,11 @@ class Split:
     severities: tuple[tuple[float, float], ...]  #: wanted peak ``|tau_ext|`` of joints 1-4 [N m]
     temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
     picks: float  #: fraction of collision-free episodes with a payload picked up
-    unseen: tuple[str, ...]  #: properties without a value of the first split: "arm", ...
-    clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: how long a clamp lasts, drawn [s]
-    paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
+    unseen: tuple[str, ...]  #: properties ("arm", ...) that share no value with the first split
+    clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: drawn duration [s]
+    paired: bool = (
+        False  #: episodes 2k and 2k + 1 have the same motion, without and with collisions
+    )
 
 
 @dataclass(frozen=True)
@@ -59,17 +61,17 @@ class Configuration:
     """The description of a dataset; :func:`load` reads one."""
 
     name: str
-    seed: int  #: of every random draw
+    seed: int  #: seed of every random draw
     rate: int  #: rows a second [Hz]; the physics runs at 1000
     episodes_per_shard: int
     residual: bool  #: whether the momentum observer's estimate of tau_ext is stored
     mismatch: tuple[tuple[str, float], ...]  #: half-widths, see :class:`tauguard.models.Mismatch`
     splits: tuple[Split, ...]
     robots: tuple[RobotSource, ...] = ()  #: arms that are not the package's own
-    objects: tuple[SceneObject, ...] = ()  #: things around the arm in every episode
+    objects: tuple[SceneObject, ...] = ()  #: objects around the arm in every episode
 
     def to_json(self) -> str:
-        """As JSON text with sorted keys: equal configurations give equal text."""
+        """The configuration as JSON text with sorted keys: equal configurations give equal text."""
         values = asdict(self)
         for name in ("robots", "objects"):
             if not values[name]:
@@ -82,7 +84,7 @@ class Configuration:
 
     @classmethod
     def from_json(cls, text: str) -> Configuration:
-        """What :meth:`to_json` wrote."""
+        """The configuration that :meth:`to_json` wrote."""
         values = json.loads(text)
         splits = tuple(Split(**{k: _frozen(v) for k, v in s.items()}) for s in values["splits"])
         robots = tuple(
@@ -95,16 +97,16 @@ class Configuration:
 
     @property
     def sha256(self) -> str:
-        """Of the JSON text without the paths of the arms' files."""
+        """SHA-256 of the JSON text without the paths of the arms' files."""
         nowhere = replace(self, robots=tuple(replace(r, source="") for r in self.robots))
         return hashlib.sha256(nowhere.to_json().encode()).hexdigest()
 
     def anywhere(self) -> Configuration:
-        """A copy with the file names of the arms instead of their paths on this machine."""
+        """A copy in which the arms' files have names instead of paths on this machine."""
         return replace(self, robots=tuple(robot.anywhere() for robot in self.robots))
 
     def joints_of(self, arm: str) -> tuple[str, ...]:
-        """The joints' names of an arm, base to tip."""
+        """The joint names of an arm, base to tip."""
         return next((r.joints for r in self.robots if r.name == arm), cura6.JOINTS)
 
     def source_of(self, arm: str) -> str:
@@ -174,7 +176,7 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
     Args:
         values: the tables.
-        folder: that files of arms are looked for in.
+        folder: where files of arms are looked for.
     """
     top = checked_table("", {k: v for k, v in values.items() if k not in TABLES}, KEYS["top"])
     if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", top["name"]):

@@ -24,7 +24,7 @@ class Key:
 
 
 def refuse(key: str, value: Any, expected: str) -> NoReturn:
-    """``ValueError`` with key, value and what would work."""
+    """Raise ``ValueError`` with the key, its value and what would work."""
     shown = repr(value)
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
     raise ValueError(f"{key} = {shown}: expected {expected}")
@@ -39,12 +39,12 @@ def closest(word: str, known: Iterable[str]) -> str:
 def checked_table(
     where: str, values: Mapping[str, Any], keys: Mapping[str, Key], partial: bool = False
 ) -> dict[str, Any]:
-    """All keys of a table, read and checked; defaults where they are missing.
+    """Read and check all keys of a table; missing keys get their defaults.
 
     Args:
         where: the table's name.
-        values: of the file.
-        keys: that are known.
+        values: the table's content.
+        keys: known keys.
         partial: required keys may be missing.
 
     Raises:
@@ -159,7 +159,7 @@ def flag(value: Any) -> bool:
 
 
 def rows_a_second(value: Any) -> int:
-    """A rate that divides the physics' 1000 Hz."""
+    """A sample rate that divides the 1000 Hz of the physics."""
     rate = int(integer(1, 1000)(value))
     if 1000 % rate:
         raise ValueError

@@ -1,4 +1,4 @@
-"""A dataset's folder: its head file, its shards, and the lock of its one writer."""
+"""A dataset's folder: its head file, its shards, and the lock that allows one writer."""
 
 import contextlib
 import hashlib
@@ -29,7 +29,7 @@ def read_head(folder: Path) -> dict[str, Any]:
     """The content of ``dataset.json``.
 
     Raises:
-        ValueError: no dataset, a damaged one, or one of a newer version (its number is named).
+        ValueError: the folder holds no dataset, a damaged one, or one of a newer format.
         FileNotFoundError: no such folder.
     """
     path = folder / HEAD
@@ -73,14 +73,14 @@ def shard_count(configuration: Configuration, split: str) -> int:
 
 
 def shards(configuration: Configuration) -> Iterator[tuple[str, int]]:
-    """Split and number of every shard, in order."""
+    """Name of the split and number of every shard, in order."""
     for split in configuration.splits:
         for number in range(shard_count(configuration, split.name)):
             yield split.name, number
 
 
 def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[str, Any]]:
-    """The manifest's lines, one an episode, split by split; shards that are missing are skipped.
+    """The manifest's lines, one per episode, split by split; missing shards are skipped.
 
     Raises:
         ValueError: a damaged file of the manifest.
@@ -92,7 +92,7 @@ def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[
 
 
 def faults(folder: Path) -> Iterator[tuple[str, int, str | None]]:
-    """Split, number and fault (None: intact) of every shard; reads every byte."""
+    """Name of the split, number and fault (None: intact) of every shard; reads every byte."""
     for split, number in shards(configuration_in(folder)):
         yield split, number, fault(folder, split, number)
 
@@ -103,9 +103,9 @@ def checksums(folder: Path) -> str:
 
 
 def changed(folder: Path) -> list[tuple[str, str]]:
-    """Names of those among head, card, metadata and the checksums that have changed.
+    """Names of the files that have changed, among head, card, metadata and checksums.
 
-    A dataset without checksums gives none: an earlier version made it, or it is not complete.
+    A dataset without checksums, which is incomplete or of an earlier version, gives no names.
     """
     if not (folder / SUMS).exists():
         return []
@@ -125,13 +125,13 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 
 @contextlib.contextmanager
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
-    """In this block ``folder`` holds this dataset and this process is its only writer.
+    """Context in which ``folder`` holds this dataset and this process is its only writer.
 
-    Into an empty folder, head, arms and subfolders are written first.
+    If the folder is empty, the head file, the arms and the subfolders are written first.
 
     Raises:
         ValueError: the folder holds something else.
-        OSError: somebody else is writing there, or it cannot be made.
+        OSError: another process is writing into it, or it cannot be made.
     """
     made = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,7 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True)
 class DriveNumbers:
-    """Gains as a user knows them; one number a joint."""
+    """Drive gains of an arm, one number per joint."""
 
     gain: tuple[float, ...]  #: N m of joint torque per ampere
 
@@ -33,7 +33,7 @@ def preset_drive(columns: str | None, logs: Sequence[Trace]) -> tuple[str, Drive
     """Name and drive of the preset that the logs' columns are of, or else of the one named.
 
     Raises:
-        ValueError: logs of different presets, one of whose drives is known.
+        ValueError: the logs have columns of different presets, and the drive of one is known.
     """
     names = sorted({str(log.meta.get("columns") or columns or "no preset") for log in logs})
     if len(names) > 1 and not DRIVES.keys().isdisjoint(names):

@@ -1,4 +1,4 @@
-"""Generation of a dataset shard by shard, on processes or a Ray cluster; a run can be resumed."""
+"""Generate a dataset shard by shard, in processes or on a Ray cluster; a run can be resumed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Built:
 
     made: int = 0  #: shards
     kept: int = 0  #: shards that were intact already
-    episodes: int = 0  #: in all shards
+    episodes: int = 0  #: episodes in all shards
     seconds: float = 0.0  #: simulated in this run [s]
 
 
@@ -36,19 +36,19 @@ def generate_dataset(
     workers: int | None = None,
     ray: str | None = None,
 ) -> Built:
-    """Write the dataset, or the missing part of it.
+    """Write the dataset, or the shards that are missing.
 
     The bytes are the same for any number of workers and for a cluster.
 
     Args:
-        configuration: of the dataset.
-        folder: made if it does not exist; if it does, it is empty or holds this dataset.
-        workers: processes (default: the processors there are); 1 stays in this process.
+        configuration: description of the dataset.
+        folder: created if it does not exist; otherwise it must be empty or hold this dataset.
+        workers: number of processes (default: one per processor); 1 computes in this process.
         ray: address of a Ray cluster to work on instead ("local" starts one here).
 
     Raises:
         ValueError: the folder holds something else; nothing in it is changed.
-        OSError: it cannot be written, somebody else is writing it, or a worker died.
+        OSError: the folder cannot be written, another process is writing it, or a worker died.
     """
     count = workers or os.cpu_count() or 1
     done = Built()

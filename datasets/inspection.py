@@ -56,7 +56,7 @@ class SplitSummary:
 
 
 def summarised(folder: Path) -> dict[str, SplitSummary]:
-    """Counts from the manifest, split by split; planned classes are of the episodes that exist.
+    """Counts from the manifest, split by split; planned counts are of existing episodes.
 
     Raises:
         ValueError: no dataset, one of a newer version, or a damaged manifest.
@@ -123,7 +123,7 @@ def _count(into: dict[str, Counter[str]], what: dict[str, Counter[str]]) -> None
 
 
 def leaks(configuration: Configuration, found: dict[str, SplitSummary]) -> list[str]:
-    """Leaks between splits: equal motion seeds, and values that a split calls unseen."""
+    """Leaks between splits: equal motion seeds, and values that a split declares unseen."""
     lines = []
     names = list(found)
     for i, a in enumerate(names):
@@ -169,7 +169,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def unchecked(folder: Path) -> list[str]:
-    """Files of a complete dataset that no checksum covers: it was made by an earlier version."""
+    """Files of a complete dataset without a checksum, because an earlier version made it."""
     if (folder / SUMS).is_file():
         return []
     return [name for name in (HEAD, CARD, CROISSANT) if (folder / name).is_file()]
@@ -190,13 +190,13 @@ def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
 
 
 def class_order(value: str) -> tuple[float, str]:
-    """Numbers and ranges by size, words by letters."""
+    """Sort key: numbers and ranges by size, words by alphabet."""
     head = value.split("-")[0]
     return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
 
 
 def report(folder: Path) -> dict[str, Any]:
-    """Everything that `tauguard inspect` shows, as plain values."""
+    """All results that `tauguard inspect` shows, as plain values."""
     head = read_head(folder)
     configuration = configuration_in(folder)
     found = summarised(folder)
@@ -243,16 +243,16 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
 def same_again(
     folder: Path, line: dict[str, Any], robot: str | Path | None = None
 ) -> tuple[Trace | None, bool]:
-    """Simulate an episode from its line; the trace, and whether it equals the stored samples.
+    """Simulate an episode again: the trace, and whether it equals the stored samples.
 
     Args:
         folder: folder of the dataset.
-        line: of its manifest.
-        robot: the file of the episode's arm, where it is not the package's own.
+        line: the episode's line of the manifest.
+        robot: the file of the episode's arm, if the arm is not part of the package.
 
     Raises:
-        ValueError: the arm's file is not here, or not what the dataset was made with, or a file
-            for an arm of the package.
+        ValueError: the arm's file is missing or not the one the dataset was made with, or a file
+            was given for an arm of the package.
     """
     episode = Episode.from_json(json.dumps(line["episode"]))
     configuration = configuration_in(folder)

@@ -1,4 +1,4 @@
-"""A page of charts of a dataset's content."""
+"""Charts of a dataset's content, on one page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLOURS = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
 
 
 def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
-    """Classes as planned and as achieved, severity by kind, and one collision of the dataset."""
+    """Draw planned and achieved counts by class, severity by kind, and one collision."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -18,7 +18,7 @@ def labelled(
     lines: NDArray[np.int64],
     t: Array,
 ) -> tuple[tuple[float, float], ...] | None:
-    """When a column of labels says that something touches the arm.
+    """The times at which a label column says that something touches the arm.
 
     Args:
         header: names of the columns.
@@ -28,7 +28,7 @@ def labelled(
 
     Returns:
         Times of the first and last sample of each contact; None without a column in LABELS, or
-        where it holds something else than 0 and 1, or false and true.
+        or if it holds values other than 0 and 1, or false and true.
     """
     columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
     cells = dict(rows) if columns else {}

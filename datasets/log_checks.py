@@ -14,11 +14,11 @@ from tauguard.traces.trace import Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
-#: No joint turns further than two turns [rad]; positions in degrees exceed this.
+#: No joint turns by more than two turns [rad]; positions in degrees exceed this.
 FURTHEST = 4 * np.pi
 #: Velocities are integrated over this time and compared with the change of position [s].
 SPAN = 0.1
-#: No arm's motor takes more [A].
+#: No arm's motor draws more [A].
 AMPERES = 100.0
 #: A current is saturated if it stays at its largest value for this many samples in a row, and that
 #: value is at least this multiple of the median.
@@ -28,14 +28,14 @@ Where = Callable[[int], str]
 
 
 def checked(trace: Trace, where: Where) -> tuple[str, ...]:
-    """Notes on faults that a detector tolerates.
+    """Check a log and return notes on faults that a detector tolerates.
 
     Args:
         trace: as read.
         where: text for a row's number, such as "line 12".
 
     Raises:
-        ValueError: a gap, degrees, velocities that are not those of the positions.
+        ValueError: a gap, angles in degrees, or velocities that do not fit the positions.
     """
     _refuse_degrees(trace, where)
     notes = _timing(trace, where)
@@ -132,7 +132,7 @@ def _alike(a: Array, b: Array) -> float:
 
 
 def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
-    """Joints whose current rests at its largest value: name, first row, longest run, value [A]."""
+    """Joints whose current stays at its largest value: name, first row, longest run, value [A]."""
     found = []
     for name, current in zip(trace.joint_names, trace.current.T, strict=True):
         size = np.abs(current)

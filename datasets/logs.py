@@ -21,8 +21,8 @@ from tauguard.untrusted_input import reading
 
 #: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
-#: Rows that repeat the state are left out where they are this share, or more: a recorder that is
-#: faster than its robot. Below it, a standing arm repeats its numbers by chance.
+#: Rows that repeat the state are left out if they are at least this fraction: then the recorder is
+#: faster than its robot. Below it, a standing arm may repeat its values by chance.
 REPEATED = 0.2
 
 
@@ -49,19 +49,19 @@ def read_log(
             system whose ``JointState`` messages hold the motor currents in ``effort``.
             If they are joint torques, set ``meta["effort"]`` of the trace to "torque".
         columns: for CSV, a map, the name of a preset (see ``PRESETS``), or "auto" for what names
-            and numbers suggest; without one the header line must be that of a preset.
+            and numbers suggest; without it the header line must be that of a preset.
         joint_names: what the joints are called, in the order of the columns (default: the map's
             names, the messages' names, or joint_1, joint_2, ...); for MCAP also which joints.
         mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
 
     Returns:
-        The trace, without truth, its times as they are in the log, and notes on repairs.
+        The trace, without truth and with the log's own times, and notes on repairs.
 
     Raises:
         ValueError: a missing column, a bad number, a cut-off row, time that does not increase, a
-            gap, degrees, velocities that are not those of the positions: one line with the file,
-            the row or line, and what would work. Only what a map's ``repair``
-            names is repaired, and a note says so.
+            gap, angles in degrees, or velocities that do not fit the positions: one line with the
+            file, the row or line, and what would work. Only what a map's ``repair`` names is
+            repaired, and a note says so.
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
@@ -80,7 +80,7 @@ def read_log(
 
 
 def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
-    """The map itself, the preset of that name, or the preset that fits the header line."""
+    """The given map, the preset of the given name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
     if columns is not None and columns != "auto":
@@ -107,7 +107,7 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
 
 
 def _beginning(path: Path) -> tuple[list[str], Array]:
-    """Names of the columns, and the numbers of the first rows, NaN for what is none."""
+    """Column names, and the values of the first rows; NaN for a cell that is no number."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         rows = list(islice((row for row in csv.reader(stream) if row), LOOKED_AT + 1))
     header = [cell.strip() for cell in rows[0]] if rows else []
@@ -326,7 +326,7 @@ def parse(
 def increasing(
     t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[str]
 ) -> NDArray[np.bool_]:
-    """Rows to keep so that time increases strictly; repeated times only if the map says so."""
+    """Rows to keep so that time increases strictly; times may repeat only if the map allows it."""
     step = np.diff(t)
     back = np.flatnonzero(step < 0)
     if back.size:
@@ -349,16 +349,16 @@ def increasing(
 
 
 def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
-    """Rows to keep so that a recorder's copies of one state do not count as samples.
+    """Rows to keep so that a recorder's copies of one state are not taken for samples.
 
-    A difference quotient over copies is 0, and then twice the speed. A state that really stays is
-    kept at the usual interval of new ones.
+    A difference quotient is 0 over a copy and twice the speed after it. A state that really stays
+    is kept at the usual interval of new ones.
 
     Args:
         t: times [s], shape (T,).
         state: all signals, shape (T, columns).
-        keep: rows that count, shape (T,).
-        notes: gets a line.
+        keep: rows to consider, shape (T,).
+        notes: a line on the rows left out is appended.
     """
     rows = np.flatnonzero(keep)
     new = np.concatenate([[True], (np.diff(state[rows], axis=0) != 0).any(axis=1)])

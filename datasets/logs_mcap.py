@@ -1,4 +1,4 @@
-"""MCAP logs: a tauguard recording, or anybody's ``sensor_msgs/msg/JointState`` messages."""
+"""Read MCAP logs: tauguard's recordings, and ``sensor_msgs/msg/JointState`` of other programs."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
 
 
 def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
-    """The first topic of the type, and its log times and messages.
+    """Name, log times and messages of the first topic of the type.
 
-    They are read from the data, not by the index at the file's end: messages that a damaged index
-    leaves out would be lost without an error.
+    Messages are read from the data, not through the index at the file's end: those that a damaged
+    index omits would be lost without an error.
     """
     from mcap.reader import NonSeekingReader, make_reader
 
@@ -81,7 +81,7 @@ def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
 def assemble(
     topic: str, messages: Sequence[tuple[int, bytes]], joint_names: Sequence[str] | None
 ) -> Trace:
-    """One trace of the messages; times are their stamps, or the log times if there are none."""
+    """Make a trace of the messages; times are stamps, or log times if there are no stamps."""
     if len(messages) < 2:
         raise ValueError(f"{topic}: {len(messages)} messages, expected at least 2")
     rows = [joint_state(f"{topic}, message {k}", data) for k, (_, data) in enumerate(messages)]

@@ -1,4 +1,4 @@
-"""Episodes to simulate, drawn from a seed: with collisions, without, and those of the demo."""
+"""Plans of episodes, drawn from a seed: with collisions, without collisions, and for the demo."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from tauguard.traces import STRATA
 
 #: Payloads of the dissertation's 15 training slices [g]: 3 without, 2 of each of six.
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
-#: Half strikes, a quarter pulses, a quarter clamps.
+#: Half are strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
-#: No collision before this time, as a detector settles first [s].
+#: No collision begins before this time, because a detector settles first [s].
 BEGIN = 3.0
 #: Length of a collision's slot, its earliest onset in it, and how much later it may begin [s].
 SLOT, OFFSET, SPREAD = 3.0, 0.9, 0.2
-#: How long a clamp lasts: drawn between these [s].
+#: Shortest and longest clamp [s]; the duration is drawn between them.
 CLAMP_SECONDS = (0.4, 0.8)
 
 
@@ -31,7 +31,7 @@ def collision_plans(
     links: Sequence[int] = (2, 3, 4, 5, 6),
     clamp_seconds: tuple[float, float] = CLAMP_SECONDS,
 ) -> tuple[CollisionPlan, ...]:
-    """``count`` collisions, one a slot, spread over kinds, links and strata.
+    """``count`` collisions, one per time slot, spread over kinds, links and strata.
 
     Args:
         rng: shuffles the combinations of kind, link and stratum.
@@ -71,8 +71,8 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
 def torque_scale(robot: str) -> float:
     """Factor on severities and loads for this robot, at most 1.
 
-    With it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA` equals the
-    robot's largest torque limit.
+    Multiplied by it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA`
+    equals the robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -101,9 +101,10 @@ def struck_episodes(
     mismatch: Mismatch | None = None,
     robot: str = "cura6",
 ) -> list[Episode]:
-    """Episodes with ``collisions`` each; :func:`pairing` combines speeds [%] and payloads [g].
+    """Episodes with ``collisions`` collisions each.
 
-    Severities are multiplied by the robot's :func:`torque_scale`; payloads are not.
+    Function :func:`pairing` combines speeds [%] and payloads [g]. Severities are multiplied by the
+    robot's :func:`torque_scale`; payloads are not.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -142,7 +143,7 @@ def free_episodes(
     picks: bool = False,
     robot: str = "cura6",
 ) -> list[Episode]:
-    """Collision-free episodes; with ``picks`` a payload is taken up half-way through each."""
+    """Collision-free episodes; with ``picks`` the arm picks up a payload half-way through each."""
     children = np.random.SeedSequence([seed, 2]).spawn(count)
     episodes = []
     for i, child in enumerate(children):
@@ -164,9 +165,9 @@ def free_episodes(
     return episodes
 
 
-#: Percent of the maximum joint speed that the demo is judged at.
+#: Joint speeds at which the demo is evaluated [% of the maximum].
 SPEEDS = (10.0, 30.0, 60.0)
-#: Percent of the maximum joint speed that it is trained at.
+#: Joint speeds at which the demo is trained [% of the maximum].
 TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
 
 
@@ -175,20 +176,20 @@ class DemoPlan:
     """Every episode of a demo: one arm; no seed is used twice."""
 
     train: list[Episode]
-    judge_struck: list[Episode]  #: with collisions, to test on
-    judge_free: list[Episode]  #: without collisions, to test on
+    judge_struck: list[Episode]  #: test episodes with collisions
+    judge_free: list[Episode]  #: test episodes without collisions
     showcase: Episode  #: for the replay
 
     @property
     def seconds(self) -> float:
-        """Simulated for training and judging [s]."""
+        """Simulated time of training and test episodes [s]."""
         return sum(e.seconds for e in (*self.train, *self.judge_struck, *self.judge_free))
 
 
 def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
     """75 collisions to train on; 72 collisions and 10 collision-free minutes to test on.
 
-    The showcase has nine collisions of all kinds, then a payload that the observer does not know.
+    The showcase has nine collisions of all kinds, then a payload that is unknown to the observer.
     """
     arm, scale = Mismatch(seed=seed), torque_scale(robot)
     base = 4 * seed

@@ -19,7 +19,7 @@ from tauguard.traces import Trace
 if TYPE_CHECKING:
     from tauguard.detectors import RobotNumbers
 
-#: Files that :func:`read` takes for recordings.
+#: Extensions of the files that :func:`read` takes for recordings.
 ENDINGS = (".mcap", ".csv", ".parquet")
 
 
@@ -36,13 +36,14 @@ def read(
     """The traces of a dataset, of a folder of recordings or of one recording, one at a time.
 
     Args:
-        path: a folder that ``tauguard generate`` made; a folder of MCAP or CSV files; one of those.
-        splits: of a dataset, which of its splits (default: all).
-        arm: of a dataset, only this arm's episodes.
+        path: a folder that ``tauguard generate`` made, a folder of MCAP or CSV files, or one such
+            file.
+        splits: names of a dataset's splits (default: all).
+        arm: read only this arm's episodes of a dataset.
 
     Yields:
         Traces. Those of a dataset have truth, and the nominal arm as attachments: ``arm.xml``, and
-            ``drive.json`` for an arm that is not the package's own. The arm's own file is not
+            ``drive.json`` for an arm that is not part of the package. The arm's own file is not
             needed.
 
     Raises:
@@ -101,7 +102,7 @@ def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> 
 
 
 def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trace]:
-    """The traces of some lines of one shard."""
+    """The traces of the episodes that some manifest lines of one shard describe."""
     if not wanted:
         return
     path = folder / wanted[0]["shard"]
@@ -122,7 +123,7 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
 
 
 def training_episodes(folder: Path, arm: str | None) -> list[Trace]:
-    """One arm's episodes of the first split, the one to train on.
+    """One arm's episodes of the first split, which is the training split.
 
     Raises:
         ValueError: the split has several arms and ``arm`` is None, or it has no such arm.

@@ -1,4 +1,4 @@
-"""The numbers of a real arm: from its robot file, its drives, and what a user knows of them."""
+"""The numbers of a real arm, from its robot file, its published drive gains and a user's flags."""
 
 import re
 from collections.abc import Sequence
@@ -52,7 +52,7 @@ def robot_numbers(
 
 
 def unnamed(count: int) -> tuple[str, ...]:
-    """The names of joints that have no name: ``joint_1``, ..."""
+    """Names for joints that have none: ``joint_1``, ..."""
     return tuple(f"joint_{i}" for i in range(1, count + 1))
 
 
@@ -61,13 +61,13 @@ def is_torque(trace: Trace) -> bool:
     return trace.meta.get("effort") == "torque"
 
 
-# -- does the robot file belong to the model, to the logs? ----------------------------------------
+# -- consistency of robot file, model and logs -----------------------------------------------------
 
 
 def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
-    """Refuse a robot file that cannot be read, or that is not of the arm a model was trained on.
+    """Refuse a robot file that cannot be read, or that is not of the arm of a trained model.
 
-    Joint names and the places of the joints must agree; masses may differ, as calibration changes
+    Joint names and joint positions must agree; masses may differ, because calibration changes
     them.
 
     Raises:
@@ -98,7 +98,7 @@ def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
 def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> None:
     """Refuse the robot file of one UR beside the columns of another UR.
 
-    The preset of the columns would bring the gains of its own arm. Files and columns of other
+    The preset of the columns would supply the gains of the wrong arm. Files and columns of other
     names are accepted.
 
     Raises:
@@ -170,13 +170,13 @@ def known_arm(
     columns: str | None,
     gains: tuple[float, ...],
 ) -> tuple[ArmModel, str]:
-    """The arm that free motion begins with, and where its gains come from, in words.
+    """The initial arm for the method free-motion, and a text that says where its gains come from.
 
-    They are those given, else those of a calibrated robot file, else as :func:`initial_arm` has
+    The gains are the given ones, else those of a calibrated robot file, else those of
     them.
 
     Raises:
-        ValueError: as for :func:`initial_arm`; logs of torques for an arm calibrated on currents.
+        ValueError: as for :func:`initial_arm`, or torque logs with an arm calibrated on currents.
     """
     arm = None if gains else load_arm(robot)
     if arm is not None:
@@ -197,7 +197,7 @@ def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
         raise ValueError(f"--gains {gains}: every number must be finite and not 0")
 
 
-# -- what a calibration leaves unexplained --------------------------------------------------------
+# -- notes on unexplained torque -------------------------------------------------------------------
 
 
 def calibration_notes(
@@ -206,7 +206,7 @@ def calibration_notes(
     """Notes on torque that a calibration does not explain, and on a log that may have had a load.
 
     Args:
-        arm: identified.
+        arm: the identified arm.
         traces: by file name.
         recordings: the same traces with their loads.
         held: held-out residual of each [N m], (n,) each; empty: not known.

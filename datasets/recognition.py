@@ -1,8 +1,8 @@
-"""Which columns of a CSV file are which: proposed from their names and numbers.
+"""Propose a column map for a CSV file from the names and values of its columns.
 
 Names come in groups that differ by a joint's number, such as ``q0`` to ``q6``, ``actual_q_0`` or
-``/joint_states/position[0]``. A group is told by its last word; groups of commands are not taken.
-What a name leaves open, numbers decide: angles beyond two turns are degrees, steps of time of more
+``/joint_states/position[0]``. The last word of its name identifies a group. Commands are ignored.
+Values decide the units: angles beyond two turns are degrees, and sample intervals of more
 than half a second are milliseconds or less.
 """
 
@@ -28,22 +28,22 @@ TIMES = (
 )
 #: Units of the time column, by the shortest usual step that they give.
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
-#: A name with such a word is of a command, of an estimate or of the tool, not of joints' sensors.
+#: A name with such a word is of a command, an estimate or the tool, not of a joint's sensor.
 _OTHER = re.compile(
     r"(^|_)(target|desired|des|command|commanded|cmd|goal|ref|reference|control|ext|external|"
     r"gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
 )
-#: ROS's JointState as tables have it: a joint's name before the kind of signal.
+#: Columns of ROS's JointState in a table: the joint's name, then the kind of signal.
 _NAMED = re.compile(r"^(.*?)([^/.]+)[/.](position|velocity|effort)$")
-#: The torques of KUKA's FRI hold the arm with the other sign.
+#: The torques of KUKA's FRI have the opposite sign.
 _FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
-#: Joints of an arm, at least and at most.
+#: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
 
 def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Columns that differ by their last number, which rises by one, by the name before it."""
+    """Columns whose names differ only in a last, consecutive number, grouped by name."""
     found: dict[str, list[tuple[int, str]]] = {}
     named: dict[str, list[str]] = {}
     for name in header:
@@ -73,11 +73,11 @@ def _field(prefix: str) -> str | None:
 
 
 def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
-    """The map that names and numbers suggest, None if positions, efforts or the time are not found.
+    """The map that names and values suggest; None if positions, efforts or the time are not found.
 
     Args:
         header: names of all columns.
-        table: numbers of some rows, NaN where there is none, shape (rows, columns).
+        table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
     """
     time = next((name for name in header if name.strip().lower() in TIMES), None)
     groups: dict[str, tuple[str, ...]] = {}
@@ -134,7 +134,7 @@ def _joints(columns: Sequence[str]) -> tuple[str, ...]:
 
 
 def rate_of(q: Array, qd: Array) -> float:
-    """Rows a second at which velocities are those of the positions [Hz]; 0 where nothing moves.
+    """Sample rate at which the velocities fit the positions [Hz]; 0 if nothing moves.
 
     Args:
         q: shape (rows, n).
@@ -148,7 +148,7 @@ def rate_of(q: Array, qd: Array) -> float:
 
 
 def described(columns: ColumnMap) -> str:
-    """A map in one line, for the user to agree to."""
+    """A map in one line, for the user to accept."""
     unit = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}[columns.time_scale]
     angle = "deg" if columns.degrees else "rad"
     ampere = "mA" if columns.current_scale == 1e-3 else "A"

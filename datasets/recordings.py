@@ -1,4 +1,4 @@
-"""Folders of labelled recordings, one MCAP file an episode: simulated, resumed, read."""
+"""Simulate, resume and read folders of labelled recordings, one MCAP file per episode."""
 
 import contextlib
 import os

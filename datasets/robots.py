@@ -1,4 +1,4 @@
-"""Arms of a dataset that come from files or other packages: source and identity of each."""
+"""Source and identity of a dataset's arms that come from files or other packages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from tauguard.models import Robot, Scene, SceneSpec, compose, cura6
 
-#: An arm's name in a dataset is part of file names.
+#: Form of an arm's name in a dataset, where it is part of file names.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 
 
@@ -22,15 +22,15 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 class RobotSource:
     """An arm by name or file, and its identity when the dataset was described."""
 
-    name: str  #: in the dataset: the given name, or the file's without ending
+    name: str  #: name in the dataset: the given name, or the file's without extension
     source: str
     """A name that :func:`tauguard.models.load_arm` knows, or a file's whole path; in a dataset's
     folder the file's name alone."""
     joints: tuple[str, ...]
-    sha256: str  #: of everything that its simulation depends on
+    sha256: str  #: hash of everything that its simulation depends on
 
     def anywhere(self) -> RobotSource:
-        """With the file's name instead of its place on this machine."""
+        """A copy with the file's name instead of its path on this machine."""
         return replace(self, source=Path(self.source).name)
 
 

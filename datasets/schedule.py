@@ -42,7 +42,7 @@ class Planned:
         return f"{self.split}/{self.number}"
 
     def key(self, configuration: Configuration, code: str) -> str:
-        """SHA-256 of all that decides the episode's bytes: configuration, number and code."""
+        """SHA-256 of what decides the episode's bytes: configuration, number and code."""
         text = "\n".join((configuration.identity, self.name, self.episode.config_hash, code))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -83,9 +83,9 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
 
 
 def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
-    """The number by which an episode is drawn, and whether it has collisions.
+    """The number that seeds an episode's draw, and whether the episode has collisions.
 
-    Both episodes of a pair are drawn by the number of the pair; the second has the collisions.
+    The number of the pair seeds both of its episodes; the second one has the collisions.
     """
     if split.paired:
         return number // 2, bool(number % 2)
@@ -116,7 +116,7 @@ def _fraction(fraction: float) -> tuple[bool, ...]:
 def _collisions(
     split: Split, seed: list[int], draw: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
-    """The collisions of an episode; dealing continues from the episode with collisions before."""
+    """The collisions of an episode; dealing continues from the previous such episode."""
     before = (
         draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
     )
@@ -136,7 +136,7 @@ Balance = dict[str, dict[str, int]]
 
 
 def stated_balance(configuration: Configuration) -> dict[str, Balance]:
-    """Planned counts by class in every split, without drawing every episode."""
+    """Planned counts by class in each split, computed without drawing every episode."""
     return {split.name: _stated(configuration, split) for split in configuration.splits}
 
 

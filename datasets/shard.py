@@ -31,9 +31,9 @@ from tauguard.envs import Simulation, SimulationDiverged
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 
-#: Gain of the momentum observer [1/s]; speed over which nominal friction changes sign [rad/s].
+#: Gain of the momentum observer [1/s]; width of the sign change of nominal friction [rad/s].
 OBSERVER_GAIN, STANDSTILL = 50.0, 0.05
-#: Of the physics [Hz].
+#: Rate of the physics [Hz].
 PHYSICS_RATE = 1000
 #: zstd's level; the levels above cost much time for a few percent.
 ZSTD_LEVEL = 3
@@ -46,8 +46,8 @@ class ShardTask:
     folder: str  #: of the dataset
     configuration: str  #: as JSON
     split: str
-    number: int  #: of the shard within the split
-    code: str  #: hash of the code that must compute it
+    number: int  #: number of the shard within the split
+    code: str  #: hash of the code that must compute the shard
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Done:
     number: int
     episodes: int
     seconds: float  #: simulated [s]
-    kept: bool  #: it existed already and was intact
+    kept: bool  #: the shard existed already and was intact
 
 
 def data_path(split: str, number: int) -> str:
@@ -72,7 +72,7 @@ def manifest_path(split: str, number: int) -> str:
 
 
 def numbers_in(configuration: Configuration, split: Split, shard: int) -> range:
-    """The episodes of a shard."""
+    """The numbers of the episodes in a shard."""
     first = shard * configuration.episodes_per_shard
     return range(first, min(first + configuration.episodes_per_shard, split.episodes))
 
@@ -122,7 +122,7 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     """The lines of one file of the manifest.
 
     Raises:
-        ValueError: it is not what was written.
+        ValueError: the file is damaged.
     """
     *lines, last, end = [b""] * 2 + path.read_bytes().split(b"\n")  # at least three
     lines = lines[2:]
@@ -165,7 +165,7 @@ def _write(
 def _write_episodes(
     stream: BinaryIO, configuration: Configuration, episodes: list[Planned], code_hash: str
 ) -> list[dict[str, Any]]:
-    """Write the samples, a row group an episode; returns the episodes' lines."""
+    """Write the samples, one row group per episode; returns the episodes' manifest lines."""
     like = schema(configuration.most_joints, configuration.residual)
     lines, groups = [], 0
     with pq.ParquetWriter(stream, like, **writing(like)) as writer:
@@ -183,7 +183,7 @@ def _write_episodes(
 
 
 def writing(like: pa.Schema) -> dict[str, Any]:
-    """How a shard of this schema is written: options of pyarrow's ``ParquetWriter``."""
+    """Options of pyarrow's ``ParquetWriter`` for a shard of this schema."""
     floats = [field.name for field in like if pa.types.is_floating(field.type)]
     return {
         "compression": "zstd",

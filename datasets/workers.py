@@ -1,4 +1,4 @@
-"""Worker processes: none outlives the command, and it is an error if one dies."""
+"""Worker processes; no process outlives the command, and the death of one is an error."""
 
 import contextlib
 import multiprocessing
@@ -31,7 +31,7 @@ class Terminated(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """In this block SIGTERM raises :class:`Terminated`, so that ``finally`` blocks run."""
+    """Context in which SIGTERM raises :class:`Terminated`, so that ``finally`` blocks run."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -52,7 +52,7 @@ def writing(
 ) -> Iterator[Generator[Result]]:
     """The results of tasks that write files into ``folder``, see :func:`in_processes`.
 
-    When the block ends, also by SIGTERM, no worker is left and no partly written file.
+    When the block ends, also by SIGTERM, no worker and no partly written file is left.
     """
     with terminable():
         results = in_processes(work, tasks, workers)
@@ -75,7 +75,7 @@ def in_processes(
 
     Raises:
         WorkerDied: a worker was killed.
-        Exception: what ``work`` raised. Whatever is raised here, no worker is left running.
+        Exception: the exception of ``work``. After any exception no worker is left running.
     """
     if workers == 1:
         yield from map(work, tasks)
@@ -106,7 +106,7 @@ def in_processes(
 
 
 def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Connection:
-    """Start a worker and note it in ``crew``; a signal to stop waits until both are done."""
+    """Start a worker and append it to ``crew``; a stop signal is handled after both are done."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
@@ -120,7 +120,7 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
 
 @contextlib.contextmanager
 def _stop_signals_deferred() -> Iterator[None]:
-    """Signals to stop are handled after the block.
+    """Context that defers signals to stop until its end.
 
     Masking them in this thread is not enough: they would reach another thread of the process.
     """
@@ -143,7 +143,7 @@ def _stop_signals_deferred() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _ctrl_c_blocked() -> Iterator[None]:
-    """A process started here inherits the mask: Ctrl-C reaches its parent only, which ends it."""
+    """Block Ctrl-C in processes started here, which inherit the mask; their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -173,7 +173,7 @@ def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Stop at once if the parent was killed: another run may begin soon."""
+    """Stop at once if the parent was killed, because another run may begin soon."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])

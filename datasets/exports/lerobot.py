@@ -29,7 +29,7 @@ CHUNK = 1000
 
 
 def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) -> int:
-    """Write traces with truth as one LeRobot dataset; returns how many there were.
+    """Write traces with truth as one LeRobot dataset; returns the number of episodes.
 
     Args:
         traces: one an episode, all of equally many joints.
@@ -82,7 +82,7 @@ def features(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
 
 
 def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
-    """A trace as LeRobot's columns; ``first`` is its first row in the dataset."""
+    """A trace as LeRobot's columns; ``first`` is the index of its first row in the dataset."""
     truth = trace.truth
     if truth is None or trace.q_des is None or trace.qd_des is None:
         raise ValueError("a trace without truth or references cannot be exported to LeRobot")
@@ -108,7 +108,7 @@ def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
 
 
 class Moments:
-    """Smallest, largest, mean and standard deviation of columns, accumulated part by part."""
+    """Minimum, maximum, mean and standard deviation of columns, accumulated part by part."""
 
     def __init__(self, values: Array) -> None:
         """Of rows (T,) or (T, c)."""
@@ -118,7 +118,7 @@ class Moments:
         self.spread = ((wide - self.mean) ** 2).sum(axis=0)
 
     def add(self, other: Moments) -> None:
-        """Take the rows of another part in."""
+        """Add the rows of another part."""
         count = self.count + other.count
         apart = other.mean - self.mean
         self.spread = self.spread + other.spread + apart**2 * self.count * other.count / count
@@ -127,7 +127,7 @@ class Moments:
         self.count = count
 
     def values(self) -> dict[str, list[float]]:
-        """As LeRobot names them."""
+        """The statistics under LeRobot's names."""
         return {
             "min": self.low.tolist(),
             "max": self.high.tolist(),
@@ -233,7 +233,7 @@ def _write_meta(
 
 
 def _tasks() -> pa.Table:
-    """The one task, as the data frame with the task as its index that LeRobot reads."""
+    """The only task as a data frame that has the task as its index, as LeRobot reads it."""
     index = "__index_level_0__"
     columns: list[dict[str, Any]] = [
         {"name": "task_index", "field_name": "task_index", "pandas_type": "int64"},

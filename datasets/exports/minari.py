@@ -1,4 +1,4 @@
-"""Minari datasets (extra ``export``): one step a sample."""
+"""Write Minari datasets (extra ``export``): each sample is one step."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -59,7 +59,7 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
 
 
 def _buffer(trace: Trace, number: int) -> Any:
-    """One episode; Minari wants one observation, and one row of infos, more than actions."""
+    """One episode; Minari expects one more observation, and one more row of infos, than actions."""
     from minari.data_collector import EpisodeBuffer
 
     truth = trace.truth
