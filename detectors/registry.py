@@ -37,10 +37,8 @@ from tauguard.detectors.scores.free_motion import FittedFreeMotion, FreeMotion
 from tauguard.detectors.scores.kernel import KernelMachine
 from tauguard.detectors.scores.learned import (
     Boosting,
-    OneClass,
     OneOutput,
     PlainSrqSvr,
-    Remoteness,
     SrqSvr,
     WindowNetwork,
 )
@@ -58,7 +56,6 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "residual-thresholds": ResidualThresholds,
     "moving-thresholds": MovingThresholds,
     "cusum": Cusum,
-    "one-class": OneClass,
     "window-network": WindowNetwork,
     "boosting": Boosting,
     "free-motion": FreeMotion,
@@ -87,7 +84,6 @@ FILE_TYPES: dict[str, type] = {
         LoadDeviation,
         Network,
         OneOutput,
-        Remoteness,
         RobotNumbers,
         Scaling,
         SensorNoise,

@@ -1,6 +1,6 @@
 """Learned methods that score windows of the residual.
 
-Support vector regression with the SRQ kernel, a one-class method, boosting and a neural network.
+Support vector regression with the SRQ kernel, boosting and a neural network.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, Scaling
-from tauguard.detectors.features.windows import Prepared, WindowShape, draw_windows, median_distance
+from tauguard.detectors.features.windows import WindowShape, draw_windows, median_distance
 from tauguard.detectors.frozen import Frozen
-from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor, srq_kernel
+from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
 from tauguard.detectors.scores.regressors import Forest, Network
 from tauguard.detectors.scores.windowed import Regressor, Windowed
 from tauguard.traces.trace import Trace
@@ -94,56 +94,6 @@ class PlainSrqSvr(SrqSvr):
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""
         return Scaling(front.joints)
-
-
-#: Smallest kernel sum: the logarithm stays finite.
-LEAST = 1e-300
-
-
-@dataclass(frozen=True, eq=False)
-class Remoteness(Frozen):
-    """``-log`` of a kernel sum with weights of 0 or more, without bound far from its vectors."""
-
-    kernels: KernelMachine
-
-    def __call__(self, x: Array) -> Array:
-        """Values at the rows of x, shape (N, d) -> (N,)."""
-        found: Array = -np.log(np.maximum(self.kernels(x), LEAST))
-        return found
-
-
-@dataclass(frozen=True)
-class OneClass(Windowed):
-    """One-class SVM on windows of collision-free motion; collisions in the traces are not used."""
-
-    windows: int = 3_000
-    mined: int = 1_000  #: of the rarest collision-free moments, added in each of two rounds
-    sigma: float = 3.0  #: of the SRQ kernel
-    graded: bool = False
-    outside: float = 0.05  #: fraction of the training windows that may lie outside
-    name: ClassVar[str] = "one-class"
-
-    def draw(
-        self, rng: np.random.Generator, prepared: Sequence[Prepared], shape: WindowShape
-    ) -> tuple[Array, Array]:
-        """Collision-free windows, as many of a trace as it has rows."""
-        total = sum(int(p.free.sum()) for p in prepared)
-        x = []
-        for p in prepared:
-            rows = np.flatnonzero(p.free)
-            fraction = min(len(rows), -(-self.windows * len(rows) // total))
-            x.append(shape.of(p.signal, rng.choice(rows, fraction, replace=False)))
-        return np.concatenate(x), np.zeros(sum(map(len, x)))
-
-    def learn(self, x: Array, y: Array) -> Remoteness:
-        """The machine's decision function, but for its constant, as a remoteness."""
-        from sklearn.svm import OneClassSVM
-
-        model = OneClassSVM(kernel="precomputed", nu=self.outside, cache_size=500)
-        model.fit(srq_kernel(x, x, self.sigma))
-        vectors = np.ascontiguousarray(x[model.support_])
-        weights = np.ascontiguousarray(model.dual_coef_[0])
-        return Remoteness(KernelMachine(vectors, weights, 0.0, self.sigma))
 
 
 @dataclass(frozen=True)

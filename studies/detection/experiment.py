@@ -93,7 +93,6 @@ ALL = (
     "residual-thresholds",
     "moving-thresholds",
     "cusum",
-    "one-class",
     "window-network",
     "boosting",
 )
