@@ -1,8 +1,8 @@
 """Named hard cases with exact answers, for tauguard's kernels and for other libraries.
 
 A library takes part through an adapter: an object with a ``name`` and a method for each kind of
-case that it can answer (:class:`~tauguard.hard_cases.adapter.Adapter` lists them). A kind without
-a method is not asked.
+case that it supports (:class:`~tauguard.hard_cases.adapter.Adapter` lists them). A kind without
+a method is skipped.
 """
 
 from tauguard.hard_cases.adapter import Adapter, adapters

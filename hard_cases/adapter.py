@@ -1,11 +1,11 @@
-"""What a library implements to be asked, and the adapters there are."""
+"""The interface that a library implements to take part, and the known adapters."""
 
 import importlib
 from typing import Any, Protocol
 
 from tauguard.hard_cases.case import KINDS
 
-#: The adapters that come with the package: name of the library and where its adapter is.
+#: The adapters of the package: name of the library, and module and class of its adapter.
 BUILT_IN = {
     "tauguard": "tauguard.hard_cases.libraries.ours:Ours",
     "ipctk": "tauguard.hard_cases.libraries.ipctk_adapter:Ipctk",
@@ -17,11 +17,11 @@ BUILT_IN = {
 
 
 class Adapter(Protocol):
-    """A library to be asked. Only ``name`` is needed; a method that is absent is not asked.
+    """Interface of a library. Only ``name`` is required; kinds without a method are skipped.
 
-    Nor is one that raises ``NotImplementedError`` for a case of its kind.
+    A case for which a method raises ``NotImplementedError`` is skipped, too.
 
-    The methods and what they answer::
+    The methods and their results::
 
         vertex_face(x_t0, x_t1) -> time of impact or None     rows v, f0, f1, f2; shape (4, 3)
         edge_edge(x_t0, x_t1) -> time of impact or None       rows a0, a1, b0, b1; shape (4, 3)
@@ -40,11 +40,11 @@ class Adapter(Protocol):
 
 
 def adapters(names: tuple[str, ...] = ()) -> list[Adapter]:
-    """Adapters by name of a library or by ``module:Class``; all that are installed by default.
+    """Adapters by name of a library or by ``module:Class``; by default all installed libraries.
 
     Raises:
-        ValueError: neither a known name nor a class that can be imported and made without
-            arguments, or one without a name or without any of the methods.
+        ValueError: a text that is neither a known name nor a class that can be imported and made
+            without arguments, or one without a name or without any of the methods.
     """
     if not names:
         return [one for one in map(_installed, BUILT_IN.values()) if one is not None]

@@ -1,4 +1,4 @@
-"""A case: what is given, where it comes from, and which answers are right."""
+"""A case: its input, its origin, and the right answers."""
 
 import json
 import math
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 FOLDER = Path(__file__).parent / "cases"
-#: The kinds of questions; an adapter's method of that name answers them.
+#: The kinds of questions; the adapter's method of the same name answers them.
 KINDS = (
     "vertex_face",
     "edge_edge",
@@ -21,7 +21,7 @@ KINDS = (
     "scene",
     "observer",
 )
-#: A right time of impact is early by at most this fraction of the step, and never late by more than
+#: A right time of impact is early by at most this fraction of the step, and late by no more than
 #: one rounding.
 EARLY = 1e-5
 ROUNDING = 2.0**-52
@@ -38,8 +38,8 @@ class Case:
         kind: the adapter's method that answers it.
         origin: where the case was first found; ``of this project`` if it was made for this list.
         why: what makes it hard.
-        given: the method's arguments by name.
-        explained: if tauguard's own answer is wrong, the reason.
+        given: arguments of the method by name.
+        explained: the reason, if tauguard's own answer is wrong.
         expected: ``{"toi": "1/2"}`` (a fraction of the step; ``None``: no contact),
             ``{"overlap": true}``, or ``{"low": 0, "high": 1}``, bounds of a number.
     """
@@ -53,7 +53,7 @@ class Case:
     explained: str = ""
 
     def right(self, answer: object) -> bool:
-        """Whether ``answer`` is right; a time is never late, and early by 1e-5 at most.
+        """Whether ``answer`` is right; a time must not be late, and may be early by 1e-5.
 
         Raises:
             TypeError: as :meth:`wrong`.
@@ -61,13 +61,13 @@ class Case:
         return not self.wrong(answer)
 
     def wrong(self, answer: object) -> str:
-        """What is wrong with ``answer`` in a few words; empty if it is right.
+        """The error of ``answer`` in a few words; empty if it is right.
 
         ``missed`` and ``late by ...`` let bodies pass through each other. ``invented`` and ``early
-        by ...`` are too cautious. Others are ``out of bounds`` and ``not a number``.
+        by ...`` are conservative. Other texts are ``out of bounds`` and ``not a number``.
 
         Raises:
-            TypeError: of another type than the question asks for.
+            TypeError: ``answer`` has a wrong type for the question.
         """
         said, exact = self._plain(answer), self.exact
         if "low" in self.expected:
@@ -83,7 +83,7 @@ class Case:
         return "" if exact is None or said is None else mistimed(float(exact), said)
 
     def _plain(self, answer: object) -> Answer:
-        """The answer as a bool, a float or None; scalars of NumPy are converted."""
+        """The answer as a bool, a float or None; NumPy scalars are converted."""
         said: Any = answer.item() if isinstance(answer, np.generic) else answer
         number = isinstance(said, int | float) and not isinstance(said, bool)
         if "overlap" in self.expected:
@@ -114,7 +114,7 @@ class Case:
 
 
 def mistimed(exact: float, said: float) -> str:
-    """Say by how much a time exceeds what a right answer may be off; empty if it does not."""
+    """The error of a time beyond the tolerance, as text; empty within the tolerance."""
     if exact - EARLY <= said <= exact * (1 + ROUNDING):
         return ""
     if math.isnan(said):

@@ -1,4 +1,4 @@
-"""Every case put to every library: one row an answer."""
+"""Ask every library every case; each answer is one row."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -12,7 +12,7 @@ def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, A
 
     A row has ``case``, ``library``, ``expected``, ``answer``, ``right`` and ``wrong``. ``wrong``
     says in a few words what is wrong, see :meth:`Case.wrong`. A library without a method for a kind
-    of case is not asked. Nor is one that raises ``NotImplementedError``. Any other exception counts
+    of case is skipped, as is one that raises ``NotImplementedError``. Any other exception counts
     as its answer, and ``wrong`` is ``failed``.
     """
     libraries = list(libraries)
@@ -47,7 +47,7 @@ def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
 def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """Count by kind and library: cases asked, right answers, and wrong ones by what is wrong.
 
-    ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is too cautious.
+    ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is conservative.
     ``other`` is out of bounds, no number, or an error.
     """
     found: dict[tuple[str, str], list[str]] = {}

@@ -1,4 +1,4 @@
-"""Streams of robots that run: RTDE, ROS 2, lines of text, a played log; and a server for tests."""
+"""Live robot streams (RTDE, ROS 2, lines of text, a replayed log), and a server for tests."""
 
 from tauguard.live.lines import LineStream
 from tauguard.live.played import PlayedStream

@@ -8,7 +8,7 @@ from typing import Self
 from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live.stream import Sample
 
-#: Answers that wait to be shown; further ones are dropped, changes of state last.
+#: Length of the queue of answers; further answers are dropped, changes of state last.
 WAITING = 1000
 #: At the end, wait this long for answers that have not been shown [s].
 PATIENCE = 1.0
@@ -22,7 +22,7 @@ class BackgroundDisplay:
     """
 
     def __init__(self, show: Callable[[Sample, Answer], None], waiting: int = WAITING) -> None:
-        """Bind what shows one answer; it may block."""
+        """Take the function that shows one answer; it may block."""
         self._show, self._most = show, waiting
         self._queue: deque[tuple[Sample, Answer]] = deque()
         self._wake, self._over = threading.Event(), False
@@ -32,10 +32,10 @@ class BackgroundDisplay:
         self.dropped = 0
 
     def put(self, sample: Sample, answer: Answer) -> None:
-        """Take one answer; returns at once.
+        """Queue one answer; returns at once.
 
         Raises:
-            Exception: what showing an earlier answer raised. Nothing is shown any more.
+            Exception: the error of an earlier call of the function, after which nothing is shown.
         """
         if self._failed is not None:
             raise self._failed

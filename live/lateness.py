@@ -2,10 +2,10 @@
 
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
-#: It is a fault if no sample comes for this time, or if a sample is later than the least late one
+#: It is a fault if no sample arrives for this time, or if a sample is later than the least late one
 #: by this time [s].
 BEHIND = 20e-3
-#: Or this number of sample intervals, if that is longer.
+#: The limit is at least this number of sample intervals.
 INTERVALS = 2.5
 #: Two clocks may drift apart at this rate: by its data sheet each crystal is off by at most 5e-5
 #: (20 to 50 ppm with temperature and age). A delay that grows more slowly is not seen.
@@ -25,7 +25,7 @@ class Lateness:
     """
 
     def __init__(self, dt: float) -> None:
-        """Begin before the first sample; ``dt``: the sample interval [s]."""
+        """Start before the first sample; ``dt``: the sample interval [s]."""
         self.most = most_behind(dt)  #: later than this is a fault [s]
         self._least, self._arrived, self._time = float("inf"), 0.0, float("-inf")
 
@@ -47,7 +47,7 @@ class Lateness:
         return late_answer(answer, late) if late > self.most else answer
 
     def step(self, t: float, arrived: float) -> float:
-        """Seconds that a sample with a believed time stamp is late; see :meth:`judge`.
+        """Lateness [s] of a sample with an accepted time stamp; see :meth:`judge`.
 
         If a time stamp decreases, the robot's clock was restarted and the measurement restarts too.
         """
@@ -62,7 +62,7 @@ class Lateness:
 def late_answer(answer: Answer, late: float) -> Answer:
     """The answer to a late sample.
 
-    Without a collision it is not "free", since the robot has moved on.
+    Without a collision the state is not "free", because the robot has moved on.
     """
     reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
     return answer._replace(state=COLLISION if answer.alarm else FAULT, reason=reason)

@@ -9,17 +9,17 @@ import numpy as np
 
 from tauguard.live.stream import Closing, Sample, StreamClosed
 
-#: Bytes of the longest line.
+#: Largest length of a line [bytes].
 LONGEST = 1 << 16
 
 
 class LineStream(Closing):
-    """One sample a line: the time, then all q, all qd and all currents, separated by commas.
+    """Each line is one sample: the time, then all q, all qd and all currents, separated by commas.
 
     Args:
-        stream: to read, such as ``sys.stdin``; it is read from its file descriptor.
+        stream: an open file such as ``sys.stdin``; its file descriptor is read.
         joint_names: what the joints are called, in the order of the columns.
-        rate: samples a second that will come.
+        rate: expected sample rate [Hz].
     """
 
     def __init__(self, stream: TextIO, joint_names: Sequence[str], rate: float) -> None:

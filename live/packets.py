@@ -17,9 +17,9 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Packets:
-    """What is sent, in order; unlike a trace it may hold anything, also what is no number."""
+    """Packets to send, in order; unlike a trace they may hold NaN and times that go back."""
 
-    due: Array  #: when each is sent, seconds after the first, shape (P,)
+    due: Array  #: time of sending after the first packet [s], shape (P,)
     t: Array  #: the time stamp inside [s], shape (P,)
     q: Array  #: [rad], shape (P, n)
     qd: Array  #: [rad/s], shape (P, n)
@@ -27,7 +27,7 @@ class Packets:
 
     @classmethod
     def of(cls, trace: Trace) -> Packets:
-        """A packet a sample, each at its own time."""
+        """One packet per sample, sent at the sample's time."""
         return cls(trace.t - trace.t[0], trace.t, trace.q, trace.qd, trace.current)
 
     def rows(self, chosen: Rows) -> Packets:
@@ -53,7 +53,8 @@ class Fault:
         """Check the name and the times.
 
         Raises:
-            ValueError: says which names there are, or which number is not usable.
+            ValueError: an unknown name (the message lists the known ones), or a number out of
+                range.
         """
         if self.name not in FAULTS:
             near = difflib.get_close_matches(self.name, FAULTS, n=1)
@@ -84,7 +85,7 @@ class Fault:
             ) from None
 
     def apply(self, packets: Packets) -> Packets:
-        """The packets with this fault in them."""
+        """A copy of the packets with this fault."""
         inside = (packets.due >= self.start) & (packets.due < self.start + self.duration)
         rows = np.flatnonzero(inside)
         return FAULTS[self.name](packets, rows) if rows.size else packets
@@ -96,7 +97,7 @@ def _frozen(packets: Packets, rows: Rows) -> Packets:
 
 
 def _stale(packets: Packets, rows: Rows) -> Packets:
-    """The last packet is sent again and again, its time stamp too."""
+    """The last packet is sent again and again, with its old time stamp."""
     return _held(packets, rows, ("t", "q", "qd", "current"))
 
 
@@ -121,24 +122,24 @@ def _encoder(packets: Packets, rows: Rows) -> Packets:
 
 
 def _missing(packets: Packets, rows: Rows) -> Packets:
-    """Packets do not come."""
+    """No packets are sent."""
     return packets.rows(np.setdiff1d(np.arange(len(packets.due)), rows))
 
 
 def _late(packets: Packets, rows: Rows) -> Packets:
-    """Packets come in one burst at the fault's end."""
+    """All packets are sent in one burst at the end of the fault."""
     due = packets.due.copy()
     due[rows] = due[rows[-1]]
     return replace(packets, due=due)
 
 
 def _repeated(packets: Packets, rows: Rows) -> Packets:
-    """Every packet comes twice."""
+    """Every packet is sent twice."""
     return packets.rows(np.sort(np.concatenate([np.arange(len(packets.due)), rows])))
 
 
 def _rate(packets: Packets, rows: Rows) -> Packets:
-    """Only every second packet comes."""
+    """Only every second packet is sent."""
     return packets.rows(np.setdiff1d(np.arange(len(packets.due)), rows[1::2]))
 
 
@@ -159,7 +160,7 @@ def _added(packets: Packets, rows: Rows, name: str, joint: int, amount: float) -
 
 
 def _saturated(packets: Packets, rows: Rows) -> Packets:
-    """No current reads above half of the largest one."""
+    """All currents are clipped at half of the largest one."""
     current = packets.current.copy()
     most = np.abs(packets.current).max(axis=0) / 2
     current[rows] = np.clip(current[rows], -most, most)
@@ -181,7 +182,7 @@ def _sign(packets: Packets, rows: Rows) -> Packets:
 
 
 def _nan(packets: Packets, rows: Rows) -> Packets:
-    """The currents are not numbers."""
+    """The currents are NaN."""
     current = packets.current.copy()
     current[rows] = np.nan
     return replace(packets, current=current)

@@ -1,4 +1,4 @@
-"""A log as a live source: its samples at their own pace."""
+"""A log as a live stream: its samples arrive at the recorded times."""
 
 import time
 
@@ -7,15 +7,15 @@ from tauguard.traces.trace import Trace
 
 
 class PlayedStream(Closing):
-    """A trace played as if it were happening now.
+    """A trace that is replayed in real time.
 
     Args:
-        trace: what is played.
-        pace: times real time; inf: as fast as it is read.
+        trace: the trace to replay.
+        pace: multiple of real time; inf: as fast as it is read.
     """
 
     def __init__(self, trace: Trace, pace: float = 1.0) -> None:
-        """Nothing runs before the first :meth:`read`."""
+        """The clock starts at the first :meth:`read`."""
         if not pace > 0:
             raise ValueError(f"pace: {pace}, expected above 0")
         self.trace, self.pace = trace, pace
@@ -25,7 +25,7 @@ class PlayedStream(Closing):
         self._began = 0.0
 
     def read(self, timeout: float) -> Sample | None:
-        """The next sample when its time has come, or None if that is after ``timeout`` seconds.
+        """Wait for the time of the next sample and return it; None after ``timeout`` seconds.
 
         Raises:
             StreamClosed: the trace is over.
@@ -48,5 +48,5 @@ class PlayedStream(Closing):
         )
 
     def close(self) -> None:
-        """No more samples."""
+        """End the stream."""
         self._next = len(self.trace.t)

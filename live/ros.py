@@ -1,4 +1,4 @@
-"""A ROS 2 topic with sensor_msgs/JointState, where rclpy is there."""
+"""Read a ROS 2 topic of type sensor_msgs/JointState (needs rclpy)."""
 
 import math
 import queue
@@ -12,7 +12,7 @@ import numpy as np
 
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
-#: Samples that wait to be read; more are lost, and counted.
+#: Length of the queue of unread samples; further samples are lost and counted.
 WAITING = 1000
 
 
@@ -40,17 +40,17 @@ class RosStream(Closing):
 
     Args:
         topic: of type sensor_msgs/JointState.
-        joint_names: that are read.
-        rate: samples a second that will come.
+        joint_names: joints to read.
+        rate: expected sample rate [Hz].
 
     Raises:
-        ValueError: there is no rclpy.
+        ValueError: rclpy is not installed.
     """
 
     def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
         """Subscribe."""
         try:
-            # Of the ROS 2 installation, not of ours: no dependency that a package index could give.
+            # rclpy is part of a ROS 2 installation and on no package index, so it is no dependency.
             rclpy: Any = import_module("rclpy")
             executors: Any = import_module("rclpy.executors")
             qos: Any = import_module("rclpy.qos")
@@ -107,7 +107,7 @@ class RosStream(Closing):
         return found
 
     def close(self) -> None:
-        """Leave the topic."""
+        """Unsubscribe from the topic."""
         if self._context.ok():
             self._executor.shutdown()
             self._node.destroy_node()

@@ -2,7 +2,7 @@
 
 The protocol is published by Universal Robots ("Real-Time Data Exchange (RTDE) Guide"): over TCP
 port 30004, every packet is its size (uint16, the header's 3 bytes included), its type (uint8) and
-a payload; all numbers are big-endian. Protocol version 2 is spoken here.
+a payload; all numbers are big-endian. This module implements protocol version 2.
 """
 
 import struct
@@ -42,7 +42,7 @@ FORMATS = {
 
 @dataclass(frozen=True)
 class Packet:
-    """One packet: its type and what follows the header."""
+    """One packet: its type and its payload."""
 
     kind: int
     payload: bytes
@@ -92,14 +92,14 @@ class PacketReader:
 
 @dataclass(frozen=True)
 class Recipe:
-    """Types of the variables of a data packet, in the requested order."""
+    """Types of a data packet's variables, in the requested order."""
 
     number: int
     types: tuple[str, ...]
 
     @property
     def layout(self) -> struct.Struct:
-        """Of the packet's payload: the recipe's number, then all values."""
+        """Layout of the packet's payload: the recipe's number, then all values."""
         return struct.Struct(">B" + "".join(FORMATS[kind] for kind in self.types))
 
     def pack(self, values: Sequence[float]) -> bytes:
@@ -108,7 +108,7 @@ class Recipe:
 
 
 def read_doubles(payload: bytes) -> NDArray[np.float64]:
-    """The numbers of a data packet that holds doubles and vectors of them alone."""
+    """The numbers of a data packet that holds only doubles and vectors of doubles."""
     return np.frombuffer(payload, ">f8", offset=1).astype(np.float64)
 
 

@@ -1,6 +1,6 @@
-"""The loop from sample to answer, and its record.
+"""The loop that asks the detector about each sample, and the record of a session.
 
-A clock in a thread of its own watches for silence. The state is a fault as soon as no sample has
+A separate thread watches for silence. The state is a fault as soon as no sample has
 come for 20 ms, even if the stream blocks, reconnects or receives other packets.
 """
 
@@ -19,9 +19,9 @@ from tauguard.live.lateness import Lateness
 from tauguard.live.stream import RobotStream, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
-#: Number of bins of a microsecond in which latencies are counted; one more holds longer ones.
+#: Number of bins of the latency histogram, 1 us each; one more bin holds longer latencies.
 BINS = 100_000
-#: Before the first sample.
+#: The answer before the first sample.
 NONE_YET = Answer(FAULT, False, 0.0, "no samples")
 #: Called with every sample and its answer, and during silence with an empty sample.
 Report = Callable[[Sample, Answer], None]
@@ -29,14 +29,14 @@ Report = Callable[[Sample, Answer], None]
 
 @dataclass
 class Silence:
-    """A time without samples that was a fault."""
+    """A period without samples that was a fault."""
 
-    after: float  #: robot's time of the sample before [s]; nan: there was none
-    seconds: float  #: by this machine's clock
+    after: float  #: robot's time of the previous sample [s]; nan: there was none
+    seconds: float  #: duration by this machine's clock [s]
 
     @property
     def reason(self) -> str:
-        """For the screen and the summary."""
+        """The reason as the display and the summary show it."""
         return f"no samples: nothing for {self.seconds:.3g} s"
 
 
@@ -46,10 +46,10 @@ class Session:
 
     joint_names: tuple[str, ...]
     keep: bool = False  #: keep every sample without a fault, for a recording
-    samples: int = 0  #: all that came
+    samples: int = 0  #: number of all samples
     first: float = np.nan  #: robot's time of the first sample without a fault [s]
-    last: float = np.nan  #: and of the last one
-    answer: Answer = NONE_YET  #: the last one
+    last: float = np.nan  #: robot's time of the last sample without a fault [s]
+    answer: Answer = NONE_YET  #: the latest answer
     spans: Spans = field(default_factory=Spans)  #: collisions, and faults of samples
     silences: list[Silence] = field(default_factory=list)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS + 1, np.int64))
@@ -58,19 +58,19 @@ class Session:
     rows: list[Sample] = field(default_factory=list)
     scores: list[float] = field(default_factory=list)
     alarms: list[bool] = field(default_factory=list)
-    ended: str = ""  #: why it ended
-    lost: bool = False  #: it ended as the robot's connection broke
-    _silence: Silence | None = None  #: the one that lasts
+    ended: str = ""  #: why the session ended
+    lost: bool = False  #: the session ended because the connection broke
+    _silence: Silence | None = None  #: the present silence
     _now: float = np.nan  #: robot's time of the last sample, with a fault or without [s]
 
     def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
         """Record one sample.
 
         Args:
-            sample: as it came.
-            answer: the monitor's; a sample with a fault is not kept.
-            latency: [ns].
-            said: the answer, or a fault if the sample was late.
+            sample: the sample as received.
+            answer: the monitor's answer; a sample with a fault is not kept.
+            latency: time from packet to answer [ns].
+            said: the reported answer: ``answer``, or a fault if the sample was late.
         """
         self.samples += 1
         self.counts[min(latency // 1000, BINS)] += 1
@@ -89,7 +89,7 @@ class Session:
         self.spans.add(t, said)
 
     def silent(self, seconds: float) -> tuple[Sample, Answer]:
-        """Record that nothing has come for ``seconds``.
+        """Record that no sample has arrived for ``seconds``.
 
         Returns:
             A sample without values at the present time of the robot, and the answer: a fault, or
@@ -140,7 +140,7 @@ class Session:
     def quantiles(self) -> dict[str, float | None]:
         """Latency from packet to answer [us]: median, p99, p99.9, p99.99 and the largest.
 
-        None: ``BINS`` microseconds or more, which are in one bin.
+        A quantile is None if it is ``BINS`` microseconds or more.
         """
         if not self.samples:
             return {}
@@ -154,7 +154,7 @@ class Session:
 class _SilenceClock:
     """A thread that marks a fault when no sample has come for ``most`` seconds.
 
-    It shares the record with the thread that reads the samples; the lock keeps reports in order.
+    The thread that reads samples writes to the same record; a lock keeps reports in order.
     """
 
     def __init__(self, session: Session, most: float, report: Report) -> None:
@@ -186,7 +186,7 @@ class _SilenceClock:
             return self._most
 
     def check(self) -> None:
-        """Raise what a report raised in the clock's thread."""
+        """Raise the exception that a report raised in the thread of the silence clock."""
         if self._failed is not None:
             raise self._failed
 
@@ -218,12 +218,12 @@ def listen(
     """Ask the monitor about every sample until the stream ends, the time is up, or Ctrl-C.
 
     Args:
-        stream: read, never commanded.
+        stream: the robot's stream; the robot is never commanded.
         monitor: made for the stream's joints and rate.
-        seconds: by this machine's clock.
+        seconds: duration by this machine's clock.
         report: called after every answer, and every 20 ms while no sample comes (with a sample of
             NaN). It must return at once; the latency does not include it. During silence another
-            thread calls it, never two at a time. An exception of it ends the session.
+            thread calls it, never two at a time. If it raises an exception, the session ends.
         keep: keep the samples, for :meth:`Session.trace`.
     """
     session, lateness = Session(stream.joint_names, keep), Lateness(1 / stream.rate)

@@ -14,11 +14,11 @@ class StreamClosed(Exception):
     """The stream has ended.
 
     Attributes:
-        lost: the connection broke and did not come back; False: the log or the input is over.
+        lost: True if the connection broke for good, False at the end of a log or input.
     """
 
     def __init__(self, why: str, lost: bool = False) -> None:
-        """``why`` it ended, in one line."""
+        """Keep the reason ``why`` in one line."""
         super().__init__(why)
         self.lost = lost
 
@@ -31,13 +31,13 @@ class Sample:
     q: Array  #: joint positions [rad], shape (n,)
     qd: Array  #: joint velocities [rad/s], shape (n,)
     current: Array  #: motor currents [A], shape (n,)
-    arrived: int  #: this machine's monotonic clock when the packet was whole [ns]
+    arrived: int  #: this machine's monotonic clock at the packet's last byte [ns]
 
 
 class RobotStream(Protocol):
     """A robot that is read and never commanded.
 
-    A class with these members adds another robot; see ``docs/howto/live.md``.
+    To add another robot, write a class with these members; see ``docs/howto/live.md``.
     """
 
     @property
@@ -46,17 +46,17 @@ class RobotStream(Protocol):
 
     @property
     def rate(self) -> float:
-        """Samples a second that it sends."""
+        """Sample rate [Hz]."""
 
     @property
     def events(self) -> list[str]:
-        """What happened to the connection so far, one line each: reconnects, lost packets."""
+        """Events of the connection so far, one line each: reconnects, lost packets."""
 
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.
 
         Raises:
-            StreamClosed: there will be no more.
+            StreamClosed: the stream has ended.
         """
 
     def close(self) -> None:
@@ -64,7 +64,7 @@ class RobotStream(Protocol):
 
 
 def add_event(events: list[str], event: str) -> None:
-    """Append an event, up to ``MOST_EVENTS`` of them."""
+    """Append an event, unless there are ``MOST_EVENTS``."""
     if len(events) < MOST_EVENTS:
         events.append(event[:200])
     elif len(events) == MOST_EVENTS:
@@ -72,7 +72,7 @@ def add_event(events: list[str], event: str) -> None:
 
 
 class Closing:
-    """``with`` for streams and servers: they are closed at the end of the block."""
+    """Context manager of streams and servers: closes them at the end of the block."""
 
     def close(self) -> None:
         """Overridden."""

@@ -22,14 +22,14 @@ UR_JOINTS = (
     "wrist_2_joint",
     "wrist_3_joint",
 )
-#: The variables that are asked for, and the types that the controller has to answer.
+#: The requested variables, and the types with which the controller must answer.
 VARIABLES = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
     "actual_qd": "VECTOR6D",
     "actual_current": "VECTOR6D",
 }
-#: Connecting and the handshake together take no longer [s].
+#: Time limit for connection and handshake together [s].
 HANDSHAKE = 5.0
 #: An open connection is given up after this time without a data packet, because a robot that loses
 #: its power does not close it [s].
@@ -45,9 +45,9 @@ class UrStream(Closing):
 
     Args:
         host: name or address of the controller.
-        port: RTDE's.
-        rate: samples a second to ask for (default: what the controller can give).
-        reconnect: seconds of attempts to reconnect after the connection broke; 0: none.
+        port: the port of RTDE.
+        rate: requested sample rate [Hz] (default: the controller's highest).
+        reconnect: how long to try to reconnect after the connection broke [s]; 0: not at all.
 
     Raises:
         ConnectionError: no answer, another protocol version, or variables that the controller does
@@ -74,7 +74,7 @@ class UrStream(Closing):
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.
 
-        A broken connection is opened again in the background; None is returned meanwhile.
+        A broken connection is reopened in the background; the method returns None meanwhile.
 
         Raises:
             StreamClosed: the connection broke, and was not back after ``reconnect`` seconds.
@@ -109,11 +109,11 @@ class UrStream(Closing):
     def _lose(self, error: Exception) -> None:
         """Drop the connection and begin to open it again.
 
-        An ``OSError`` broke it; after any other error a packet could not be read, and the
-        connection is dropped here.
+        An ``OSError`` means that it broke. After any other error a packet could not be read, and
+        the connection is dropped here.
 
         Raises:
-            StreamClosed: no reconnection is asked for.
+            StreamClosed: ``reconnect`` is 0.
         """
         self.close()
         broken = isinstance(error, OSError)
@@ -148,7 +148,7 @@ class UrStream(Closing):
 
 
 class _Connection:
-    """An RTDE connection whose data have been started.
+    """An RTDE connection on which the controller sends data.
 
     Raises:
         ConnectionError: no answer in time, another protocol version, or variables that the
@@ -176,7 +176,7 @@ class _Connection:
             raise ConnectionError(
                 f"{self._where} does not speak RTDE version {rtde.VERSION} ({error})"
             ) from None
-        self.data_due = time.monotonic() + NO_DATA  #: without data until then, it is given up
+        self.data_due = time.monotonic() + NO_DATA  #: time of giving up without data
 
     def _handshake(self, rate: float | None, deadline: float) -> None:
         version = struct.pack(">H", rtde.VERSION)
@@ -207,7 +207,7 @@ class _Connection:
             raise ConnectionError(f"{self._where} does not start its data")
 
     def _ask(self, deadline: float, kind: int, payload: bytes = b"") -> bytes:
-        """Send one request and wait for the answer of its kind."""
+        """Send one request and wait for the answer of the same type."""
         self._socket.sendall(rtde.packet(kind, payload))
         while (found := self.packet(deadline)) is not None and time.monotonic() < deadline:
             if found.kind == kind:
@@ -223,7 +223,7 @@ class _Connection:
         """
         left = deadline - time.monotonic()
         while (found := self._reader.next()) is None:
-            # Look once even after the deadline: this program may have been kept from running.
+            # Read once even after the deadline: the system may have suspended this program.
             self._socket.settimeout(max(0.0, left))
             try:
                 data = self._socket.recv(65536)
@@ -257,7 +257,7 @@ class _Connection:
 
 
 def _connected(host: str, port: int, deadline: float) -> socket.socket:
-    """A connection to the first address of the host that answers; they share the time."""
+    """Connect to the host's first address that answers; all attempts share the time limit."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     addresses = [(str(address[0]), port) for *_, address in found]
     for waiting in range(len(addresses), 0, -1):
@@ -271,7 +271,7 @@ def _connected(host: str, port: int, deadline: float) -> socket.socket:
 
 
 class _Reconnection:
-    """Attempts to connect again, in a thread of its own, so that reading keeps its deadlines."""
+    """Attempts to reconnect, in a separate thread, so that reading keeps its deadlines."""
 
     def __init__(self, host: str, port: int, rate: float | None, within: float) -> None:
         self.began = time.monotonic()
@@ -283,7 +283,7 @@ class _Reconnection:
 
     @property
     def over(self) -> bool:
-        """Whether the time is up; the thread may still wait for an answer."""
+        """Whether the time limit has passed; the thread may still wait for an answer."""
         return self._done.is_set() or time.monotonic() >= self._until
 
     def wait(self, timeout: float) -> _Connection | None:

@@ -1,8 +1,8 @@
-"""A server that speaks RTDE on this machine and plays a log, so that a client has a robot to read.
+"""An RTDE server on this machine that replays a log in place of a robot.
 
 It answers what a UR controller answers to a client that reads: the handshake, the recipe of output
 variables, start and pause. Inputs are refused. Its clock begins with the first start. A client
-that connects later receives the log from the present time on, as from a robot.
+that connects later receives the log from the present time on, as it would from a robot.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ OUTPUTS = {
 
 
 class UrServer(Closing):
-    """Plays packets to every client that connects, in real time, on 127.0.0.1.
+    """Sends packets to every client that connects, in real time, on 127.0.0.1.
 
     Args:
-        packets: what is played; six joints.
-        port: RTDE's, or 0 for any that is free (see :attr:`port`).
-        version: protocol versions that are accepted.
+        packets: the packets to send, of six joints.
+        port: the port to serve; 0: any free port (see :attr:`port`).
+        version: accepted protocol versions.
         controller: major version of the controller; 5 and up sends up to 500 samples a second.
 
     Raises:
-        ValueError: another number of joints than RTDE's six, or the port is taken.
+        ValueError: the number of joints is not six, or the port is in use.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class UrServer(Closing):
             session.run()
 
     def begin(self) -> float:
-        """Start the clock unless it runs. Returns the seconds since its start."""
+        """Start the clock if it does not run. Returns the seconds since its start."""
         with self._lock:
             if self._began is None:
                 self._began = time.monotonic()
@@ -148,7 +148,7 @@ class _Session:
         self.row = 0
 
     def run(self) -> None:
-        """Answer until the client goes or the log is over."""
+        """Answer until the client disconnects or the log is over."""
         while not self.server._over.is_set():
             wait = self._send_due() if self.running else 0.5
             self.client.settimeout(max(wait, 1e-4))
@@ -209,7 +209,7 @@ class _Session:
 
     def _set_up(self, payload: bytes) -> bytes:
         rate = struct.unpack_from(">d", payload)[0]
-        # Clients in use end the list with a comma, and controllers do not mind.
+        # Common clients end the list with a comma, which controllers accept.
         names = payload[8:].decode("ascii", "replace").rstrip(",").split(",")
         known = [OUTPUTS.get(name, ("NOT_FOUND", "")) for name in names]
         types = tuple(kind for kind, _ in known)

@@ -1,4 +1,4 @@
-"""An arm ready for a scene: from a name, a file or a :class:`tauguard.models.Robot`."""
+"""Load an arm for a scene from a name, a file or a :class:`tauguard.models.Robot`."""
 
 import functools
 from dataclasses import dataclass, field, replace
@@ -39,7 +39,7 @@ NAMED = cura6.NAMES
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known or assumed about an arm, joint by joint, and where each part comes from."""
+    """Known and assumed numbers of an arm, per joint, and the source of each."""
 
     __repr__ = in_a_line
 
@@ -47,22 +47,22 @@ class Facts:
     joints: tuple[str, ...]
     drive: Drive  #: nominal: gains, limits, the drive's own friction
     armature: Array  #: rotor inertia at the joint [kg m^2]
-    damping: Array  #: of the file, simulated by MuJoCo [N m s/rad]
-    friction_loss: Array  #: of the file, simulated by MuJoCo [N m]
+    damping: Array  #: the file's damping, simulated by MuJoCo [N m s/rad]
+    friction_loss: Array  #: the file's friction loss, simulated by MuJoCo [N m]
     home: Array  #: [rad]
     max_speed: Array  #: [rad/s]
     max_acceleration: Array  #: [rad/s^2]
-    spread: Array  #: poses are drawn this far around home [rad]
-    servo_inertia: Array | None  #: [kg m^2]; None: that of the home pose
-    bandwidth: Array  #: of the servo [rad/s]
+    spread: Array  #: largest distance of drawn poses from home [rad]
+    servo_inertia: Array | None  #: assumed by the servo [kg m^2]; None: at home
+    bandwidth: Array  #: bandwidth of the servo [rad/s]
     compensation: float  #: fraction of the known friction that the servo compensates
     tool: str | None  #: site, or None: the last link's origin
     gripper: tuple[str, ...]  #: joints below the flange
-    sources: dict[str, str] = field(default_factory=dict)  #: of each part, in words
+    sources: dict[str, str] = field(default_factory=dict)  #: source of each part, as text
 
     @property
     def nominal(self) -> Drive:
-        """What controller and observer know: the drive with all friction, the file's included."""
+        """The drive that controller and observer assume, with all friction, the file's included."""
         if not (self.damping.any() or self.friction_loss.any()):
             return self.drive
         own = self.drive.friction or level_friction(np.zeros_like(self.damping), self.damping * 0)
@@ -93,7 +93,7 @@ class Arm:
 
     @property
     def home(self) -> Array:
-        """A pose to start from [rad], shape (n,)."""
+        """Initial joint positions [rad], shape (n,)."""
         return self.facts.home
 
     @property
@@ -102,7 +102,7 @@ class Arm:
         return self.facts.drive.torque_limit
 
     def shapes(self) -> list[mujoco.MjsGeom]:
-        """The geoms of the links that can touch something, named."""
+        """Names of the links' collision geoms."""
         found = []
         for link in self.links:
             colliding = [g for g in self.spec.body(link).geoms if g.contype or g.conaffinity]
@@ -112,14 +112,14 @@ class Arm:
         return found
 
     def flange(self) -> mujoco.MjsSite:
-        """The site of the tool; the origin of the last link where there is none."""
+        """The site of the tool; the origin of the last link if there is no site."""
         name = self.facts.tool
         if name is not None:
             return self.spec.site(name)
         return self.spec.body(self.links[-1]).add_site(name="flange")
 
     def place(self, pose: Array) -> None:
-        """Move the base: ``pose`` is that of the file's world in the world, shape (4, 4)."""
+        """Move the base: ``pose`` is the pose of the file's world in the world, shape (4, 4)."""
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(pose[:3, :3]).ravel())
         frame = self.spec.worldbody.add_frame(pos=pose[:3, 3], quat=quat)
@@ -129,12 +129,12 @@ class Arm:
 
 
 def load_arm(source: str | Robot) -> Arm:
-    """The arm called, filed or described as ``source``.
+    """Load the arm that ``source`` names or describes.
 
     Args:
         source: "cura6", a name of :data:`tauguard.models.ROBOTS`, an MJCF or URDF file, a TOML file
             (:meth:`Robot.from_toml`), or a robot; a file may be followed by ``#`` and the names of
-            the arm's joints (:meth:`Robot.named`). What it leaves open is derived.
+            the arm's joints (:meth:`Robot.named`). Missing numbers are derived.
 
     Raises:
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
@@ -167,7 +167,7 @@ def _left_over(robot: Robot) -> str | None:
 def _from_file(
     robot: Robot, path: Path, modified: int, sources: tuple[tuple[str, str], ...]
 ) -> Arm:
-    """The arm of a file as it was at a time; its spec is not to be changed."""
+    """The arm of a file at a modification time (for the cache); do not change its spec."""
     file = read_arm(path, robot.joints, robot.gripper == "weld", robot.tool)
     known = dict(sources)
     if robot.source is not None:
@@ -221,7 +221,7 @@ def _cura6(robot: Robot) -> Arm:
 
 
 def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
-    """The arm with everything that the file leaves open derived."""
+    """The arm, with derived values for all numbers that the file does not state."""
     spec, joints, n = file.spec, file.joints, len(file.joints)
     model = file.model
     said = _Said(robot, sources, n)
@@ -284,7 +284,7 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
 
 
 class _Said:
-    """What the user's description says of each part, and a note of where every part comes from."""
+    """Reads the user's description, and notes the source of each part."""
 
     def __init__(self, robot: Robot, sources: dict[str, str], joints: int) -> None:
         self.robot, self.joints, self.sources = robot, joints, dict(sources)

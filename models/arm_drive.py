@@ -1,4 +1,4 @@
-"""The drives of an arm whose file says little: as stated, assumed, or like the CURA6's."""
+"""The drives of an arm: as its description states them, assumed, or scaled from the CURA6's."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,16 +11,16 @@ from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.left_over import LeftOver
 from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joint
 
-#: Presliding distance of joints of which only the friction level is known [rad].
+#: Presliding distance of joints with a known friction level only [rad].
 PRESLIDING = 1.5e-3
-#: The back-EMF brakes a joint no faster than with this time constant [s].
+#: Smallest time constant with which back-EMF brakes a joint [s].
 _FADE_TIME = 4e-3
-#: Gear and gain [N m/A] of drives for which none are stated.
+#: Default gear ratio and gain [N m/A].
 _GEAR, _GAIN = 100.0, 10.0
 
 
 def level_friction(coulomb: Array, viscous: Array) -> Friction:
-    """Friction of which only two numbers a joint are known [N m, N m s/rad], shapes (n,)."""
+    """Friction from a level [N m] and a viscous coefficient [N m s/rad], shapes (n,)."""
     n = len(coulomb)
     return Friction(
         coulomb=coulomb,
@@ -101,7 +101,7 @@ def _stated_sensors(stated: RobotSensors | None, n: int) -> Sensors | None:
 
 
 def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
-    """Torque that falls above the largest speed, slowly enough for a step of a few milliseconds."""
+    """The drive with a torque limit that falls above the largest speed."""
     limit = drive.torque_limit
     if not np.isfinite(limit).all():
         return drive
@@ -110,7 +110,7 @@ def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
 
 
 def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
-    """``drive`` with friction, ripple, lag and sensor noise of the CURA6-like arm's class.
+    """``drive`` with friction, ripple, lag and sensor noise scaled from the CURA6-like arm.
 
     Coulomb friction is a fraction of the torque limit, viscous friction of that limit over the
     largest speed. Ripple and noise of the currents are fractions of the current limit. The rise of
@@ -118,9 +118,9 @@ def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
     arm's joints.
 
     Args:
-        drive: a joint's friction that it states is kept.
+        drive: its stated joint friction is kept.
         speed: largest joint speeds [rad/s], shape (n,).
-        lossy: joints to which the file gives friction: they get no more, shape (n,).
+        lossy: joints with friction in the file, which get no more friction, shape (n,).
 
     Raises:
         ValueError: a joint without a torque limit.

@@ -1,4 +1,4 @@
-"""From a robot file, MJCF or URDF, to a spec that holds one serial arm and stands alone."""
+"""Read one serial arm from a robot file (MJCF or URDF) into a self-contained spec."""
 
 import re
 from collections.abc import Iterator
@@ -13,18 +13,18 @@ from tauguard.models.mjcf import SpecText, compiled, inline_meshes
 from tauguard.models.robot_check import checked_robot
 from tauguard.models.urdf import UrdfFile, is_urdf, max_speeds, read_urdf
 
-#: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
+#: Collision bits of the arm and of obstacles; the arm has no collisions with itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
-#: Radius of the capsule that stands for a link without any shape: at most [m], and as a fraction of
+#: Radius of the capsule that replaces a link without any shape: at most [m], and as a fraction of
 #: the arm's length.
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
-#: Its colour, and the group of collision shapes where others show.
+#: Its colour, and the group of collision shapes if visual shapes exist.
 STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
-#: Below a chain of at least this many joints a branch is a gripper, if it has fewer joints.
+#: A branch below a chain of at least this many joints is a gripper if it has fewer joints.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
-#: A last joint that is called so moves a gripper, too.
+#: A last joint with such a name belongs to a gripper, too.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)
-#: Names that a tool frame has in common files, the likeliest first.
+#: Usual names of a tool frame, the likeliest first.
 TOOL_FRAMES = (
     "flange", "attachment_site", "tool0", "ee_link", "ee_site", "grip_site", "pinch_site",
     "link_eef", "panda_link8", "right_hand", "tool_frame", "end_effector", "ee",
@@ -34,7 +34,7 @@ _KINDS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 @dataclass(frozen=True)
 class ArmFile:
-    """What a file says about an arm; ``spec`` holds nothing else."""
+    """The content of a file about an arm; ``spec`` holds nothing else."""
 
     spec: mujoco.MjSpec
     links: tuple[str, ...]  #: the body of each joint, base to tip
@@ -43,10 +43,10 @@ class ArmFile:
     max_speed: Array  #: [rad/s], infinite where the file has none, shape (n,)
     home: Array | None  #: joint positions of the file's first keyframe [rad], shape (n,)
     gripper: tuple[str, ...]  #: joints below the flange
-    model: mujoco.MjModel  #: of ``spec``, compiled without its shapes
-    mended: tuple[str, ...]  #: links of a URDF whose inertia no body can have
-    sticks: tuple[str, ...]  #: links without any shape, which got a capsule
-    replaced: dict[str, str]  #: links whose shape is not the file's, and what it is
+    model: mujoco.MjModel  #: ``spec`` compiled without its shapes
+    mended: tuple[str, ...]  #: links of a URDF whose impossible inertia was corrected
+    sticks: tuple[str, ...]  #: links without any shape, which were given a capsule
+    replaced: dict[str, str]  #: links with a substitute shape, and its description
 
 
 def read_arm(
@@ -55,17 +55,17 @@ def read_arm(
     weld_gripper: bool = True,
     tool: str | None = None,
 ) -> ArmFile:
-    """The arm in a file.
+    """Read the arm in a file.
 
-    Actuators, sensors and keyframes are left out, because the drive is simulated here. Welded
-    bodies are fused into the links that carry them; mesh files are written into the text. A link
+    Actuators, sensors and keyframes are omitted, because the drive is simulated here. Welded
+    bodies are fused into their parent links; mesh files are written into the text. A link
     without collision geometry gets the convex hulls of its visual shapes; without these, a capsule.
 
     Args:
         path: MJCF or URDF.
-        wanted: names of the arm's joints; every other joint is welded where it stands at zero. The
+        wanted: names of the arm's joints; every other joint is welded at zero. The
             default is the file's only chain; branches at its end are a gripper.
-        weld_gripper: weld the joints of the gripper (else they move without a drive).
+        weld_gripper: weld the joints of the gripper (otherwise they move without a drive).
         tool: a body or site; a body, and any body with a usual name of a tool frame, becomes a
             site.
 
@@ -118,7 +118,7 @@ def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
 
 
 def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> set[str]:
-    """The joints that the user asked for: by name, or from one to another below it."""
+    """The requested joints, given by name or as a range ``FIRST..LAST``."""
     kept = set()
     for entry in wanted:
         ends = entry.split("..")
@@ -137,7 +137,7 @@ def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> se
 
 
 def _name_joints(spec: mujoco.MjSpec) -> None:
-    """Unnamed bodies and joints get names, so that they can be found again."""
+    """Give names to unnamed bodies and joints."""
     for i, body in enumerate(b for b in spec.bodies if b.name != "world"):
         body.name = body.name or f"body{i + 1}"
     for i, joint in enumerate(spec.joints):
@@ -145,7 +145,7 @@ def _name_joints(spec: mujoco.MjSpec) -> None:
 
 
 def _weld(spec: mujoco.MjSpec, names: list[str]) -> None:
-    """Take joints out; what constrains them goes, too."""
+    """Remove joints and the constraints on them."""
     if not names:
         return
     for element in (*spec.equalities, *spec.tendons):
@@ -161,7 +161,7 @@ def _joints_below(body: mujoco.MjsBody) -> Iterator[mujoco.MjsJoint]:
 
 
 def _find_gripper(spec: mujoco.MjSpec) -> tuple[str, ...]:
-    """The joints below the flange: small branches at the end of a chain, and a gripper's joint."""
+    """The gripper's joints: small branches at the chain's end, and a last joint of that name."""
     chain: list[str] = []
     level = list(spec.worldbody.bodies)
     while level:
@@ -182,7 +182,7 @@ def _find_gripper(spec: mujoco.MjSpec) -> tuple[str, ...]:
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:
-    """Of the joints, from their own ranges or those of the actuators that drive them."""
+    """Torque limits of the joints, from their own ranges or those of their actuators."""
     limits = np.where(model.jnt_actfrclimited, np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
     for i in range(model.nu):
         if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT:
@@ -205,7 +205,7 @@ def _is_motor(model: mujoco.MjModel, i: int) -> bool:
 
 
 def _weigh(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """State every body's inertia, so that no geom decides it any more."""
+    """State every body's inertia explicitly, so that it does not depend on geoms."""
     for body in spec.bodies:
         if body.name == "world" or body.explicitinertial:
             continue
@@ -221,7 +221,7 @@ def _weigh(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 def _chain(
     spec: mujoco.MjSpec, gripper: tuple[str, ...] = ()
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The bodies that move and their joints, base to tip, up to a gripper that moves."""
+    """The moving bodies and their joints, base to tip, without the gripper."""
     links: list[str] = []
     joints: list[str] = []
     level = list(spec.worldbody.bodies)
@@ -253,7 +253,7 @@ def _all_of(body: mujoco.MjsBody, gripper: tuple[str, ...]) -> bool:
 
 
 def _ends(moving: list[mujoco.MjsBody]) -> str:
-    """The longest branch, up to where it branches again: an example of how joints are named."""
+    """First and last joint of the longest branch, an example for the error message."""
     chains = []
     for body in moving:
         names, level = [], [body]
@@ -266,7 +266,7 @@ def _ends(moving: list[mujoco.MjsBody]) -> str:
 
 
 def _branches(moving: list[mujoco.MjsBody]) -> str:
-    """Where it branches, and what to do about it."""
+    """The error message for a file with branches."""
     parts = []
     for body in moving:
         names = [joint.name for joint in _joints_below(body)]
@@ -290,9 +290,9 @@ def _carrier(spec: mujoco.MjSpec, name: str) -> str:
 def _let_collide(
     spec: mujoco.MjSpec, links: tuple[str, ...], unread: dict[str, str]
 ) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Every colliding geom of the file gets the arm's bits, and every link has one.
+    """Set the arm's collision bits on all colliding geoms, and give every link such a geom.
 
-    Returns the links without any shape, and all whose shape is not the file's and what it is.
+    Returns the links without any shape, and the links with a substitute shape.
     """
     sticks, replaced = [], {}
     for geom in spec.geoms:
@@ -323,7 +323,7 @@ def _let_collide(
 
 
 def _add_stick(body: mujoco.MjsBody, span: np.ndarray, radius: float) -> None:
-    """A capsule along a link, a ball where it is short."""
+    """Add a capsule along a link, or a ball if the link is short."""
     long = float(np.linalg.norm(span)) > 2 * radius
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE if long else mujoco.mjtGeom.mjGEOM_SPHERE
     stick = body.add_geom(type=kind, size=[radius, 0, 0], rgba=STICK_COLOUR, mass=0)

@@ -1,4 +1,4 @@
-"""Body regions of a person and how hard a robot may press them: power and force limiting.
+"""Body regions of a person and their force limits (power and force limiting).
 
 The numbers are those of the power-and-force-limiting annex of ISO 10218-2:2025, formerly ISO/TS
 15066. Public copies contradict each other, so each value says whether an open source confirmed
@@ -15,16 +15,16 @@ UNCONFIRMED = "verify against the standard"
 
 @dataclass(frozen=True)
 class BodyRegion:
-    """One region: the force that it bears, its stiffness, and the mass that moves with it."""
+    """One region: its force limit, its stiffness, and its effective mass."""
 
     name: str
-    quasi_static_force: float  #: F_QS, when clamped [N]
-    stiffness: float  #: k, of the contact [N/m]
+    quasi_static_force: float  #: F_QS, limit of quasi-static contact (clamping) [N]
+    stiffness: float  #: k, stiffness of the contact [N/m]
     mass: float  #: m_H, effective mass [kg]
     transient: bool = True  #: False: no transient contact is allowed (skull, face)
-    force_confirmed: bool = False  #: F_QS was confirmed from an open source
-    stiffness_confirmed: bool = False  #: k was
-    mass_confirmed: bool = False  #: m_H was
+    force_confirmed: bool = False  #: whether an open source confirmed F_QS
+    stiffness_confirmed: bool = False  #: whether an open source confirmed k
+    mass_confirmed: bool = False  #: whether an open source confirmed m_H
 
     @property
     def transient_force(self) -> float:
@@ -39,7 +39,7 @@ class BodyRegion:
         return tuple(name for name, sure in zip(fields, known, strict=True) if not sure)
 
     def peak_force(self, speed: float, robot_mass: float) -> float:
-        """Peak force [N] of an impact by the standard's two masses and one spring.
+        """Peak force [N] of an impact in the standard's model of two masses and a spring.
 
         Args:
             speed: relative speed along the contact normal [m/s].
@@ -59,7 +59,7 @@ class BodyRegion:
         return self.mass * robot_mass / (self.mass + robot_mass)
 
 
-# name, F_QS [N], k [N/mm], m_H [kg], F_QS confirmed, k confirmed; no m_H was.
+# name, F_QS [N], k [N/mm], m_H [kg], F_QS confirmed, k confirmed; no m_H is confirmed.
 _TABLE = (
     ("skull", 130, 150, 4.4, False, True),
     ("face", 65, 75, 4.4, False, True),

@@ -1,4 +1,4 @@
-"""What `tauguard calibrate` wrote into a robot file, as the drive that is simulated."""
+"""Simulated drives from the numbers that `tauguard calibrate` writes into a robot file."""
 
 import json
 from dataclasses import replace
@@ -12,25 +12,25 @@ from tauguard.models.arm_file import ArmFile
 from tauguard.models.robot import Robot
 from tauguard.models.robot_file import read_note
 
-#: Speeds at which both friction laws are the same, as nearly as they can be [rad/s].
+#: Speeds at which the simulated friction law is fitted to the identified one [rad/s].
 SPEEDS = np.geomspace(2e-3, 2.0, 100)
-#: Stribeck velocity where the calibration has none [rad/s].
+#: Default Stribeck velocity [rad/s].
 STRIBECK = 0.03
-#: Speed of a joint that turns around [rad/s].
+#: Speed of a joint near its reversal [rad/s].
 TURNING = 0.05
-#: Angle over which friction turns around with the joint, where the calibration does not say [rad].
+#: Default angle over which friction reverses with the joint [rad].
 PRESLIDING = 1.5e-3
 
 
 def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str]) -> Robot:
-    """The robot with gains, rotors and friction of a calibrated file, unless it states its own.
+    """The robot with gains, rotor inertias and friction of a calibrated file, if it states none.
 
     Args:
-        robot: as described.
-        path: its file.
-        file: what was read from it; its own damping and friction loss give way to friction that
-            was identified, which holds all of it.
-        sources: receives where the drive comes from.
+        robot: the user's description.
+        path: the robot's file.
+        file: the content of the file; its damping and friction loss are replaced by the friction
+            that was identified, which includes them.
+        sources: receives the source of the drive.
     """
     drive, n = robot.drive, len(file.joints)
     if drive.gain is not None or drive.torque_constant is not None:

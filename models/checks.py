@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def above_zero(owner: object, *names: str) -> None:
-    """Every number of the named fields is finite and above 0, or ``ValueError``."""
+    """Raise ``ValueError`` unless every number of the named fields is finite and above 0."""
     for name in names:
         value = np.asarray(getattr(owner, name), dtype=float)
         if not (np.isfinite(value) & (value > 0)).all():
@@ -13,7 +13,7 @@ def above_zero(owner: object, *names: str) -> None:
 
 
 def not_negative(owner: object, *names: str) -> None:
-    """Every number of the named fields is finite and 0 or more, or ``ValueError``."""
+    """Raise ``ValueError`` unless every number of the named fields is finite and 0 or more."""
     for name in names:
         value = np.asarray(getattr(owner, name), dtype=float)
         if not (np.isfinite(value) & (value >= 0)).all():
@@ -21,7 +21,7 @@ def not_negative(owner: object, *names: str) -> None:
 
 
 def vector(owner: object, name: str, size: int) -> tuple[float, ...]:
-    """The numbers of a field, or ``ValueError`` where they are not ``size`` finite ones."""
+    """The numbers of a field; raise ``ValueError`` unless they are ``size`` finite numbers."""
     value = getattr(owner, name)
     try:
         numbers = np.asarray(value, dtype=float)
@@ -33,7 +33,7 @@ def vector(owner: object, name: str, size: int) -> tuple[float, ...]:
 
 
 def shaped(owner: object, shape: tuple[int, ...], meaning: str, *names: str) -> None:
-    """The named fields have ``shape``, or ``ValueError`` that says what the axes mean."""
+    """Raise ``ValueError`` with the meaning of the axes unless the named fields have ``shape``."""
     for name in names:
         found = np.shape(getattr(owner, name))
         if found != shape:

@@ -11,7 +11,7 @@ from tauguard.models.checks import above_zero, not_negative
 
 Vector = tuple[float, float, float]
 
-#: Which vertices are held: none, the upper edge, the two upper corners, all four edges.
+#: Fixed vertices: none, the upper edge, the two upper corners, or all four edges.
 PINS = ("none", "edge", "corners", "frame")
 
 #: Rayleigh damping of an elastic sheet's stiffness [s]: a hundredth of a millisecond.
@@ -29,12 +29,12 @@ class Cloth:
     count: int = 15  #: vertices along each side
     size: float = 0.6  #: side [m]
     mass: float = 0.2  #: [kg]
-    radius: float = 1e-3  #: half the thickness that contacts see [m]
-    position: Vector = (0.7, 0.0, 0.8)  #: of the middle [m]
+    radius: float = 1e-3  #: half the thickness in contacts [m]
+    position: Vector = (0.7, 0.0, 0.8)  #: position of the centre [m]
     quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
     """Orientation; the default hangs it across the x axis, y edge up."""
     pinned: str = "edge"  #: one of :data:`PINS`
-    damping: float = 0.01  #: of the edges [1/s], against ringing; not used for an elastic sheet
+    damping: float = 0.01  #: damping of the edges [1/s]; not used for an elastic sheet
     young: float | None = None
     """Young's modulus of an elastic sheet of thickness 2 ``radius`` [Pa], Poisson's ratio 0.3.
 
@@ -55,7 +55,7 @@ class Cloth:
             raise ValueError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
 
     def pins(self) -> list[int]:
-        """Numbers of the held vertices; vertex ``i * count + j`` is row i along x, j along y."""
+        """Numbers of the fixed vertices; vertex ``i * count + j`` is row i along x, j along y."""
         n = self.count
         i, j = np.divmod(np.arange(n * n), n)
         held = {
@@ -68,7 +68,7 @@ class Cloth:
 
 
 def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
-    """Add the flex ``cloth_sheet`` to the world of ``spec``; it meets the arm alone."""
+    """Add the flex ``cloth_sheet`` to the world of ``spec``; it collides with the arm only."""
     spec.attach(
         mujoco.MjSpec.from_string(_text(cloth)),
         frame=spec.worldbody.add_frame(pos=cloth.position, quat=cloth.quat_wxyz),
@@ -85,16 +85,16 @@ def add_sheet(
     young: float,
     name: str = "garment",
 ) -> None:
-    """Add an elastic sheet of any shape as the flex ``name_sheet``, unpinned; it meets the arm.
+    """Add an elastic sheet of any shape, free of pins, as the flex ``name_sheet``.
 
     Args:
-        spec: whose integrator is ``discrete``.
+        spec: a spec with the integrator ``discrete``.
         points: Vertices at rest in the world frame. Shape (V, 3), m.
         faces: Shape (F, 3).
         mass: [kg].
-        radius: half the thickness that contacts see [m].
+        radius: half the thickness in contacts [m].
         young: Young's modulus [Pa]; Poisson's ratio is 0.3.
-        name: prefix of its names.
+        name: prefix of the sheet's names.
     """
     text = f"""<mujoco><worldbody><body name="frame">
       <flexcomp name="sheet" type="direct" dim="2" mass="{mass!r}" radius="{radius!r}"

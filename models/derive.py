@@ -1,4 +1,4 @@
-"""Numbers that a robot file leaves open, derived from stated ones: each rule with its reason."""
+"""Derive the numbers that a robot file does not state; each rule has its reason beside it."""
 
 import mujoco
 import numpy as np
@@ -10,7 +10,7 @@ from tauguard.arrays import Array
 #: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's
 #: (0.016: 3.2 kg m^2 for 200 N m).
 ROTOR_PER_TORQUE = 0.005
-#: Without a torque limit: this fraction of the joint's largest inertia.
+#: Rotor inertia of a joint without torque limit, as a fraction of the joint's largest inertia.
 ROTOR_FRACTION = 0.05
 #: A torque limit that is not stated is the sum of three: this multiple of the torque that holds the
 #: arm, twice the file's friction, and the torque for this acceleration of the largest inertia
@@ -26,7 +26,7 @@ SHORTEST_LEVER = 0.02
 DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
 #: Number of poses in which inertia and gravity are computed.
 POSES = 64
-#: A joint without a range is drawn within this of zero [rad].
+#: Poses of a joint without a range are drawn within this distance of zero [rad].
 FREE_RANGE = np.pi
 #: Distance of the home pose from both ends of a joint's range, as a fraction of it.
 HOME_MARGIN = 0.1
@@ -34,9 +34,9 @@ HOME_MARGIN = 0.1
 #: (:func:`stiffest_mode`) is at most the first number. With a stated bandwidth it may be up to the
 #: second. At 2 the servo would be unstable.
 MOST_PER_STEP, LIMIT_PER_STEP = 1.0, 1.5
-#: A joint turns by less than this while a contact builds up [rad]: 5 cm at a lever of 0.2 m.
+#: Upper bound of a joint's rotation while a contact force builds up [rad]: 5 cm at 0.2 m.
 PRESSING = 0.25
-#: Bandwidth of a servo that nothing limits [rad/s].
+#: Default bandwidth of a servo [rad/s].
 BANDWIDTH = 30.0
 
 
@@ -46,7 +46,7 @@ def joint_ids(model: mujoco.MjModel, joints: tuple[str, ...]) -> NDArray[np.int6
 
 
 def ranges(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array]:
-    """Joint ranges [rad], +-pi about 0 where there is none, shapes (n,)."""
+    """Joint ranges [rad], shapes (n,); +-pi for joints without a range."""
     at = joint_ids(model, joints)
     limited = model.jnt_limited[at].astype(bool)
     slides = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_SLIDE
@@ -57,7 +57,7 @@ def ranges(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array
 
 
 def random_poses(model: mujoco.MjModel, joints: tuple[str, ...], count: int = POSES) -> Array:
-    """The same poses at every call, over the whole range [rad], shape (count, n)."""
+    """Poses over the whole range, the same at each call [rad], shape (count, n)."""
     low, high = ranges(model, joints)
     middle, half = (low + high) / 2, np.minimum((high - low) / 2, FREE_RANGE)
     rng = np.random.default_rng(0)
@@ -96,9 +96,9 @@ def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
 
 
 def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> str:
-    """Say what is odd about a file's torque limits [N m], shape (n,); "" if nothing is.
+    """A text on implausible torque limits [N m], shape (n,), of a file; "" if they are plausible.
 
-    The strongest joint of a serial arm gives a few times the gravity torque of the most loaded one.
+    The strongest joint of a serial arm has a few times the gravity torque of the most loaded one.
     """
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge.any():
@@ -120,7 +120,7 @@ def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Arr
 
 
 def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> Array:
-    """At the joint [kg m^2], for joints whose file has none; 0 for slides, shape (n,)."""
+    """Default rotor inertia at the joint [kg m^2], shape (n,); 0 for slides."""
     at = joint_ids(model, joints)
     given = model.dof_armature[model.jnt_dofadr[at]]
     hinge = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_HINGE
@@ -133,7 +133,7 @@ def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) 
 def largest_energy(
     model: mujoco.MjModel, joints: tuple[str, ...], speed: Array, limit: Array
 ) -> tuple[float, float]:
-    """Energy that an arm can put into a contact [J]: of its motion, and the work of its drives.
+    """Energy that an arm can put into a contact [J]: kinetic energy plus the work of its drives.
 
     The kinetic energy 1/2 v^T |M| v takes the largest joint speeds with the worst signs, over the
     random poses. The work is that of all drives at their limits over :data:`PRESSING`.
@@ -144,7 +144,7 @@ def largest_energy(
 
 
 def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) -> Array:
-    """[N m]; hinges without a limit get one that holds and moves the arm, shape (n,)."""
+    """Torque limits [N m], shape (n,); a missing one is chosen to hold and move the arm."""
     if np.isfinite(stated).all():
         return stated
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
@@ -157,14 +157,14 @@ def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) 
 
 
 def servo_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    """Inertia that a joint's servo has to move: the largest over the poses [kg m^2], shape (n,)."""
+    """Largest inertia at each joint over the poses [kg m^2], shape (n,)."""
     masses = inertia_matrices(model, joints, random_poses(model, joints))
     most: Array = masses.diagonal(axis1=1, axis2=2).max(axis=0)
     return most
 
 
 def lightest_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    """Least inertia that a joint moves, with the others free: 1 / (M^-1)_ii, shape (n,)."""
+    """Smallest inertia at a joint while the others are free: 1 / (M^-1)_ii, shape (n,)."""
     masses = inertia_matrices(model, joints, random_poses(model, joints))
     least: Array = 1 / np.linalg.inv(masses).diagonal(axis1=1, axis2=2).max(axis=0)
     return least
@@ -173,7 +173,7 @@ def lightest_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
 def stiffest_mode(
     model: mujoco.MjModel, joints: tuple[str, ...], kp: Array, kd: Array
 ) -> tuple[float, int]:
-    """By how much the servo's fastest mode changes in a time step, and the joint that leads it.
+    """Change of the servo's fastest mode in a time step, and the joint that dominates it.
 
     An explicit velocity loop of rate ``d`` and a position loop of ``k`` (per unit of inertia) are
     stable for ``d dt + k dt^2 / 2 < 2``; this is the largest such sum over the poses.
@@ -195,8 +195,8 @@ def stiffest_mode(
 def home_pose(model: mujoco.MjModel, joints: tuple[str, ...], tip: int) -> Array:
     """A home pose [rad], shape (n,): in front of the base, away from singular poses and limits.
 
-    Of fixed random poses it has the largest manipulability, weighted by the distance of the joints
-    from their limits and of the tool from the middle of its reach.
+    Among fixed random poses it has the largest manipulability, weighted by the distance of the
+    joints from their limits and of the tool from the middle of its reach.
     """
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]

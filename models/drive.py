@@ -42,7 +42,7 @@ class Friction:
     coulomb_per_kelvin: float = -0.002  #: kc [1/K]
     viscous_per_kelvin: float = -0.012  #: kv [1/K]
     reference_temperature: float = 35.0  #: T0 [degC]
-    temperature: float = 35.0  #: T of this episode [degC]
+    temperature: float = 35.0  #: T in this episode [degC]
     slope: Array | None = None  #: s, rises of the level with the speed [N m], shape (n, k)
     slope_velocity: Array | None = None  #: w [rad/s], shape (k,)
 
@@ -94,7 +94,7 @@ class Ripple:
                 raise ValueError(f"Ripple.{name}: not finite")
 
     def at(self, angle: Array) -> Array:
-        """The series [A] at angles of what turns (a motor, a joint) [rad], shape (..., n) both."""
+        """The series [A] at angles of the motor or joint [rad], both of shape (..., n)."""
         turns = np.asarray(angle)[..., None] * self.cycles
         series: Array = (self.amplitude * np.sin(turns + self.phase)).sum(axis=-1)
         return series
@@ -128,11 +128,11 @@ class Sensors:
             )
 
     def player(self, dt: float, rng: np.random.Generator) -> Player | None:
-        """What plays the left-over errors of one episode; None where there are none."""
+        """The player of one episode's left-over errors; None if there are none."""
         return None if self.left_over is None else Player(self.left_over, dt, rng)
 
     def samples(self, t: Array, rng: np.random.Generator) -> NDArray[np.intp]:
-        """Which of the physics steps at times ``t`` [s] are sampled, rising."""
+        """Indices, rising, of the physics steps at times ``t`` [s] that are sampled."""
         if self.rate <= 0 or len(t) < 2 or self.rate * (t[1] - t[0]) > 1:
             return np.arange(len(t))
         times = np.arange(t[0], t[-1], 1 / self.rate)
@@ -152,7 +152,7 @@ class Sensors:
         """Measured signals from true ones of shape (T, n): noise is added, then they are quantised.
 
         Args:
-            rng: generator of the noise.
+            rng: random generator for the noise.
             q: positions [rad].
             qd: velocities [rad/s].
             current: [A].

@@ -1,4 +1,4 @@
-"""The numbers of a drive as text, which a recording carries with it."""
+"""Convert a drive to JSON text, which is attached to recordings, and back."""
 
 import json
 from dataclasses import asdict, replace
@@ -33,7 +33,7 @@ def drive_of(text: str) -> Drive:
     """The drive that :func:`drive_text` wrote.
 
     Raises:
-        ValueError: other text, or that of a newer version (its number is named).
+        ValueError: the text is not of a drive, or is of a newer version.
     """
     try:
         values: dict[str, Any] = json.loads(text)
@@ -50,7 +50,7 @@ def drive_of(text: str) -> Drive:
 
 def _plain(value: object) -> object:
     assert isinstance(value, np.ndarray)
-    # JSON has no infinity, which a current limit may be.
+    # A current limit may be infinite, and JSON has no infinity.
     return np.where(np.isfinite(value), value.astype(object), value.astype(str)).tolist()
 
 

@@ -13,15 +13,15 @@ def reflected_mass(
 ) -> float:
     """Effective mass of the arm at a point of impact [kg]: 1 / (n^T J M^-1 J^T n).
 
-    Armature included, since an impact is shorter than the response of any drive. (Khatib, "Inertial
-    properties in robotic manipulation", 1995.)
+    M includes armature, because an impact is shorter than the response of any drive. (Khatib,
+    "Inertial properties in robotic manipulation", 1995.)
 
     Args:
         scene: a composed scene.
         q: joint positions [rad], shape (n,).
         body: id of the body that is hit.
-        point: where, in the world frame [m], shape (3,).
-        direction: n, of the impact; its length does not matter, shape (3,).
+        point: point of impact in the world frame [m], shape (3,).
+        direction: n, the direction of the impact, of any length, shape (3,).
 
     Raises:
         ValueError: a zero direction, or one in which no joint can move the point.
@@ -45,7 +45,7 @@ def blow_velocity(
 ) -> Array:
     """Joint velocities [rad/s] that move the point at ``speed`` [m/s] along the direction, (n,).
 
-    Of all such velocities these have the least kinetic energy; arguments as in
+    Among all such velocities these have the least kinetic energy; arguments as in
     :func:`reflected_mass`.
     """
     mass, column = _along(scene, q, body, point, direction)

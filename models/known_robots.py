@@ -1,4 +1,4 @@
-"""Arms by name: where their model comes from, and the numbers that no model file has.
+"""Arms by name: the source of their model, and the numbers that no model file states.
 
 Every number names its source. Numbers that a row leaves out are derived, see
 :mod:`tauguard.models.derive`.
@@ -17,15 +17,15 @@ from tauguard.models.robot import Robot, RobotDrive
 _READY = (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854)
 _UR_HOME = (-1.5708, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 _DEG = 0.017453292519943295
-#: Arms with published numbers and light shapes, that need no other package.
+#: Arms of this package, with published numbers and simple shapes.
 PUBLISHED = Path(__file__).parent / "published"
 
 
 @dataclass(frozen=True)
 class KnownRobot:
-    """A row: a file here, one within ``example-robot-data`` or a name in ``mujoco-menagerie``."""
+    """A row: a file of this package or ``example-robot-data``, or a ``mujoco-menagerie`` name."""
 
-    robot: Robot  #: its ``file`` is the name
+    robot: Robot  #: description, whose ``file`` is the arm's name
     own: str | None  #: file in :data:`PUBLISHED`
     urdf: str | None  #: path below ``robots`` of example-robot-data
     menagerie: str | None
@@ -158,7 +158,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
 
 
 def known_names() -> tuple[str, ...]:
-    """Names of the table, then those of mujoco-menagerie's arms if it is installed."""
+    """Names in the table, then those of mujoco-menagerie's arms if it is installed."""
     names = list(ROBOTS)
     if importlib.util.find_spec("mujoco_menagerie") is not None:
         import mujoco_menagerie
@@ -168,12 +168,12 @@ def known_names() -> tuple[str, ...]:
 
 
 def find_file(name: str) -> Path:
-    """The model file of an arm by name: the package's own, example-robot-data's, or menagerie's.
+    """The model file of a named arm, from this package, example-robot-data or menagerie.
 
     Nothing is downloaded here: ``tauguard robot NAME --download`` does it.
 
     Raises:
-        FileNotFoundError: no installed package has it; the message says what to do.
+        FileNotFoundError: no installed package has the file; the message says what to install.
     """
     row = ROBOTS.get(name)
     if row is not None and row.own is not None:
@@ -212,8 +212,8 @@ def menagerie_file(name: str, download: bool = False) -> Path | None:
     """The MJCF file of a menagerie model, None if it was not downloaded.
 
     Args:
-        name: as mujoco-menagerie has it.
-        download: fetch the model where it has not been fetched before.
+        name: name of the model in mujoco-menagerie.
+        download: download the model if it is not there yet.
 
     Raises:
         ModuleNotFoundError: ``download`` without mujoco-menagerie.

@@ -1,6 +1,6 @@
-"""The currents that a model of an arm's drives does not explain, replayed along like motions.
+"""Replay of the current errors of a drive model, matched to similar recorded motions.
 
-Most of what a model of a real drive does not explain repeats with the motion, has heavy tails and
+The error of a model of a real drive mostly repeats with the motion, has heavy tails and
 depends on speed, acceleration and the time since a stop. A random process can have the same level
 but not this structure. Stretches of the recorded error have it. While the motion resembles that of
 the log, the log's error is continued. When it differs, the stretch with the most similar motion is
@@ -26,7 +26,7 @@ from tauguard.untrusted_input import read_text, reading
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-#: A joint that is slower stands [rad/s].
+#: A joint below this speed counts as standing [rad/s].
 SLOW = 0.02
 #: Time constants of the filters of velocity and acceleration [s].
 FAST, SLOWER = 0.02, 0.06
@@ -51,7 +51,7 @@ MOVED = 3
 _UNMOVED, _LONG = (float(WEIGHTS[MOVED] * np.log10(0.02 + s)) for s in (1e-3, HELD))
 
 
-#: A search tree, and the rows that its points are.
+#: A search tree, and the row of each of its points.
 _Tree: TypeAlias = "tuple[cKDTree, NDArray[np.intp]]"
 
 
@@ -78,10 +78,10 @@ class LeftOver:
 
     @classmethod
     def read(cls, path: str | Path) -> LeftOver:
-        """From a CSV file as :meth:`write` makes it.
+        """Read a CSV file that :meth:`write` made.
 
         Raises:
-            ValueError: not such a file.
+            ValueError: the file has another form.
             FileNotFoundError: no such file.
         """
         with reading(path, "expected columns log, t, qd1, ..., error1, ..."):
@@ -95,7 +95,7 @@ class LeftOver:
             return cls(rate, log, table[:, 2 : 2 + joints], table[:, 2 + joints :])
 
     def write(self, path: Path) -> None:
-        """As CSV: log, time in it [s], velocities [rad/s], errors [A]."""
+        """Write CSV with the columns log, time in the log [s], velocities [rad/s], errors [A]."""
         joints = range(1, self.qd.shape[1] + 1)
         head = ["log", "t", *(f"qd{j}" for j in joints), *(f"error{j}" for j in joints)]
         first = np.searchsorted(self.log, self.log)
@@ -110,7 +110,7 @@ class LeftOver:
 
     @cached_property
     def features(self) -> Array:
-        """Of every sample's motion, shape (N, n, features)."""
+        """Features of the motion at every sample, shape (N, n, features)."""
         parts = [
             _Motion(1 / self.rate).features(self.qd[self.log == k]) for k in np.unique(self.log)
         ]
@@ -130,7 +130,7 @@ class LeftOver:
 
     @cached_property
     def _trees(self) -> list[tuple[_Tree, _Tree]]:
-        """Of each joint: where stretches begin, and where it stands for a while from there."""
+        """Per joint, search trees of all stretches and of those in which it then stands."""
         later = self._starts + round(HELD * self.rate)
         later = np.minimum(later, self._starts + self.remaining[self._starts])
         found = []
@@ -157,7 +157,7 @@ class LeftOver:
     def nearest(
         self, joint: int, motion: Array, stands: bool, count: int
     ) -> tuple[float, NDArray[np.intp]]:
-        """Distance of the nearest stretch to a motion, and where the ``count`` nearest begin."""
+        """Distance of the nearest stretch to a motion, and first rows of the ``count`` nearest."""
         tree, rows = self._trees[joint][int(stands)]
         distance, found = tree.query(motion, k=min(count, len(rows)))
         places: NDArray[np.intp] = rows[np.atleast_1d(found)]
@@ -174,7 +174,7 @@ class _Motion:
         self._direction = np.zeros(0)
 
     def features(self, qd: Array) -> Array:
-        """Of the next samples' motion, shape (T, n, features)."""
+        """Features of the next samples' motion, shape (T, n, features)."""
         from scipy.signal import lfilter
 
         if not self._filtered:
@@ -202,7 +202,7 @@ class _Motion:
         return np.asarray(WEIGHTS * np.stack(parts, axis=2))
 
     def _last_direction(self, fast: Array, slow: Bools) -> Array:
-        """The sign of each joint's last motion, whose friction it holds at rest, shape (T, n)."""
+        """The sign of each joint's last motion, which sets its friction at rest, shape (T, n)."""
         row = np.arange(1, len(fast) + 1)[:, None]
         last = np.maximum.accumulate(np.where(slow, 0, row), axis=0)
         signs = np.take_along_axis(np.sign(fast), np.maximum(last - 1, 0), axis=0)
@@ -224,20 +224,20 @@ class Player:
     """Gives the errors along a running motion, block by block."""
 
     def __init__(self, source: LeftOver, dt: float, rng: np.random.Generator) -> None:
-        """Begin anywhere.
+        """Start with no matched stretch.
 
         Args:
-            source: what is played.
+            source: the errors to replay.
             dt: sample interval of the motion [s].
             rng: generator of the random choices between stretches.
         """
         n = source.qd.shape[1]
         self._source, self._rng, self._step = source, rng, dt * source.rate
         self._motion, self._dt = _Motion(dt), dt
-        self._rows = max(1, round(EVERY / dt))  # between two comparisons
+        self._rows = max(1, round(EVERY / dt))  # rows between two comparisons
         self._due = 0
-        self._at = np.full(n, -1.0)  # place in the source
-        self._before = np.full(n, -1.0)  # that is faded out
+        self._at = np.full(n, -1.0)  # row of the source, per joint
+        self._before = np.full(n, -1.0)  # row that is faded out
         self._held = np.zeros(n)  # added so that a joint at rest keeps its torque [A]
         self._held_before = np.zeros(n)
         self._keep = np.exp(-dt / np.array([FORGET, RELEASE]))
@@ -262,7 +262,7 @@ class Player:
         for j, now in enumerate(motion):
             at, stands = int(self._at[j]), bool(now[MOVED] > _UNMOVED)
             known = at >= 0 and source.remaining[at] > ahead
-            if known and stands:  # a stretch that is about to move is left before
+            if known and stands:  # a stretch is left before the joint moves in it
                 known = source.features[at + ahead, j, MOVED] > _UNMOVED
             here = float(np.linalg.norm(source.features[at, j] - now)) if known else np.inf
             stood = at >= 0 and min(now[MOVED], source.features[at, j, MOVED]) > _LONG
@@ -281,7 +281,7 @@ class Player:
             self._at[j] = place
 
     def _played(self, qd: Array) -> Array:
-        """The errors until the next comparison; a change of stretch fades."""
+        """The errors until the next comparison; a change of stretch is cross-faded."""
         steps = self._step * np.arange(len(qd) + 1)
         kept = np.cumprod(self._keep[(np.abs(qd) > SLOW).astype(int)], axis=0)
         new = self._read(self._at + steps[:-1, None]) + self._held * kept

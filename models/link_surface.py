@@ -1,4 +1,4 @@
-"""Points on the surface of an arm's links, where something can touch it."""
+"""Sample points on the surface of an arm's links that can be touched."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tauguard.arrays import Array, in_a_line
 from tauguard.models.arm_file import read_arm
 from tauguard.models.nominal import compiled
 
-#: Points on each link, and lines that may be tried for each of them (thin links are often missed).
+#: Number of points on each link, and of lines to try per point (lines often miss thin links).
 POINTS, TRIES = 150, 40
 
 
@@ -43,10 +43,10 @@ class LinkSurface:
             raise ValueError("link: expected 0-based numbers in rising order")
 
     def only(self, links: Iterable[int]) -> LinkSurface:
-        """The surface of some links only (1-based), for an arm of which only these can be touched.
+        """The surface of the given links only (1-based).
 
         Raises:
-            ValueError: a link that has no surface here.
+            ValueError: a link has no surface in this object.
         """
         wanted = sorted(set(links))
         there = sorted({int(i) + 1 for i in self.link})
@@ -103,7 +103,7 @@ def link_surface(
 def arm_surface(
     path: Path, joints: tuple[str, ...], points: int = POINTS
 ) -> tuple[LinkSurface, tuple[str, ...]]:
-    """The surface of the arm in a robot file, and the links whose shape is a capsule only.
+    """The surface of the arm in a robot file, and the links that have a substitute capsule.
 
     Meshes of a URDF are looked for from its folder upwards. A link without a shape that MuJoCo
     reads becomes a capsule along it. This is impossible for the last link, whose end is unknown.
@@ -144,7 +144,7 @@ def _entries(
     wanted: int,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Where random lines enter the geoms, and the outward normals there, world frame."""
+    """Points at which random lines enter the geoms, and outward normals, in the world frame."""
     before = model.geom_group.copy()
     model.geom_group[:] = 0
     model.geom_group[geoms] = 1

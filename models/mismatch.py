@@ -1,4 +1,4 @@
-"""How the simulated arm differs from the nominal one that the observer assumes."""
+"""Random differences between the simulated arm and the nominal arm of the observer."""
 
 from dataclasses import dataclass, replace
 
@@ -10,9 +10,10 @@ from tauguard.models.drive import Drive
 
 @dataclass(frozen=True)
 class Mismatch:
-    """An individual arm.
+    """Size of the differences of an individual arm from the nominal one.
 
-    Each number is the half-width of a uniform distribution, relative (com: absolute).
+    Each number is the half-width of a uniform distribution, relative to the value (``com``:
+    absolute).
 
     The inertia of a link is scaled with its mass and by a common factor. Its principal moments are
     scaled by independent factors, each at most a quarter of ``inertia``, so that the inertia stays
@@ -57,7 +58,7 @@ class Mismatch:
             body.inertia, body.iquat = moments, quat
 
     def perturb_drive(self, drive: Drive) -> Drive:
-        """The drives of this arm."""
+        """A copy of the drives with random differences."""
         rng = np.random.default_rng([self.seed, 1])
         n = len(drive.gain)
 
@@ -96,7 +97,7 @@ def _inertia_matrix(body: mujoco.MjsBody) -> np.ndarray:
 
 
 def _possible(moments: np.ndarray) -> np.ndarray:
-    """Principal moments that obey the triangle inequality; the largest is reduced if necessary."""
+    """Principal moments that satisfy the triangle inequality; the largest may be reduced."""
     order = np.argsort(moments)
     out = moments.copy()
     out[order[2]] = min(out[order[2]], 0.999 * (out[order[0]] + out[order[1]]))

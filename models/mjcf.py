@@ -1,4 +1,4 @@
-"""Compiling a spec whose meshes are missing, and MJCF text with every digit."""
+"""Compile specs whose meshes are missing, and write MJCF text with full precision."""
 
 import ctypes
 import functools
@@ -42,9 +42,9 @@ def xml_text(spec: mujoco.MjSpec) -> str:
 
 
 class SpecText:
-    """The text of a spec as it is now, written when it is first asked for.
+    """The text of a spec at this moment, written when it is first needed.
 
-    Meshes make it long: an arm with detailed ones takes seconds, and few callers read it.
+    Writing an arm with detailed meshes takes seconds, and few callers read the text.
     """
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
@@ -60,7 +60,7 @@ class SpecText:
         return self._text
 
     def dynamics(self) -> mujoco.MjModel:
-        """The compiled model without shapes, with the inertia that the shapes would give."""
+        """The compiled model without shapes, which keeps the inertia of the shapes."""
         spec = self._spec.copy()
         if not all(body.explicitinertial for body in spec.bodies if body.name != "world"):
             return mujoco.MjModel.from_xml_string(str(self))
@@ -79,10 +79,10 @@ def without_shapes(spec: mujoco.MjSpec, geoms: list[mujoco.MjsGeom]) -> None:
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The model of ``spec``; without its mesh geoms if it does not compile with them.
+    """The model of ``spec``, without its mesh geoms if it does not compile with them.
 
     Raises:
-        ValueError: it compiles neither with nor without shapes; MuJoCo's first message.
+        ValueError: it compiles neither with nor without shapes; the text is MuJoCo's first message.
     """
     try:
         return spec.compile()
@@ -99,7 +99,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def inline_meshes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Write mesh files into the text and drop textures, so that the text stands alone."""
+    """Write mesh files into the text and remove textures, so that the text is self-contained."""
     solid = {geom.meshname for geom in spec.geoms if geom.contype or geom.conaffinity}
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
         at = model.mesh(mesh.name or Path(mesh.file).stem)

@@ -1,4 +1,4 @@
-"""Known defects of MuJoCo versions that change results, and the models that they concern."""
+"""Known defects of MuJoCo versions that change results, and checks for affected models."""
 
 import warnings
 from typing import Any
@@ -8,7 +8,7 @@ import mujoco
 #: Versions whose Newton solver factors a wrong Hessian if the Jacobian is sparse. It may then stop
 #: at its limit of iterations with wrong accelerations. Fixed in 4.0.1.
 WRONG_SPARSE_NEWTON = ("4.0.0",)
-#: Degrees of freedom from which on MuJoCo's choice of Jacobian, ``auto``, is the sparse one.
+#: Number of degrees of freedom from which MuJoCo's ``auto`` chooses the sparse Jacobian.
 SPARSE_FROM = 60
 
 
@@ -43,7 +43,7 @@ def choose_jacobian(spec: Any) -> None:
 
 
 def warn_of_sparse_newton(model: Any) -> None:
-    """One ``UserWarning`` that says what to do, where :func:`hit_by_sparse_newton` is true."""
+    """Raise a ``UserWarning`` with the remedy if :func:`hit_by_sparse_newton` is true."""
     if hit_by_sparse_newton(model):
         warnings.warn(
             f"MuJoCo {mujoco.__version__}: its Newton solver can give wrong accelerations with a "

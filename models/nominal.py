@@ -27,10 +27,10 @@ MOST_DEPTH = 200
 def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
     """The MuJoCo model of MJCF or URDF text, of a file, or of a spec.
 
-    Meshes that a URDF names and that are not there are left out: dynamics do not need them.
+    Missing meshes of a URDF are ignored, because dynamics do not need them.
 
     Raises:
-        ValueError: the text or file is no model that MuJoCo can compile.
+        ValueError: MuJoCo cannot compile the text or file.
         FileNotFoundError: no such file.
     """
     if isinstance(source, mujoco.MjModel):
@@ -57,7 +57,7 @@ def _beginning(path: Path) -> str:
 
 
 def _compiled_urdf(text: str) -> mujoco.MjModel:
-    """The model of a URDF without shapes; links that move without a mass get a gram or less."""
+    """The model of a URDF without shapes; massless moving links get a gram or less."""
     try:
         return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text)))
     except ValueError as error:
@@ -88,7 +88,7 @@ def _without_shapes(urdf: str, compiler: Mapping[str, str] = MappingProxyType({}
 
 
 def _check_depth(root: ElementTree.Element) -> None:
-    """Refuse deep nesting, which would exhaust the stack when the text is written again."""
+    """Refuse deep nesting, which would exhaust the stack when the text is written."""
     level, depth = [root], 0
     while level:
         level, depth = [child for one in level for child in one], depth + 1
@@ -153,7 +153,7 @@ def pin_model(
 def _add_joint(
     model: pin.Model, m: mujoco.MjModel, j: int, parent: int, body: pin.SE3
 ) -> tuple[int, pin.SE3]:
-    """Adds joint ``j``; returns its index and where the body's frame is in the joint's frame."""
+    """Add joint ``j``; returns its index and the pose of the body's frame in the joint's frame."""
     name = m.joint(j).name or f"joint{j + 1}"
     axis, anchor = m.jnt_axis[j], m.jnt_pos[j]
     placement = body * pin.SE3(np.eye(3), anchor)
@@ -198,7 +198,7 @@ def add_payload(
         inertia: about the payload's centre of mass [kg m^2], a number or (3, 3).
 
     Raises:
-        ValueError: a mass or inertia that nothing can have, or a ``com`` that is no vector.
+        ValueError: a physically impossible mass or inertia, or a ``com`` that is no vector.
     """
     if not (np.isfinite(mass) and mass >= 0):
         raise ValueError(f"payload mass {mass} kg: expected 0 or more")

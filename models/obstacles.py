@@ -49,16 +49,16 @@ class Clamp:
 class BodyProxy:
     """A body region of a person: its effective mass behind its contact stiffness.
 
-    A ball, because every further contact point would multiply the stiffness. It slides along
-    ``direction``, as the two-mass model of the standard has it, or is held (``clamped``).
+    It is a ball, because every further contact point would multiply the stiffness. It slides along
+    ``direction``, as in the standard's two-mass model, or is fixed (``clamped``).
     """
 
     region: str  #: one of :data:`tauguard.models.body_regions.BODY_REGIONS`
     position: Vector  #: of its centre [m]
-    direction: Vector = (1.0, 0.0, 0.0)  #: in which it may move; length does not matter
+    direction: Vector = (1.0, 0.0, 0.0)  #: direction of free motion, of any length
     radius: float = 0.07  #: [m]
-    damping: float = 0.0  #: of its contact [N s/m]; the standard's spring has none
-    clamped: bool = False  #: held in place: the quasi-static case
+    damping: float = 0.0  #: damping of its contact [N s/m]; the standard's model has none
+    clamped: bool = False  #: fixed in place: the quasi-static case
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is out of range."""
@@ -133,7 +133,7 @@ def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle, name: str) -> None:
 
 
 def _ball(body: mujoco.MjsBody, radius: float, mass: float, rgba: list[float]) -> None:
-    """An obstacle's geom; it meets the arm by contact pairs alone."""
+    """An obstacle's geom; it collides with the arm through contact pairs only."""
     body.add_geom(
         name=body.name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,

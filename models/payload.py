@@ -1,15 +1,15 @@
-"""What the arm carries: a body at the flange whose mass changes while the simulation runs."""
+"""The payload: a body at the flange whose mass can change while the simulation runs."""
 
 import mujoco
 import numpy as np
 
 from tauguard.models.obstacles import pair_weights
 
-#: Length of the payload's lever: its centre of mass in front of the flange [m].
+#: Distance of the payload's centre of mass from the flange [m].
 PAYLOAD_REACH = 0.08
 #: Radius of the solid ball that gives the payload its inertia [m].
 _RADIUS = 0.05
-#: Mass [kg] and inertia [kg m^2] of an empty payload body; MuJoCo wants them above its minimum.
+#: Mass [kg] and inertia [kg m^2] of an empty payload body, above MuJoCo's minimum.
 _NO_MASS, _NO_INERTIA = 1e-6, 1e-9
 
 
@@ -40,7 +40,7 @@ def load_body(model: mujoco.MjModel, body: int, mass: float) -> None:
 
 
 def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:
-    """Give the payload body a mass [kg], from now on; a compact load in front of the flange.
+    """Set the mass [kg] of the payload body, a compact load in front of the flange.
 
     The model's derived constants are updated, and contact pairs keep their stated stiffness.
 

@@ -31,7 +31,7 @@ STATURES = {
     "male 5": 1.649, "male 50": 1.759, "male 95": 1.869,
 }  # fmt: skip
 POSTURES = ("standing", "seated")
-#: What a person does: work with the hands and walk, work in place, or stand with hanging arms.
+#: Motions of a person: reach and walk, reach in place, or stand with hanging arms.
 MOTIONS = ("walk", "work", "still")
 #: Lengths in units of the stature. Trunk: from hip to shoulder; grip: from wrist to palm.
 LENGTHS = {
@@ -54,7 +54,7 @@ class Segment:
     half: float  #: of the capsule's straight part
     radius: float
     height: float  #: of its centre above the floor, standing
-    gives: bool = True  #: moves under a force
+    gives: bool = True  #: yields to a force
 
 
 def _limbs(side: str) -> tuple[Segment, ...]:
@@ -86,8 +86,8 @@ SEGMENTS = (
 class Person:
     """One person; every number has a default, and the environment chooses the place."""
 
-    position: tuple[float, float] = (1.0, 0.0)  #: where they work: below the hips [m]
-    facing: float = np.pi  #: about z; 0 looks along x [rad]
+    position: tuple[float, float] = (1.0, 0.0)  #: work place: the point below the hips [m]
+    facing: float = np.pi  #: heading about z [rad]; 0: along x
     floor: float = -0.75  #: height of the floor: the arm stands on a bench [m]
     stature: float = STATURES["male 50"]  #: [m]
     posture: str = "standing"  #: one of :data:`POSTURES`
@@ -167,7 +167,7 @@ class PersonPart:
 
     @property
     def held(self) -> bool:
-        """Cannot move away: what lies on a seat."""
+        """Whether the part cannot yield, because it lies on a seat."""
         return self.person.seated and self.segment.region in ("pelvis", "thigh")
 
     @property

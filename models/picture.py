@@ -1,4 +1,4 @@
-"""What a picture of a scene needs beside it: sky, floor, lamp, and an OpenGL that starts."""
+"""Sky, floor, lamp and markers for pictures of a scene, and a check of OpenGL."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ FLOOR = (8.0, 8.0, 1.0)
 #: The lamp that throws the shadows: where it stands [m], its direction and how bright it is. From
 #: straight above, the floor would throw thin shadows on itself.
 LAMP, DOWN, LAMP_COLOUR = (0.0, 0.0, 3.0), (0.06, 0.04, -1.0), 0.35
-#: Light of the camera: from everywhere, and from in front.
+#: Ambient and diffuse light of the camera.
 AMBIENT, DIFFUSE = 0.35, 0.4
-#: Height of the floor where nothing stands lower [m].
+#: Height of the floor if nothing is below it [m].
 FLOOR_HEIGHT = -0.001
-#: What an arm stands on where the floor is lower: half its extents [m] and colour.
+#: Pedestal of an arm above the floor: half extents [m] and colour.
 PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
 #: Radius [m] and colour of the ball that marks a target; width [m] and colour of an arrow.
 MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
@@ -33,7 +33,7 @@ ARROW_WIDTH, ARROW_COLOUR = 0.012, (0.85, 0.1, 0.1, 1.0)
 
 
 def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -> mujoco.MjModel:
-    """The model of ``spec`` with sky, lamp and a floor at a height [m], which only show.
+    """The model of ``spec`` with sky, lamp and a floor at a height [m], all visual only.
 
     Arms at ``bases`` [m] get a pedestal where the floor is below them.
     """
@@ -80,7 +80,7 @@ def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -
 
 
 def _next(scene: Any, kind: Any, rgba: Any) -> Any:
-    """The next free shape of a ``MjvScene``; None where it is full."""
+    """The next free geom of a ``MjvScene``; None if the scene is full."""
     if scene.ngeom >= scene.maxgeom:
         return None
     shape, scene.ngeom = scene.geoms[scene.ngeom], scene.ngeom + 1
@@ -104,7 +104,7 @@ def point_at(scene: Any, point: ArrayLike, vector: ArrayLike) -> None:
 
 
 def check_opengl() -> None:
-    """Start an OpenGL and end it.
+    """Check that an OpenGL context can be created.
 
     Raises:
         RuntimeError: as :func:`opengl`.

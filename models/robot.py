@@ -1,4 +1,4 @@
-"""A robot, described once: its file, and whatever the file does not say or says wrongly."""
+"""The description of a robot: its file, and the numbers that the file lacks or states wrongly."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tauguard.arrays import Array
 from tauguard.untrusted_input import read_text, reading
 
 Numbers = tuple[float, ...]
-#: A number a joint and harmonic.
+#: One number per joint and harmonic.
 Rows = tuple[Numbers, ...]
 
-#: What becomes of the joints below the flange.
+#: Treatment of the joints below the flange.
 GRIPPERS = ("weld", "passive")
 
 
@@ -44,7 +44,7 @@ class RobotRipple:
 
 @dataclass(frozen=True)
 class RobotSensors:
-    """What the arm reports of its signals; a number is that of every joint."""
+    """The arm's sensors; a single number holds for every joint."""
 
     current_noise: float | Numbers = 0.0  #: standard deviation [A]
     current_quantum: float | Numbers = 0.0  #: [A]
@@ -66,9 +66,9 @@ class RobotSensors:
 
 @dataclass(frozen=True)
 class RobotDrive:
-    """Drives as a data sheet or an identification states them; a number is that of every joint.
+    """Drives from a data sheet or an identification; a single number holds for every joint.
 
-    ``gear`` and ``torque_constant`` give the gain, or ``gain`` does; ``rotor_inertia`` is the
+    State either ``gain``, or ``gear`` and ``torque_constant``. ``rotor_inertia`` is the
     motor's own (the joint feels gear^2 times it). Friction is that at the joint, in the terms of
     :class:`tauguard.models.Friction`.
     """
@@ -138,7 +138,7 @@ class Robot:
     joints: tuple[str, ...] | None = None
     """Names of the arm's joints, base to tip, or ``FIRST..LAST`` for all between two of them; all
     others are welded. Default: the only chain."""
-    gripper: str = "weld"  #: what becomes of joints below the flange, one of :data:`GRIPPERS`
+    gripper: str = "weld"  #: treatment of joints below the flange, one of :data:`GRIPPERS`
     home: Numbers | None = None  #: [rad]
     tool: str | None = None  #: name of a site or body
     torque_limit: float | Numbers | None = None  #: [N m]
@@ -147,7 +147,7 @@ class Robot:
     bandwidth: float | Numbers | None = None  #: of the servo [rad/s]
     friction_compensation: float = 1.0  #: fraction of the known friction that the servo compensates
     drive: RobotDrive = RobotDrive()  #: noqa: RUF009
-    source: str | None = None  #: what the drive was identified from, in words
+    source: str | None = None  #: source of the identified drive, as text
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field and what would work."""
@@ -171,7 +171,7 @@ class Robot:
 
     @classmethod
     def named(cls, text: str) -> Robot:
-        """From ``FILE`` or ``FILE#JOINTS``, joints with commas between or ``FIRST..LAST``."""
+        """Parse ``FILE`` or ``FILE#JOINTS``; joints are separated by commas, or ``FIRST..LAST``."""
         file, _, names = text.partition("#")
         if not names or Path(text).is_file():
             return cls(text)
@@ -179,7 +179,7 @@ class Robot:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Robot:
-        """The robot that a TOML file describes; ``file`` in it counts from the file's folder.
+        """The robot that a TOML file describes; ``file`` in it is relative to the file's folder.
 
         Raises:
             ValueError: not TOML, or a key or value that a robot cannot have.
@@ -199,7 +199,7 @@ class Robot:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Robot:
-        """From the keys of a TOML table."""
+        """The robot that a TOML table describes."""
         known = [field.name for field in fields(cls)]
         parts = dict(values)
         _check_keys(parts, known, "robot")
@@ -210,7 +210,7 @@ class Robot:
 
 
 def _drive(values: Mapping[str, Any]) -> RobotDrive:
-    """From the keys of the TOML table ``drive`` and its own tables."""
+    """The drive that the TOML table ``drive`` describes."""
     parts = dict(values)
     _check_keys(parts, [field.name for field in fields(RobotDrive)], "drive")
     if "ripple" in parts:

@@ -1,4 +1,4 @@
-"""Untrusted robot files: they name files of their own folder only, and are compiled apart first.
+"""Check untrusted robot files: the files they name, and a first compilation in a separate process.
 
 MuJoCo's compiler can crash on XML that looks valid, so a file is compiled in a process of limited
 memory and time first.
@@ -13,20 +13,20 @@ from pathlib import Path
 from tauguard.models.robot_trial import Trial
 from tauguard.untrusted_input import read_text, reading
 
-#: Files that include one another, at most.
+#: Largest number of files that include one another.
 MOST_INCLUDES = 100
 
 #: Attributes that name a file; the six are those of a cube's texture.
 FILES = ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
 
-#: What tries the files.
+#: The process that compiles files first.
 TRIAL = Trial()
 
 
 def checked_robot(path: Path) -> Path:
-    """``path``, once its files are known to be its own and MuJoCo to survive them.
+    """Check that ``path`` names only files of its folder and does not crash MuJoCo; returns it.
 
-    A file that MuJoCo merely refuses passes: compiling it here says why.
+    A file that MuJoCo merely refuses passes, because its later compilation reports the reason.
 
     Raises:
         ValueError: a file outside the robot's folder is named, or MuJoCo crashes or needs more than
@@ -39,7 +39,7 @@ def checked_robot(path: Path) -> Path:
 
 
 def checked_text(text: str) -> str:
-    """``text`` of a robot, once MuJoCo is known to survive it.
+    """Check that the ``text`` of a robot does not crash MuJoCo; returns it.
 
     Raises:
         ValueError: as for :func:`checked_robot`.
@@ -64,7 +64,7 @@ def _check(path: str, mtime: int, size: int) -> None:
 
 
 def _check_names(path: Path) -> None:
-    """Every file and folder that the robot names lies in the folder of its own file."""
+    """Check that every file and folder that the robot names lies in the folder of its file."""
     folder, waiting, seen = path.parent.resolve(), [path], set[Path]()
     while waiting:
         one = waiting.pop()

@@ -1,4 +1,4 @@
-"""A robot file with other inertial numbers and a note inside: URDF stays URDF, MJCF stays MJCF."""
+"""Write a copy of a robot file (URDF or MJCF) with other inertial numbers and a note."""
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -25,8 +25,8 @@ def write_robot_file(
         source: URDF or MJCF of an arm.
         target: where to write, in the same format.
         joints: names, in the order of ``inertial``; all other joints are made fixed.
-        inertial: of all that moves with each joint, in the joint's frame: mass, first moment (3),
-            Ixx Ixy Iyy Ixz Iyz Izz about its origin [kg, kg m, kg m^2], shape (n, 10).
+        inertial: inertia of all that moves with each joint, in the joint's frame: mass, first
+            moment (3), Ixx Ixy Iyy Ixz Iyz Izz about its origin [kg, kg m, kg m^2], shape (n, 10).
         note: any text; :func:`read_note` finds it again.
 
     Raises:
@@ -170,7 +170,7 @@ def _without_joints(text: str, held: set[str]) -> str:
 
 
 def _welded(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
-    """Bodies below ``body`` that move with it."""
+    """Bodies below ``body`` that are welded to it."""
     found = []
     for child in body.bodies:
         if not child.joints:

@@ -12,17 +12,17 @@ import sys
 import threading
 from select import select
 
-#: Limits of one trial beyond what MuJoCo takes by itself [bytes, s].
+#: Limits of one trial beyond MuJoCo's own use [bytes, s].
 MOST_MEMORY, MOST_SECONDS = 1 << 30, 10.0
-#: Processor time of one trial [s]. What passes is compiled again here, up to twice, so that all of
-#: it stays below ``MOST_SECONDS`` on an idle processor.
+#: Processor time of one trial [s]. A model that passes is compiled again, up to twice, so that all
+#: of it stays below ``MOST_SECONDS`` on an idle processor.
 MOST_WORK = 3
-#: Longest time in which MuJoCo is loaded, on a busy machine [s].
+#: Time limit for loading MuJoCo on a busy machine [s].
 LOADING = 60.0
 #: An idle process ends after this time [s].
 IDLE = 20
 
-#: What a trial does with the content of a request, its file's path or its text.
+#: Code of a trial; a request holds the path of a file or its text.
 COMPILE = """
 spec = mujoco.MjSpec.from_string(what["text"]) if "text" in what else \\
     mujoco.MjSpec.from_file(what["path"])
@@ -70,24 +70,24 @@ while True:
 
 
 class Trial:
-    """What tries robots; safe to ask from several threads, and after a fork.
+    """Compiles robots in a separate process; safe to use from several threads and after a fork.
 
-    A system without ``fork`` (Windows) tries nothing; one without ``/proc`` (macOS) has no limit of
-    memory.
+    Systems without ``fork`` (Windows) skip the trial; those without ``/proc`` (macOS) have no limit
+    of memory.
 
     Args:
-        work: Python that gets ``what``, a request, and ``mujoco``.
-        seconds: for one robot.
+        work: Python code with the variables ``what``, a request, and ``mujoco``.
+        seconds: time limit for one robot.
     """
 
     def __init__(self, work: str = COMPILE, seconds: float = MOST_SECONDS) -> None:
-        """Nothing is started before the first question."""
+        """Keep the settings; the process starts with the first request."""
         self._work, self.seconds = work, seconds
         self._lock, self._owner = threading.Lock(), 0
         self._process: subprocess.Popen[bytes] | None = None
 
     def of(self, **what: str) -> str | None:
-        """None if MuJoCo compiles or refuses it, else what happened.
+        """Try a robot: None if MuJoCo compiles or refuses it, otherwise the failure as text.
 
         Args:
             what: ``path`` of a file, or its ``text``.
@@ -95,10 +95,10 @@ class Trial:
         if not hasattr(os, "fork"):
             return None
         line = json.dumps(what).encode() + b"\n"
-        if self._owner != os.getpid():  # the process of a parent is not ours
+        if self._owner != os.getpid():  # the process belongs to the parent
             self._lock, self._process, self._owner = threading.Lock(), None, os.getpid()
         with self._lock:
-            for _ in range(2):  # an idle one may have ended this moment
+            for _ in range(2):  # an idle process may just have ended
                 process = self._running()
                 if process is None or process.stdin is None:
                     break

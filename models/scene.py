@@ -55,15 +55,15 @@ class SceneSpec:
     clamp: Clamp | None = None
     labels: bool = True  #: a contact sensor on every link
     floor: bool = False  #: a plane at height 0
-    arm: str | Robot = "cura6"  #: or a name, a file or a robot, see :func:`load_arm`
-    base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
+    arm: str | Robot = "cura6"  #: a name, a file or a robot, see :func:`load_arm`
+    base_pose: tuple[tuple[float, ...], ...] | None = None  #: pose of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
     people: tuple[Person, ...] = ()
     region_labels: bool = False  #: a contact sensor on every body region, after the links
     table: Table | None = None
     cloth: Cloth | None = None
-    objects: tuple[SceneObject, ...] = ()  #: things of your own
+    objects: tuple[SceneObject, ...] = ()  #: your own objects
     drive: Drive | None = field(default=None, compare=False)
     """The nominal drive; without it the arm has its own, see :class:`tauguard.models.arm.Facts`."""
 
@@ -94,18 +94,18 @@ class Scene:
     __repr__ = in_a_line
 
     model: mujoco.MjModel
-    text: SpecText  #: of the scene, see :attr:`xml`
+    text: SpecText  #: text of the scene, see :attr:`xml`
     spec: SceneSpec
-    arm_text: SpecText  #: of the nominal arm alone, see :attr:`arm_xml`
+    arm_text: SpecText  #: text of the nominal arm alone, see :attr:`arm_xml`
     joint_names: tuple[str, ...]
     link_bodies: NDArray[np.int64]  #: body ids of link 1..n
-    qpos_adr: NDArray[np.int64]  #: of the arm's joints in qpos
-    dof_adr: NDArray[np.int64]  #: of the arm's joints in qvel
-    obstacle_names: tuple[str, ...]  #: bodies that move by themselves
-    payload_body: int  #: its id, -1 where there is none
-    drive: Drive  #: what is simulated
-    home: Array  #: a pose to start from [rad], shape (n,)
-    facts: Facts  #: what is known or assumed about the arm (of one, where there are two)
+    qpos_adr: NDArray[np.int64]  #: addresses of the arm's joints in qpos
+    dof_adr: NDArray[np.int64]  #: addresses of the arm's joints in qvel
+    obstacle_names: tuple[str, ...]  #: bodies that move without the arm
+    payload_body: int  #: id of the payload body, -1 if there is none
+    drive: Drive  #: the simulated drives
+    home: Array  #: initial joint positions [rad], shape (n,)
+    facts: Facts  #: known and assumed numbers of the arm (of the first, if there are two)
 
     @property
     def xml(self) -> str:
@@ -114,12 +114,12 @@ class Scene:
 
     @property
     def arm_xml(self) -> str:
-        """MJCF text of the nominal arm alone: what an observer believes."""
+        """MJCF text of the nominal arm alone, which an observer assumes."""
         return str(self.arm_text)
 
     @property
     def nominal_texts(self) -> dict[str, str]:
-        """What goes with a recording, so that its arm is known anywhere: names and texts.
+        """Names and texts of the attachments that describe the arm of a recording.
 
         ``arm.xml`` is :attr:`arm_xml`; ``drive.json`` holds the nominal drive
         (:func:`tauguard.models.drive_of`) of an arm that is not the package's own.
@@ -130,7 +130,7 @@ class Scene:
 
     @property
     def arm_model(self) -> mujoco.MjModel:
-        """The nominal arm alone, compiled; without shapes where its file is another's."""
+        """The compiled nominal arm alone; without shapes if it is not part of the package."""
         if self.facts.name in NAMED:
             return mujoco.MjModel.from_xml_string(self.arm_xml)
         return self.arm_text.dynamics()
@@ -141,8 +141,8 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
 
     Args:
         spec: what the scene holds.
-        visuals: without the shapes that only show, a physics step is a fifth cheaper, with the same
-            bits; ``Scene.xml`` has them all the same.
+        visuals: keep visual shapes. Without them a physics step is a fifth cheaper, with the same
+            bits; ``Scene.xml`` always has them.
 
     Raises:
         ValueError: an arm that cannot be used, see :func:`tauguard.models.arm.load_arm`.
@@ -183,7 +183,7 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
 
 
 def _nominal_text(arm: Arm, spec: SceneSpec, whole: mujoco.MjSpec) -> SpecText:
-    """MJCF of the arm as an observer believes in it: a gripper that moves is rigid there."""
+    """MJCF of the arm that an observer assumes, with a rigid gripper."""
     if not (arm.facts.gripper and isinstance(spec.arm, Robot) and spec.arm.gripper == "passive"):
         return SpecText(whole)
     rigid = compose(replace(spec, arm=replace(spec.arm, gripper="weld")))
@@ -193,7 +193,7 @@ def _nominal_text(arm: Arm, spec: SceneSpec, whole: mujoco.MjSpec) -> SpecText:
 def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile ``whole`` without the shapes that touch nothing; bodies and joints keep their ids.
 
-    Such a shape stays where it gives its body mass. ``whole`` is changed.
+    A shape from which MuJoCo computes a body's mass stays. ``whole`` is changed.
     """
     stated = all(body.explicitinertial for body in whole.bodies if body.name != "world")
     full = None if stated else whole.compile()
@@ -266,14 +266,14 @@ def people_parts(spec: SceneSpec) -> Iterator[PersonPart]:
 
 
 def region_names(spec: SceneSpec) -> tuple[str, ...]:
-    """Bodies that the arm must not press too hard: the proxies, people's, then the objects."""
+    """Names of bodies with force limits: the proxies, body parts of people, then the objects."""
     people = (part.name for part in people_parts(spec))
     objects = (obj.name for obj in spec.objects if obj.touchable)
     return (*(proxy.region for proxy in spec.proxies), *people, *objects)
 
 
 def label_region(whole: mujoco.MjSpec, spec: SceneSpec, name: str, arm: str = "") -> None:
-    """A contact sensor on a region; on an object, only of contacts with the arm from a link on."""
+    """Add a contact sensor to a region; on an object it sees only links from ``first`` on."""
     own = any(obj.name == name for obj in spec.objects)
     _add_label(whole, name, f"contact_{name}", subtree=own, against=arm if own else "")
 
@@ -293,7 +293,7 @@ def _drive(spec: SceneSpec, arm: Arm) -> Drive:
 def _add_label(
     spec: mujoco.MjSpec, link: str, name: str, subtree: bool = False, against: str = ""
 ) -> None:
-    """A sensor of the net external contact wrench on a link: found, force, torque, position.
+    """Add a sensor of the net external contact wrench on a link: found, force, torque, position.
 
     Its ten numbers are how many contacts there are (1), the force (3) and torque (3) that the
     *link* exerts, in the world frame, about the position (3): the centroid of the contacts weighted
@@ -320,12 +320,12 @@ def _add_label(
 
 
 def with_drive(scene: Scene, drive: Drive) -> Scene:
-    """The same scene with other drives."""
+    """A copy of the scene with other drives."""
     return replace(scene, drive=drive)
 
 
 def without_losses(scene: Scene) -> Scene:
-    """The same scene with ideal drives: no friction (the file's neither), ripple, lag or noise.
+    """The scene with ideal drives: no friction (also not the file's), ripple, lag or noise.
 
     The scene's model is changed.
     """

@@ -1,4 +1,4 @@
-"""Things of your own in a scene: fixtures, bins, tools, held and loose parts, things that move."""
+"""A user's objects in a scene: fixtures, bins, tools, held and free parts, moving objects."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from tauguard.untrusted_input import read_text, reading
 Vector = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 
-#: Primitive shapes and how many numbers their size has, as MuJoCo has them: half extents [m] of a
+#: Primitive shapes and the length of their size, as in MuJoCo: half extents [m] of a
 #: box and an ellipsoid; radius and, but for a sphere, half length [m].
 SHAPES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "mesh": 0}
-#: What an object does: stands, hangs on the tool, or is free; one with a path follows it.
+#: An object is fixed, held by the tool, or free; a fixed object with a path follows it.
 MOTIONS = ("fixed", "held", "free")
-#: Objects touch one another, and the table, by this bit; the arm meets them by contact pairs.
+#: Collision bit of objects and table; the arm collides with them through contact pairs.
 OBJECT_BIT = 4
 _COLOUR = (0.55, 0.6, 0.65, 1.0)
-#: Mass of a conveyor's belt: what lies on it does not slow it down [kg].
+#: Mass of a conveyor's belt [kg], large enough that parts on it do not slow it down.
 BELT_MASS = 1e4
 #: Sizes of shapes lie between these [m].
 LEAST, MOST = 1e-5, 1e3
-#: Free objects may overlap others by this much at the beginning [m]; more would throw them.
+#: Largest initial overlap of free objects [m]; a deeper one would eject them.
 RESTING = 1e-3
 
 
@@ -44,7 +44,7 @@ class Shape:
     size: tuple[float, ...] = ()  #: [m], see :data:`SHAPES`
     position: Vector = (0.0, 0.0, 0.0)  #: [m]
     quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
-    file: str = ""  #: of a mesh: any format that trimesh reads
+    file: str = ""  #: file of a mesh, in any format that trimesh reads
     rgba: tuple[float, ...] = _COLOUR
 
     def __post_init__(self) -> None:
@@ -66,9 +66,9 @@ class Shape:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """Something of your own: shapes, or an MJCF fragment, and what it does.
+    """A user's object: its shapes or an MJCF fragment, and its motion.
 
-    Contacts with the arm are as stiff as ``stiffness`` says, are labelled, and count against the
+    Contacts with the arm have the given stiffness, are labelled, and count against the
     limits like those with people. An object is a region of the environment, by its name.
     """
 
@@ -79,7 +79,7 @@ class SceneObject:
     mjcf: Any = ""
     """Text or file of an MJCF fragment instead of shapes, a ``mujoco.MjSpec`` or a root of
     dm_control's ``mjcf``; kept as text with its meshes inside. Its bodies may have joints."""
-    position: Vector = (0.0, 0.0, 0.0)  #: in the world [m]; of a held one in the tool's frame
+    position: Vector = (0.0, 0.0, 0.0)  #: in the world, or in the frame of the holding tool [m]
     quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
     motion: str = "fixed"  #: one of :data:`MOTIONS`
     path: tuple[tuple[float, ...], ...] = ()
@@ -88,7 +88,7 @@ class SceneObject:
     belt: Vector | None = None
     """Velocity of the surface of a conveyor in its own frame [m/s]: it stays where it is and
     carries what lies on it."""
-    mass: float = 1.0  #: of a free or held one [kg]
+    mass: float = 1.0  #: mass of a free or held object [kg]
     stiffness: float = 1e5  #: of its contact with the arm [N/m]
     damping: float = 100.0  #: of its contact with the arm [N s/m]
     quasi_static_limit: float | None = None  #: largest lasting force without a cost [N]
@@ -138,17 +138,17 @@ class SceneObject:
 
     @classmethod
     def from_spec(cls, name: str, spec: mujoco.MjSpec, **keywords: Any) -> SceneObject:
-        """From a ``mujoco.MjSpec``; its keywords are those of the class."""
+        """An object from a ``mujoco.MjSpec``; keywords are those of the class."""
         return cls(name, mjcf=spec, **keywords)
 
     @property
     def moves(self) -> bool:
-        """Whether it is elsewhere later."""
+        """Whether its position changes."""
         return self.motion == "free" or bool(self.path)
 
     @property
     def touchable(self) -> bool:
-        """Whether it is something that the arm can touch, not a part of the arm."""
+        """Whether the arm can touch it (a held object is part of the arm)."""
         return self.motion != "held"
 
 
@@ -161,7 +161,7 @@ def _unit(quat: tuple[float, ...], name: str) -> Quat:
 
 
 def _text(mjcf: Any, name: str) -> str:
-    """MJCF text that stands alone."""
+    """Self-contained MJCF text."""
     if isinstance(mjcf, str) and (not mjcf or mjcf.lstrip().startswith("<")):
         return mjcf
     try:
@@ -181,9 +181,9 @@ def _text(mjcf: Any, name: str) -> str:
 
 
 def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
-    """The objects of a TOML file, a table ``[[object]]`` each, with ``[[object.shapes]]``.
+    """The objects of a TOML file: tables ``[[object]]`` with ``[[object.shapes]]``.
 
-    Files that it names count from its own folder.
+    Files that it names are relative to its folder.
 
     Raises:
         ValueError: not TOML, or a key or value that an object cannot have.
@@ -220,7 +220,7 @@ def _check_keys(found: Mapping[str, Any], kind: type[SceneObject] | type[Shape])
 def hold(
     spec: mujoco.MjSpec, link: mujoco.MjsBody, flange: mujoco.MjsSite, obj: SceneObject
 ) -> None:
-    """Put a held object on the last link: its shapes are the link's, its mass a body's beside."""
+    """Attach a held object to the last link: shapes to the link, mass to an extra body."""
     pose = np.zeros(3), np.zeros(4)
     mujoco.mju_mulPose(*pose, flange.pos, flange.quat, obj.position, obj.quat_wxyz)
     place, turn = pose
@@ -240,7 +240,7 @@ def hold(
 
 
 def add_object(spec: mujoco.MjSpec, obj: SceneObject) -> list[mujoco.MjsGeom]:
-    """Add an object that stands, moves or is free as the body of its name; returns its geoms."""
+    """Add a fixed, moving or free object as a body of its name; returns its geoms."""
     body = spec.worldbody.add_body(
         name=obj.name, pos=obj.position, quat=obj.quat_wxyz, mocap=bool(obj.path)
     )
@@ -278,10 +278,10 @@ def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: SceneObject) -> list[m
 
 
 def check_apart(model: mujoco.MjModel, objects: tuple[SceneObject, ...]) -> None:
-    """Free objects overlap nothing else that objects can touch at the beginning.
+    """Check that free objects overlap nothing at the beginning.
 
     Raises:
-        ValueError: one does, by more than :data:`RESTING`; the message has both names.
+        ValueError: an overlap exceeds :data:`RESTING`; the message has both names.
     """
     free = {obj.name for obj in objects if obj.motion == "free"}
     if not free:
@@ -299,7 +299,7 @@ def check_apart(model: mujoco.MjModel, objects: tuple[SceneObject, ...]) -> None
 
 
 def _owner(model: mujoco.MjModel, geom: int, parts: set[str]) -> str:
-    """The object that a geom belongs to, else the geom's own name."""
+    """The name of a geom's object, or else of the geom."""
     body = int(model.geom_bodyid[geom])
     while body:
         if model.body(body).name in parts:

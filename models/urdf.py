@@ -1,6 +1,6 @@
-"""A URDF as MuJoCo takes it: its meshes found, read in any format, and coarse where they only show.
+"""Prepare a URDF for MuJoCo: find its meshes, read any format, and simplify visual meshes.
 
-trimesh reads STL, OBJ, Collada, PLY, glTF and others, MuJoCo its own MSH.
+trimesh reads STL, OBJ, Collada, PLY, glTF and others; MuJoCo reads its own MSH.
 """
 
 import copy
@@ -18,30 +18,30 @@ from tauguard.arrays import Array
 from tauguard.models.robot_check import checked_text
 from tauguard.models.urdf_inertia import mend_inertias
 
-#: Larger files are not read [bytes]; of a mesh of more triangles the convex hull collides.
+#: Largest file [bytes]; above this number of triangles a mesh collides as its convex hull.
 MOST_BYTES, MOST_FACES = 1 << 27, 50_000
 #: A visual mesh is simplified on the finest of these grids (cells along its longest side) that
 #: leaves at most this many triangles.
 SHOWN_CELLS, SHOWN_FACES = (64, 45, 32, 24), 5000
-#: Least thickness over length; what is thinner becomes the box around it: MuJoCo needs a volume.
+#: Smallest thickness over length; thinner meshes become boxes, because MuJoCo needs a volume.
 FLATTEST = 1e-3
-#: Of a mesh that has no colour.
+#: Colour of a mesh without one.
 GREY = (0.7, 0.72, 0.75, 1.0)
-#: A prefix of an element or attribute; xacro leaves some that nothing declares.
+#: A prefix of an element or attribute; xacro leaves undeclared ones.
 _PREFIX = re.compile(r"(</?|\s)([A-Za-z_][\w.-]*):(?=[A-Za-z_][\w.-]*[\s=/>])")
 
 
 @dataclass
 class UrdfFile:
-    """What a URDF says that its MjSpec does not."""
+    """The content of a URDF beyond its MjSpec."""
 
-    spec: Any = None  #: with its meshes in it
-    mended: tuple[str, ...] = ()  #: links whose inertia was made possible
-    unread: dict[str, str] = field(default_factory=dict)  #: link: the shape that is left out, why
+    spec: Any = None  #: the MjSpec, with its meshes
+    mended: tuple[str, ...] = ()  #: links whose inertia was corrected
+    unread: dict[str, str] = field(default_factory=dict)  #: link: its omitted shape, and why
 
 
 def is_urdf(path: Path) -> bool:
-    """Whether a file is a URDF, by its ending or its beginning."""
+    """Whether a file is a URDF, by its extension or its first lines."""
     return path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]
 
 
@@ -74,7 +74,7 @@ Mesh = tuple[Array, NDArray[np.int64]]
 
 
 def read_urdf(path: Path) -> UrdfFile:
-    """The spec of a URDF, with every mesh that is there and can be read.
+    """The spec of a URDF, with every mesh that exists and can be read.
 
     Raises:
         ValueError: not a robot that MuJoCo can read.
@@ -125,10 +125,10 @@ def _without_meshes(root: ElementTree.Element) -> ElementTree.Element:
 
 
 def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
-    """The mesh of a shape; what only shows is coarse, and gets its file's colour.
+    """The mesh of a shape; a visual mesh is simplified and keeps its file's colour.
 
     Raises:
-        ValueError: what is wrong with the file, without its name.
+        ValueError: the file cannot be used; the message leaves out its name.
     """
     source = _find(urdf, name)
     if source is None:
@@ -167,7 +167,7 @@ def load_mesh(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
     try:
         read = _load_msh if source.suffix.lower() == ".msh" else _load_any
         vertices, faces, colour = read(source)
-    except Exception as error:  # whatever a foreign reader raises
+    except Exception as error:  # readers of meshes raise exceptions of many types
         raise ValueError(f"cannot be read ({' '.join(str(error).split())[:80]})") from None
     if len(faces) == 0 or not np.isfinite(vertices).all():
         raise ValueError("has no triangles, or vertices that are not finite")
@@ -198,7 +198,7 @@ def _load_msh(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
 
 
 def coarse(vertices: Array, faces: NDArray[np.int64]) -> Mesh:
-    """A mesh for show: vertices within a cell of a grid become one, see :data:`SHOWN_CELLS`.
+    """Simplify a visual mesh: vertices in one grid cell are merged, see :data:`SHOWN_CELLS`.
 
     Args:
         vertices: [m], shape (V, 3).
@@ -228,7 +228,7 @@ def _hull(vertices: Array) -> Mesh:
 
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     least = FLATTEST * float((high - low).max())
-    if (high - low < least).any():  # a sheet: the box around it
+    if (high - low < least).any():  # a sheet is replaced by its bounding box
         low, high = np.minimum(low, high - least), np.maximum(high, low + least)
         vertices = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
     try:

@@ -1,4 +1,4 @@
-"""Inertias of a URDF that no body can have, made possible: MuJoCo refuses them."""
+"""Correct physically impossible inertias of a URDF, which MuJoCo refuses."""
 
 import xml.etree.ElementTree as ElementTree
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from tauguard.arrays import Array
 
-#: Smallest principal moment over the largest, where the file's is not above 0.
+#: Smallest principal moment over the largest, for a file whose moment is not above 0.
 LEAST_MOMENT = 0.01
 #: MuJoCo takes moments below 1e-14 for 0 [kg m^2]; lighter links are left as they are [kg].
 SMALLEST, LIGHTEST = 1e-12, 1e-5
-#: A body of which only the mass is stated is a ball of this density [kg/m^3].
+#: A body with a mass but no inertia becomes a ball of this density [kg/m^3].
 DENSITY = 1000.0
 _ENTRIES = {
     "ixx": (0, 0),
@@ -23,10 +23,10 @@ _ENTRIES = {
 
 
 def mend_inertias(root: ElementTree.Element) -> tuple[str, ...]:
-    """Change the impossible inertias of a URDF in place; the names of their links.
+    """Correct the impossible inertias of a URDF in place; returns the names of their links.
 
-    Moments at or below 0 are raised, and the largest is cut to the sum of the others. No moments at
-    all become those of a ball.
+    Moments at or below 0 are raised, and the largest is cut to the sum of the others. Missing
+    moments become those of a ball.
 
     Raises:
         ValueError: a mass or moment that is no number.
@@ -51,7 +51,7 @@ def mend_inertias(root: ElementTree.Element) -> tuple[str, ...]:
 
 
 def possible_inertia(tensor: Array, mass: float) -> Array:
-    """An inertia near ``tensor`` that a body can have [kg m^2], shape (3, 3)."""
+    """The physically possible inertia near ``tensor`` [kg m^2], shape (3, 3)."""
     moments, axes = np.linalg.eigh(tensor)
     if moments[2] <= 0:
         # MuJoCo names the link of a mass below 0.

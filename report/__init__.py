@@ -1,4 +1,4 @@
-"""What figures are reported with: rates with intervals, tables, JSON, machine and versions."""
+"""Reporting of measurements: rates with intervals, tables, JSON, machine and versions."""
 
 from tauguard.report.digits import two_digits
 from tauguard.report.json_file import write_json

@@ -1,4 +1,4 @@
-"""What charts of studies share."""
+"""Style and helpers that the charts of all studies share."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-#: Colours that colour-blind readers tell apart: Okabe and Ito's without yellow, two of Tol's.
+#: Colours that colour-blind readers can distinguish: Okabe and Ito's without yellow, two of Tol's.
 COLOURS = (
     *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"),
     *("#56B4E9", "#000000", "#999999", "#882255", "#117733"),
 )
-#: How every chart looks (matplotlib's settings); readable at half of a page's width.
+#: Matplotlib settings of every chart; text is readable at half of a page's width.
 STYLE: dict[str, Any] = {
     "axes.prop_cycle": f"cycler('color', {list(COLOURS)})",
     "axes.spines.right": False,
@@ -38,9 +38,9 @@ def errorbars(
     Args:
         axes: matplotlib axes to draw on.
         at: position of each value on the other axis.
-        figures: the values, at least one.
-        across: along x instead of y.
-        style: of matplotlib's errorbar.
+        figures: the values with their intervals, at least one.
+        across: draw values along x instead of y.
+        style: keywords of matplotlib's ``errorbar``.
     """
     rows = [(f["value"] if "value" in f else f["median"], f["low"], f["high"]) for f in figures]
     middle, low, high = np.array(rows, dtype=np.float64).reshape(-1, 3).T

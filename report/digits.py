@@ -1,4 +1,4 @@
-"""Numbers in sentences: two digits and no exponent."""
+"""Format numbers for sentences: two digits and no exponent."""
 
 
 def two_digits(value: float) -> str:

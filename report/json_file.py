@@ -1,4 +1,4 @@
-"""Rows as a JSON file."""
+"""Write rows as a JSON file."""
 
 import json
 import math

@@ -23,7 +23,7 @@ _PACKAGES = (
 def measured(
     name: str, rows: Sequence[Mapping[str, Any]], quick: bool = False, seed: int | None = None
 ) -> dict[str, Any]:
-    """Rows with the machine and versions that they were measured with, as a file holds them."""
+    """The content of a results file: rows, and the machine and versions that measured them."""
     return {
         "name": name,
         "quick": quick,
@@ -34,7 +34,7 @@ def measured(
     }
 
 
-#: A machine is busy if more programs than this want to run for each core.
+#: A machine is busy if its load average per core exceeds this.
 BUSY = 1.25
 
 
@@ -54,7 +54,7 @@ def machine() -> dict[str, Any]:
 
 
 def load() -> float | None:
-    """Programs that wanted to run in the last minute, on average; None: unknown."""
+    """Load average of the last minute; None: unknown."""
     try:
         return round(os.getloadavg()[0], 1)
     except (AttributeError, OSError):  # Windows, or a system that does not say
@@ -62,11 +62,11 @@ def load() -> float | None:
 
 
 def load_line(begin: float | None, end: float | None) -> str:
-    """One line that says whether the load of the machine made times unreliable.
+    """One line that says whether the machine's load made times unreliable.
 
     Args:
         begin: :func:`load` before the times were measured.
-        end: the same after it.
+        end: :func:`load` after they were measured.
     """
     known = [each for each in (begin, end) if each is not None]
     if not known:
@@ -79,7 +79,7 @@ def load_line(begin: float | None, end: float | None) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the packages that were measured; those that are not installed are left out."""
+    """Versions of the measured packages that are installed."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

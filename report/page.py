@@ -1,4 +1,4 @@
-"""Rows, text and pictures as one HTML file that needs no other file."""
+"""Write rows, text and pictures as one self-contained HTML file."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -50,11 +50,11 @@ class Link:
 
 
 def page(title: str, sections: Mapping[str, str], lead: str = "") -> str:
-    """A whole page: a heading and a link for each section, whose bodies are HTML.
+    """A whole page, with a heading and a link for each section; section bodies are HTML.
 
     Args:
         title: title of the page.
-        sections: heading and body of each; one without a body is left out.
+        sections: heading and body of each; a section without a body is omitted.
         lead: HTML between the title and the links.
     """
     sections = {name: body for name, body in sections.items() if body}
@@ -94,7 +94,7 @@ def _cell(value: object) -> str:
 
 
 def picture(data: bytes, kind: str, text: str) -> str:
-    """A picture inside the file.
+    """A picture as HTML with its data embedded.
 
     ``kind`` is ``png`` or ``svg+xml``, ``text`` says what it shows.
     """

@@ -1,4 +1,4 @@
-"""Rows as text tables for a terminal."""
+"""Format rows as text tables for a terminal."""
 
 import itertools
 import re
@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-#: Characters of a line.
+#: Default length of a line [characters].
 WIDTH = 140
 #: A column's heading is broken at its underscores into lines of about this length.
 HEADING = 9
 #: Text in a cell is broken into lines of this length.
 TEXT = 56
 
-#: A line of figures: a flat dictionary.
+#: One row: a flat dictionary.
 Row = dict[str, Any]
 #: A column: the heading and then each row's cell, all as lines of text.
 Column = list[list[str]]
@@ -30,8 +30,8 @@ def table(
     """Rows as aligned columns; successive rows of one study with the same keys share a heading.
 
     The name of the study and its line of ``notes`` stand above. If a line would be longer than
-    ``width``, headings and long texts are broken. If that is not enough, intervals are left out.
-    Columns that still do not fit follow below, each part with the first columns again.
+    ``width``, headings and long texts are broken. If that is not enough, intervals are omitted.
+    Columns that still do not fit follow below, and each part repeats the first columns.
     """
     blocks: list[str] = []
     for study, keys, own in blocks_of(rows):
@@ -78,7 +78,7 @@ def cell(value: object, brief: bool = False) -> str:
 
 
 def _block(keys: list[str], rows: Sequence[Mapping[str, Any]], width: int) -> list[str]:
-    """One table, or several of them where there are too many columns."""
+    """One table, or several if there are too many columns."""
     columns: list[Column] = []
     for narrow, brief in ((False, False), (True, False), (True, True)):
         columns = [_column(key, [row[key] for row in rows], narrow, brief) for key in keys]

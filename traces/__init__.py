@@ -1,4 +1,4 @@
-"""The typed values that flow through tauguard, and their MCAP form."""
+"""The data types of recordings (signals, truth, contacts, detections), and their MCAP form."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""What contact checkers saw during a run: typed values that go with a trace."""
+"""The contacts that contact checkers reported during a run; part of a trace."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from tauguard.arrays import Array
 
 @dataclass(frozen=True)
 class CheckedContacts:
-    """The contacts that one checker reported, one a row, by time.
+    """The contacts that one checker reported, one per row, in order of time.
 
-    They are answers about geometry: what acts on the arm is in :class:`tauguard.traces.Truth`.
+    They describe geometry only; the forces on the arm are in :class:`tauguard.traces.Truth`.
     """
 
-    checker: str  #: its name
-    partners: tuple[str, ...]  #: bodies and flexes, by name
-    t: Array  #: when, not decreasing [s], shape (K,)
+    checker: str  #: the checker's name
+    partners: tuple[str, ...]  #: names of bodies and flexes
+    t: Array  #: times, not decreasing [s], shape (K,)
     pair: NDArray[np.int64]  #: both partners, rows of ``partners``, shape (K, 2)
     point: Array  #: world frame [m], NaN where it is not known, shape (K, 3)
     normal: Array  #: unit vector from the first partner to the second, shape (K, 3)
-    distance: Array  #: between both surfaces then, negative in penetration [m], shape (K,)
+    distance: Array  #: signed distance of the surfaces, negative in penetration [m], shape (K,)
 
     def __post_init__(self) -> None:
         """Check shapes, order and indices: ``ValueError`` names the field that does not fit."""
@@ -48,7 +48,7 @@ class CheckedContacts:
         return len(self.t)
 
     def between(self, start: float, stop: float) -> CheckedContacts:
-        """Those with ``start`` <= t < ``stop`` [s]."""
+        """The contacts with ``start`` <= t < ``stop`` [s]."""
         rows = slice(*np.searchsorted(self.t, [start, stop]).tolist())
         return CheckedContacts(
             self.checker,

@@ -1,4 +1,4 @@
-"""A trace as an MCAP file of ROS 2 messages, and back, bit by bit.
+"""Write a trace as an MCAP file of ROS 2 messages, and read it back, equal bit by bit.
 
 Topics: ``/joint_states`` (``sensor_msgs/msg/JointState``), ``/motor_currents``, ``/joint_command``,
 ``/truth/contact``, ``/truth/obstacles``, ``/truth/collisions``, ``/detection``,
@@ -31,9 +31,9 @@ MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "applic
 
 
 def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = None) -> None:
-    """Write a trace, and what a detector said about it, as one MCAP file.
+    """Write a trace, and a detector's output for it, as one MCAP file.
 
-    Without ``detection`` it is that of the trace.
+    The default of ``detection`` is that of the trace.
 
     The file is replaced atomically: it is written beside ``path`` and renamed.
 
@@ -65,7 +65,7 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
 def read_mcap(path: str | Path) -> Trace:
     """Read what :func:`write_mcap` wrote; every array is equal bit by bit.
 
-    What a detector said is in ``Trace.detection``.
+    The detector's output is in ``Trace.detection``.
 
     (An obstacle array without obstacles comes back in its default form, shape (0, 0, 4, 4).)
 
@@ -85,7 +85,7 @@ def read_mcap(path: str | Path) -> Trace:
 
 
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
-    """What the reader must know before it looks at the messages."""
+    """The layout that the reader needs before it reads the messages."""
     form: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trace.joint_names,
@@ -105,7 +105,7 @@ COMMANDED = ("q_des", "qd_des", "qdd_des")
 
 
 def layouts(form: Mapping[str, Any]) -> list[Topic]:
-    """Topics with one message a sample, empty, in the order in which they are written."""
+    """Topics with one message per sample, without values, in the order of writing."""
     names, joints = form["joint_names"], len(form["joint_names"])
     state = Layout().header().strings(names)
     state.sequence("q", joints).sequence("qd", joints).sequence("effort", 0)

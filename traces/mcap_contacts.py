@@ -1,4 +1,4 @@
-"""Checked contacts as MCAP messages, a topic ``/contacts/NAME`` a checker."""
+"""Checked contacts as MCAP messages; each checker has its topic ``/contacts/NAME``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,15 +14,15 @@ COLUMNS = ("point", "normal", "distance")
 
 
 def topic_name(checker: str) -> str:
-    """Where a checker's contacts go."""
+    """The topic of a checker's contacts."""
     return f"/contacts/{checker}"
 
 
 def describe(contacts: Sequence[CheckedContacts]) -> list[dict[str, Any]]:
-    """What the reader must know before it looks at the messages.
+    """The layout that the reader needs before it reads the messages.
 
     Raises:
-        ValueError: two entries of one checker.
+        ValueError: a checker has two entries.
     """
     names = [one.checker for one in contacts]
     if len(set(names)) < len(names):

@@ -1,7 +1,7 @@
 """MCAP files whose topics are tables: a chunk of messages is packed and unpacked at once.
 
 The format is the public one (mcap.dev/spec), and the records are those of the ``mcap`` package.
-That package handles one message at a time. Therefore the inside of a chunk and its message index
+That package handles one message at a time. Therefore the content of a chunk and its message index
 are laid out here, as arrays. Topics of one group share their times and are interleaved row by
 row, in the order of time.
 """
@@ -30,7 +30,7 @@ PREFIX = np.dtype(
 
 @dataclass(frozen=True)
 class Topic:
-    """A table of messages: one row a message."""
+    """A table of messages, one per row."""
 
     name: str
     schema: str  #: ROS 2 type name, "sensor_msgs/msg/JointState"
@@ -40,7 +40,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Group:
-    """Topics logged together, one message of each at every time."""
+    """Topics that are logged together: each has one message at every time."""
 
     nanoseconds: NDArray[np.uint64]  #: log times, shape (rows,)
     topics: Sequence[Topic]
@@ -86,7 +86,7 @@ class Contents:
             self.profile = record.profile
 
     def check_sum(self) -> None:
-        """Compare everything before the end of the data with its checksum, if there is one.
+        """Compare the data section with its checksum, if there is one.
 
         Raises:
             ValueError: metadata, names or messages were damaged or changed.
@@ -112,15 +112,15 @@ CHUNK = int(Opcode.CHUNK)
 
 #: Limits of a recording: bytes of a chunk, bytes of a whole unpacked file, and its ratio to the
 #: size of the packed file. The last two must both be exceeded. A message takes some 2 kB of memory
-#: and 20 us, however small it is packed: 64 MiB of them take 5 s.
+#: and 20 us, however well it is compressed: 64 MiB of messages take 5 s.
 MOST_CHUNK, MOST_UNPACKED, MOST_RATIO = 1 << 27, 1 << 26, 64
 
 
 def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
-    """Refuse chunks that unpack to more than a recording of ``size`` bytes can hold.
+    """Refuse chunks that decompress to more than a recording of ``size`` bytes can hold.
 
     Raises:
-        ValueError: says which chunk, and what it claims.
+        ValueError: a chunk is too large; the message gives its position and size.
     """
     total = 0
     for offset, body in chunks:
@@ -135,7 +135,7 @@ def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
 
 
 def unpacked_size(chunk: records.Chunk) -> int:
-    """Count the bytes that decompression would give, at most to the limit of a chunk."""
+    """Count the bytes that decompression would give, up to the limit of a chunk."""
     if chunk.compression == "zstd":
         import zstandard
 
@@ -210,7 +210,7 @@ def rows_of(data: bytes) -> list[tuple[int, NDArray[np.uint32], Bytes]]:
 
 
 def singles(data: bytes) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
-    """The messages of any chunk, one at a time."""
+    """The messages of a chunk without repetition, one at a time."""
     at = 0
     while at < len(data):
         opcode, length = struct.unpack_from("<BQ", data, at)

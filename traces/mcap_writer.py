@@ -54,7 +54,7 @@ class Writer:
         self._metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
 
     def attachment(self, name: str, media_type: str, data: bytes) -> None:
-        """Add an attachment; its times are 0, so that equal traces are equal bytes."""
+        """Add an attachment; its times are 0, so that equal traces give equal bytes."""
         record = records.Attachment(
             create_time=0, log_time=0, name=name, media_type=media_type, data=data
         )
@@ -192,7 +192,7 @@ class Writer:
 
 
 def encode(record: records.McapRecord) -> bytes:
-    """A record's bytes, opcode and length included."""
+    """The bytes of a record, with opcode and length."""
     builder: Any = RecordBuilder()
     record.write(builder)
     data: bytes = builder.end()
@@ -200,7 +200,7 @@ def encode(record: records.McapRecord) -> bytes:
 
 
 def row_template(channels: Sequence[int], topics: Sequence[Topic]) -> tuple[Bytes, list[int]]:
-    """One row of a group: message records with empty times, and where each of them starts."""
+    """One row of a group: message records with empty times, and the offset of each record."""
     row, starts = b"", []
     for channel, topic in zip(channels, topics, strict=True):
         length = PREFIX.itemsize - 9 + topic.layout.size

@@ -11,17 +11,17 @@ from tauguard.traces.trace import Trace, Truth
 def resampled(trace: Trace, hz: float) -> Trace:
     """The trace every 1 / ``hz`` seconds.
 
-    What a robot measures, it measures at an instant: positions, velocities, currents and commands
+    A robot samples its sensors at an instant, so positions, velocities, currents and commands
     are interpolated. True torques are averaged over the interval that ends at a sample, so that no
     impulse is lost or counted twice; contact force, link and point are those of the interval's
-    largest force. Collisions keep their times, and checked contacts are left out.
+    largest force. Collisions keep their times; checked contacts are omitted.
 
     Args:
-        trace: of two samples or more.
+        trace: two samples or more.
         hz: the new rate, at most the trace's own [Hz].
 
     Raises:
-        ValueError: a rate that is not above 0 or higher than the trace's own, or a trace that is
+        ValueError: a rate that is not above 0 or exceeds the trace's own, or a trace that is
             over before the second sample.
     """
     if not (hz > 0 and len(trace.t) > 1 and hz * trace.dt < 1.01):
@@ -49,14 +49,14 @@ def resampled(trace: Trace, hz: float) -> Trace:
 
 
 def averaged(trace: Trace, hz: float) -> Trace:
-    """The trace every 1 / ``hz`` seconds, each sample the mean over the interval that ends at it.
+    """The trace at ``hz``, where each sample is the mean over the interval that ends at it.
 
-    So nothing above half the rate is folded to below it, and nothing later than a sample is in it.
+    The mean limits aliasing, and no sample depends on later ones.
     All signals are half an interval late.
 
     Args:
         trace: without truth.
-        hz: at most the trace's own rate [Hz].
+        hz: the new rate, at most the trace's own [Hz].
 
     Raises:
         ValueError: as :func:`resampled`, or a trace with truth.
@@ -74,7 +74,7 @@ def averaged(trace: Trace, hz: float) -> Trace:
 
 
 def _truth(truth: Truth, t: Array, new: Array) -> Truth:
-    """Torques averaged, contacts from the row of each interval's largest force."""
+    """The truth with averaged torques, and contacts from each interval's row of largest force."""
     ends = np.searchsorted(t, new + 1e-9)
     begins = np.minimum(np.concatenate(([0], ends[:-1])), ends - 1)
     force = truth.contact_force

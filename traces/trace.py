@@ -1,4 +1,4 @@
-"""The typed values that flow: measured signals, the truth, and a detector's output."""
+"""The data types of a recording: measured signals, the truth, and a detector's output."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
-#: Attachment of an environment's recording: JSON rows of a time [s] and each tool's target from
+#: Attachment of an environment's recording: JSON rows with a time [s] and each tool's target from
 #: then on [m].
 TARGETS = "targets.json"
 
 
 @dataclass(frozen=True)
 class Collision:
-    """One labelled collision: what hit the arm, when, where and how hard."""
+    """One labelled collision: its kind, time, place and force."""
 
     __repr__ = in_a_line
 
@@ -27,7 +27,7 @@ class Collision:
     onset: float  #: time of the first sample with a contact force above 0 N [s]
     end: float  #: time of the last such sample [s]
     link: int  #: the link that was hit, 1-based: link i moves with joint i
-    point: Array  #: where, at the sample of peak force, world frame [m], shape (3,)
+    point: Array  #: contact point at the sample of peak force, world frame [m], shape (3,)
     force: Array  #: peak contact force on the arm, world frame [N], shape (3,)
     peak_tau: float  #: largest ``|tau_ext|`` over joints 1-4 [N m]: the severity axis
 
@@ -43,7 +43,7 @@ class Truth:
     contact_link: NDArray[np.int64]  #: link of the largest contact force, 0 for none, shape (T,)
     contact_point: Array  #: its point, world frame [m], NaN where there is none, shape (T, 3)
     contact_vector: Array  #: its force on the arm, world frame [N], 0 for none, shape (T, 3)
-    obstacle_names: tuple[str, ...] = ()  #: bodies of the scene that move by themselves
+    obstacle_names: tuple[str, ...] = ()  #: bodies of the scene that move without the arm
     obstacle_poses: Array = field(default_factory=lambda: np.empty((0, 0, 4, 4)))
     """World poses of the obstacles, homogeneous, shape (T, len(obstacle_names), 4, 4)."""
 
@@ -73,12 +73,12 @@ class Trace:
     qd_des: Array | None = None  #: commanded velocities [rad/s], shape (T, n)
     qdd_des: Array | None = None  #: commanded accelerations [rad/s^2], shape (T, n)
     truth: Truth | None = None
-    contacts: tuple[CheckedContacts, ...] = ()  #: what contact checkers saw, one entry a checker
+    contacts: tuple[CheckedContacts, ...] = ()  #: reported contacts, one entry per checker
     meta: Mapping[str, str] = field(default_factory=dict)
     """Seed, versions, configuration hash, model hash and whatever else describes the run."""
     attachments: Mapping[str, str] = field(default_factory=dict)
     """Text files that belong to the run, by name: the MJCF of the scene, the configuration."""
-    detection: Detection | None = None  #: what a detector said about it
+    detection: Detection | None = None  #: a detector's output for this trace
 
     def __post_init__(self) -> None:
         """Check shapes and values.
@@ -111,7 +111,7 @@ class Trace:
             raise ValueError(f"t: not increasing at row {back[0] + 1}")
 
     def __repr__(self) -> str:
-        """In a line: how long, of which arm, what is known."""
+        """One line: the arm, the duration, and which fields are known."""
         arm = self.meta.get("arm", "") or self.meta.get("environment", "")
         known = "no truth" if self.truth is None else f"{len(self.truth.collisions)} collisions"
         long = self.t[-1] - self.t[0] if len(self.t) else 0.0
@@ -129,7 +129,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Alarm:
-    """A maximal run of filtered True; alarms closer than the merge gap are one."""
+    """A period of alarm after filtering; alarms closer than the merge gap are joined."""
 
     start: float  #: [s]
     end: float  #: [s]
@@ -137,7 +137,7 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Detection:
-    """What a detector said about a trace; rows are the trace's samples."""
+    """A detector's output for a trace; rows are the trace's samples."""
 
     detector: str  #: the detector's name
     t: Array  #: [s], shape (T,)

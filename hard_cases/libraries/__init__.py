@@ -1,1 +1,1 @@
-"""How each library is asked: one adapter a file."""
+"""Adapters of libraries, one per file."""

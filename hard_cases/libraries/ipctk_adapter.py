@@ -7,21 +7,21 @@ import numpy as np
 
 
 class Ipctk:
-    """Times are not scaled back towards the start, so that they are compared as they are."""
+    """The queries without rescaling of times, so that raw times of impact are compared."""
 
     name = "ipctk"
 
     def __init__(self) -> None:
-        """Make the query."""
+        """Create the query object."""
         ipctk.set_logger_level(ipctk.LoggerLevel.error)
         self._ccd = ipctk.TightInclusionCCD(conservative_rescaling=1.0)
 
     def vertex_face(self, x_t0: Any, x_t1: Any) -> float | None:
-        """Point against triangle."""
+        """Time of impact of a point and a triangle."""
         hit, toi = self._ccd.point_triangle_ccd(*np.array(x_t0), *np.array(x_t1))
         return float(toi) if hit else None
 
     def edge_edge(self, x_t0: Any, x_t1: Any) -> float | None:
-        """Edge against edge."""
+        """Time of impact of two edges."""
         hit, toi = self._ccd.edge_edge_ccd(*np.array(x_t0), *np.array(x_t1))
         return float(toi) if hit else None

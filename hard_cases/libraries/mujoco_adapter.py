@@ -27,7 +27,7 @@ def answer(model: Any, data: Any) -> float:
 
 @contextlib.contextmanager
 def _quiet_library() -> Iterator[None]:
-    """Nothing reaches the process's standard error: Qhull inside MuJoCo warns of narrow hulls."""
+    """Silence standard error, on which Qhull inside MuJoCo warns of narrow hulls."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
@@ -59,7 +59,7 @@ class MuJoCo:
         return bool(mujoco.mj_geomDistance(model, data, 0, 1, 1e300, None) <= 0.0)
 
     def scene(self, mjcf: str, seconds: float) -> float:
-        """Call ``mj_step`` until the end."""
+        """Call ``mj_step`` up to the given time."""
         model, data = start(mjcf, self.flags)
         while data.time < seconds - model.opt.timestep / 2:
             mujoco.mj_step(model, data)
@@ -72,7 +72,7 @@ class Speculative:
     name = "mujoco-speculative"
 
     def scene(self, mjcf: str, seconds: float) -> float:
-        """``mj_step`` with the flag ``speculative`` until the end."""
+        """Call ``mj_step`` with the flag ``speculative`` up to the given time."""
         plain = MuJoCo()
         plain.flags = int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE)
         return plain.scene(mjcf, seconds)

@@ -35,7 +35,7 @@ class Ours:
         return _first(found.time_of_impact)
 
     def scene(self, mjcf: str, seconds: float) -> float:
-        """MuJoCo's steps under the guard."""
+        """Steps of :class:`~tauguard.contacts.GuardedStepper`."""
         from tauguard.contacts import GuardedStepper
         from tauguard.hard_cases.libraries.mujoco_adapter import answer, start
 

@@ -1,4 +1,4 @@
-"""The CURA6-like arm: six revolute joints, the class of a 10 kg cobot; and its other sizes."""
+"""The CURA6-like arm (six revolute joints, in the class of 10 kg cobots) and its other sizes."""
 
 from functools import cache
 from importlib.resources import files

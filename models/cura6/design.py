@@ -117,9 +117,9 @@ LINKS = (
 
 #: Height of the caps of the joint housings, relative to their radius.
 _BULGE = 0.28
-#: Where a tool is fixed, in the frame of link 6 [m]; the flange's outward normal is +y.
+#: Tool mounting point in the frame of link 6 [m]; the flange's outward normal is +y.
 FLANGE = (0.0, 0.018, 0.0)
-#: A pose at work: elbow up, the tool axis down [rad].
+#: Home pose [rad]: elbow up, tool axis down.
 HOME = (0.0, -0.5, 1.9, 0.1708, -1.5708, 0.0)
 #: Largest joint speeds and accelerations of planned motions [rad/s, rad/s^2].
 MAX_SPEED = tuple(link.speed for link in LINKS)

@@ -1,6 +1,6 @@
-"""Arms of other sizes, drawn after the CURA6-like one: same joints, other links, masses, drives.
+"""Arms of other sizes, derived from the CURA6-like one: same joints; other links, masses, drives.
 
-They are designs, not products. They test whether something works on arms that it was not
+They are designs, not products. They test whether a method works on arms that it was not
 developed on.
 """
 
@@ -13,10 +13,10 @@ from tauguard.models.cura6.design import FLANGE, LINKS, Link, Part
 class Size:
     """Factors on the arm's numbers; a tuple holds one for each link, base to tip."""
 
-    length: tuple[float, ...]  #: of every distance along and between the joints
+    length: tuple[float, ...]  #: factors on distances along and between joints
     mass: tuple[float, ...]
-    drive: float  #: of torque limits, gains, friction; rotor inertia goes with its square
-    speed: float = 1.0  #: of the largest joint speeds
+    drive: float  #: factor on torque limits, gains and friction; its square scales rotor inertia
+    speed: float = 1.0  #: factor on the largest joint speeds
 
 
 #: A small 5 kg arm, a long one and a strong 16 kg one.
@@ -29,7 +29,7 @@ SIZES = {
 
 def links(size: Size) -> tuple[Link, ...]:
     """The table of links of an arm of this size."""
-    stretched = (1.0, *size.length)  # a joint stands on the link before it
+    stretched = (1.0, *size.length)  # a joint's offset lies on the previous link
     return tuple(
         replace(
             link,
@@ -46,7 +46,7 @@ def links(size: Size) -> tuple[Link, ...]:
 
 
 def flange(size: Size) -> tuple[float, float, float]:
-    """Where a tool is fixed, in the frame of the last link [m]."""
+    """Tool mounting point in the frame of the last link [m]."""
     return _scaled(FLANGE, size.length[-1])
 
 
