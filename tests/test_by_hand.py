@@ -113,6 +113,9 @@ def test_every_value_that_one_meets_prints_in_a_few_lines(trace):
         assert said.startswith(f"{type(value).__name__}(")
         assert len(said) < 900, said
         assert "\n" not in said
+    env = gymnasium.make("tauguard/TwoArms-v1").unwrapped
+    assert repr(env) == "TwoArmsEnv(cura6, 1 at once, 12 actions, 48 observations, 0 regions)"
+    assert repr(env.task) == f"TwoArms({env.batch!r})"
     assert "gain=[10, 10.7, 8.5, 9, 9.5, 10.1]" in repr(scene.drive)
     assert "point=array(120, 3)" in repr(link_surface(scene.arm_xml, points=20))
 

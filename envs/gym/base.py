@@ -87,6 +87,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._no_reward = dict.fromkeys(self.task.terms, 0.0)
         self._begun = False
 
+    def __repr__(self) -> str:
+        """As of the batch that is stepped."""
+        return type(self).__name__ + repr(self.batch).removeprefix("Batch")
+
     @property
     def scene(self) -> Scene:
         """What is simulated: the compiled model, joint names, home pose, the arm's MJCF."""

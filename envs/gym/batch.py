@@ -143,6 +143,15 @@ class Batch:
         self.checks = [StepChecks(compiled, names) for _ in range(rows)] if names else []
         self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
 
+    def __repr__(self) -> str:
+        """The arm, the sizes of the tables, and what may be touched."""
+        regions = [region.name for region in self.compiled.regions]
+        named = ": " * bool(regions) + ", ".join(regions[:2]) + ", ..." * (len(regions) > 2)
+        return (
+            f"Batch({self.compiled.scene.facts.name}, {self.rows} at once, {len(self.actions)} "
+            f"actions, {len(self.observations)} observations, {len(regions)} regions{named})"
+        )
+
     def attach(self, detector: object) -> None:
         """Put a detector into every copy's loop; ``None`` takes it out."""
         make = listening(self.compiled, detector)

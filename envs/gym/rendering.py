@@ -65,7 +65,7 @@ class Stage:
             places = np.array([*_bases(compiled), [*compiled.person.position, 0.0]])
             x, y = places[:, :2].mean(axis=0)
             camera.lookat[:] = (x, y, compiled.person.floor + 0.5 * compiled.person.stature)
-            camera.distance, camera.azimuth, camera.elevation = 2.9, 102.0, -12.0
+            camera.distance, camera.azimuth, camera.elevation = 3.3, 102.0, -12.0
         elif compiled.arms == 1:
             camera.lookat[:] = layout.at((0.35 * reach, 0.0, 0.4 * reach))
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0

@@ -48,6 +48,10 @@ class Task(Usual):
         #: The memory of :meth:`score` from one step to the next, a number for each copy.
         self.memory = np.zeros(batch.rows)
 
+    def __repr__(self) -> str:
+        """The task and what it runs in."""
+        return f"{type(self).__name__}({self.batch!r})"
+
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Begin an episode of copy ``i``; end with :meth:`Batch.start`."""
         raise NotImplementedError

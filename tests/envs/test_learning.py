@@ -62,7 +62,7 @@ assert env.observation_space.contains(seen), {k: (v.shape, v.dtype) for k, v in 
 assert seen["rgb"].shape == (24, 32, 3) and seen["depth"].shape == (24, 32, 1)
 assert len(numpy.unique(seen["rgb"].reshape(-1, 3), axis=0)) > 50
 depth = seen["depth"][..., 0]
-assert 1.5 < depth.min() < 4.0, depth.min()  # the person and the arm, about 2.9 m away
+assert 1.5 < depth.min() < 4.0, depth.min()  # the person and the arm, about 3.3 m away
 """
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     out = subprocess.run(
