@@ -1,8 +1,7 @@
 """Pick from a bin beside a person, with a part in the gripper: a scene of your own.
 
     python examples/bin_picking.py [PICTURE.png]
-
-`bin_picking.toml` lists bin, loose part, held part and cart.
+The bin, a loose part, the held part and a cart are in `bin_picking.toml`.
 """
 
 import sys

@@ -253,16 +253,18 @@ def _all_of(body: mujoco.MjsBody, gripper: tuple[str, ...]) -> bool:
 
 
 def _ends(moving: list[mujoco.MjsBody]) -> str:
-    """First and last joint of the longest branch, an example for the error message."""
-    chains = []
-    for body in moving:
-        names, level = [], [body]
-        while len(level) == 1:
-            names += [joint.name for joint in level[0].joints]
-            level = [part for part in level[0].bodies if any(_joints_below(part))]
-        chains.append(names)
-    names = max(chains, key=len)
+    """First and last joint of the longest chain, an example for the error message."""
+    names = max(map(_longest, moving), key=len, default=[])
     return f"{names[0]}..{names[-1]}" if names else ".."
+
+
+def _longest(body: mujoco.MjsBody, before: int = 0) -> list[str]:
+    """Joints of the longest chain from a body on, without short branches at its end: fingers."""
+    names = [joint.name for joint in body.joints]
+    count = before + len(names)
+    parts = [part for part in body.bodies if any(_joints_below(part))]
+    below = max((_longest(part, count) for part in parts), key=len, default=[])
+    return names + (below if len(parts) == 1 or len(below) > count else [])
 
 
 def _branches(moving: list[mujoco.MjsBody]) -> str:

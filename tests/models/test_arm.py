@@ -147,9 +147,20 @@ def pin_free(scene):
             "<body name='r'><joint/><geom size='.1'/></body></worldbody></mujoco>",
             r"branches into l .*; r .*; expected one serial chain.*Name those of the arm",
         ),
+        (
+            "<mujoco><worldbody><body name='w'><joint name='wheel'/><geom size='.1'/></body>"
+            "<body name='t'><joint name='lift'/><geom size='.1'/>"
+            "<body name='h'><joint name='head'/><geom size='.1'/></body>"
+            "<body name='a'><joint name='a1'/><geom size='.1'/>"
+            "<body name='b'><joint name='a2'/><geom size='.1'/>"
+            "<body name='f'><joint name='f1'/><geom size='.1'/></body>"
+            "<body name='g'><joint name='f2'/><geom size='.1'/></body></body></body></body>"
+            "</worldbody></mujoco>",
+            r"--arm-joints lift\.\.a2 ",
+        ),
         ("<mujoco><worldbody><body>", "arm "),
     ],
-    ids=["no joints", "ball joint", "two arms", "no XML"],
+    ids=["no joints", "ball joint", "two arms", "wheel, head and fingers", "no XML"],
 )
 def test_unusable_arms_are_named(tmp_path, text, message):
     path = tmp_path / "arm.xml"
