@@ -1,7 +1,7 @@
 """The numbers of a real arm, from its robot file, its published drive gains and a user's flags."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.assessment import (
     OUTLYING,
     OUTLYING_IN_DOUBT,
+    UNEXPLAINED_LADEN,
     explained,
     outlier,
     start_gains,
@@ -201,24 +202,25 @@ def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
 
 
 def calibration_notes(
-    arm: ArmModel, traces: dict[str, Trace], recordings: Sequence[Recording], held: Sequence[Any]
+    arm: ArmModel, logs: Mapping[str, Recording], held: Sequence[Any]
 ) -> list[str]:
     """Notes on torque that a calibration does not explain, and on a log that may have had a load.
 
     Args:
         arm: the identified arm.
-        traces: by file name.
-        recordings: the same traces with their loads.
+        logs: by file name, with their loads.
         held: held-out residual of each [N m], (n,) each; empty: not known.
 
     Raises:
         ValueError: so much torque is unexplained that the logs cannot be the arm's as given.
     """
+    names, recordings, refused = list(logs), list(logs.values()), ""
     bare = [k for k, r in enumerate(recordings) if r.load == Load() and moves(r.trace)]
-    names, refused = list(traces), ""
+    laden = [r for r in recordings if r.load != Load() and moves(r.trace)]
     notes: tuple[str, ...] = ()
     try:
-        notes = explained(arm, [recordings[k].trace for k in bare])
+        notes = explained(arm, [recordings[k] for k in bare])
+        notes += explained(arm, laden, limit=UNEXPLAINED_LADEN)
     except ValueError as error:
         refused = str(error)
     doubtful = bool(notes or refused)

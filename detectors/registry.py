@@ -9,13 +9,14 @@ from typing import Any
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
+from tauguard.detectors.calibration.recording import LoadDeviation
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.detectors.faults.inputs import UsualInput
-from tauguard.detectors.features.free_bound import Bound, LoadDeviation
+from tauguard.detectors.features.free_bound import Bound
 from tauguard.detectors.features.front_end import FrontEnd, Scaling
 from tauguard.detectors.features.windows import WindowShape
 from tauguard.detectors.scores.baselines import (

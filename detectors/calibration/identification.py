@@ -114,7 +114,7 @@ def _deviations(
         loads += [1e-6 if given else beliefs.moment] * 3
         nothing = load is not None and load.mass == 0
         loads += [1e-6 if nothing else beliefs.spread] * 6
-        means.append(known_load(recording))
+        means.append(known_load(load))
     deviations = np.concatenate(
         [
             body,
@@ -214,7 +214,7 @@ def _fit(
     robot, held = arm.robot, scale == "gains"
     gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)
-    known = [known_load(recording) for recording in recordings]
+    known = [known_load(recording.load) for recording in recordings]
     loads = np.array(known)
     # Friction that depends on the model's own load is independent of the gains, which scale the
     # currents only.

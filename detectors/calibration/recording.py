@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauguard.arrays import Array, Bools
+from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
 
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
@@ -36,6 +37,18 @@ class Load:
             len(self.centre) == 3 and np.isfinite(self.centre).all()
         ):
             raise ValueError(f"load: centre {self.centre}, expected three finite numbers [m]")
+
+
+@dataclass(frozen=True)
+class LoadDeviation:
+    """How uncertain the carried load is."""
+
+    mass: float = 0.0  #: standard deviation [kg]
+    moment: float = 0.0  #: of each axis of the first moment [kg m]
+
+
+#: The deviation of a load that is not known.
+UNKNOWN_LOAD = LoadDeviation(3.0, 0.3)
 
 
 @dataclass(frozen=True)
@@ -113,12 +126,23 @@ def is_known(recording: Recording) -> bool:
     return load is not None and (load.mass == 0 or load.centre is not None)
 
 
-def known_load(recording: Recording) -> Array:
-    """Inertial numbers of the load as far as it is known, as in ``Identified.loads``, (10,)."""
-    load = recording.load or Load()
+def known_load(load: Load | None) -> Array:
+    """Inertial numbers of a load as far as it is known, as in ``Identified.loads``, (10,)."""
+    load = load or Load()
     x, y, z = load.centre or (0.0, 0.0, 0.0)
     spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
     return load.mass * np.array([1.0, x, y, z, *spread])
+
+
+def laden(arm: ArmModel, load: Load | None) -> tuple[ArmModel, LoadDeviation]:
+    """The arm with a load in its gripper, as far as it is known, and how uncertain that is."""
+    if load is None:
+        return arm, UNKNOWN_LOAD
+    inertial = arm.robot.inertial.copy()
+    inertial[-1] += known_load(load)
+    moment = 0.1 * load.mass if load.mass and load.centre is None else 0.0
+    robot = arm.robot.with_inertial(inertial)
+    return replace(arm, robot=robot), LoadDeviation(0.02 * load.mass, moment)
 
 
 def pieces(recordings: Sequence[Recording], count: int) -> list[Recording]:

@@ -89,7 +89,7 @@ def filtered(
     trace = recording.trace
     held = None
     if model.modelled:
-        held = _carried(trace, robot, known_load(recording) if load is None else load)
+        held = _carried(trace, robot, known_load(recording.load) if load is None else load)
     used = moving_span(trace) & free_rows(trace)
     return filtered_columns(trace, robot, gain, model, rate, used, rest, held)
 

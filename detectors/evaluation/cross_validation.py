@@ -15,6 +15,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
+    UNKNOWN_LOAD,
     Recording,
     motion_length,
     moves,
@@ -24,7 +25,6 @@ from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import (
-    UNKNOWN_LOAD,
     Bound,
     friction_levels,
     standing_positions,

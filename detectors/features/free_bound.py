@@ -9,21 +9,9 @@ import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
-from tauguard.detectors.calibration.recording import Recording
+from tauguard.detectors.calibration.recording import LoadDeviation, Recording
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
-
-
-@dataclass(frozen=True)
-class LoadDeviation:
-    """How uncertain the carried load is."""
-
-    mass: float = 0.0  #: standard deviation [kg]
-    moment: float = 0.0  #: of each axis of the first moment [kg m]
-
-
-#: The deviation of a load that is not known.
-UNKNOWN_LOAD = LoadDeviation(3.0, 0.3)
 
 #: More rows than this are thinned out.
 ROWS = 2000

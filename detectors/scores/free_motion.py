@@ -23,9 +23,11 @@ from tauguard.arrays import Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
+    UNKNOWN_LOAD,
     Load,
+    LoadDeviation,
     Recording,
-    known_load,
+    laden,
     moves,
     pieces,
 )
@@ -37,9 +39,7 @@ from tauguard.detectors.features.free_bound import (
     CREEP,
     PRIOR,
     SLOW,
-    UNKNOWN_LOAD,
     Bound,
-    LoadDeviation,
     friction_levels,
     native,
     standing_positions,
@@ -118,12 +118,7 @@ class FittedFreeMotion(Frozen):
 
     def carrying(self, load: Load) -> FittedFreeMotion:
         """The same detector of the arm with a load in its gripper; ``Load()`` for none."""
-        known = known_load(Recording(None, load))  # type: ignore[arg-type]
-        moment = 0.1 * load.mass if load.mass and load.centre is None else 0.0
-        inertial = self.arm.robot.inertial.copy()
-        inertial[-1] += known
-        arm = replace(self.arm, robot=self.arm.robot.with_inertial(inertial))
-        deviation = LoadDeviation(0.02 * load.mass, moment)
+        arm, deviation = laden(self.arm, load)
         return replace(self, arm=arm, load=deviation)
 
     def scores(self, trace: Trace) -> Array:

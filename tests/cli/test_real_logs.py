@@ -200,11 +200,11 @@ def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
     model = tmp_path / "model.skops"
     asked = ["train", "--free", *logs, *flags(folder, calibrated.name), "--model", str(model)]
     line = refused_until_accepted(capsys, asked, model)
-    assert "an hour where 10 are accepted" in line
+    assert "in bursts, as contacts do" in line
     assert "say --accept alarms" in line
-    model.unlink()
-    main([*asked, "--false-alarms-per-hour", "1000"])
-    assert model.exists()
+    for rate, refused in (("10", True), ("1000", False)):
+        main([*asked, "--accept", "alarms", "--false-alarms-per-hour", rate])
+        assert ("an hour where 10 are accepted" in capsys.readouterr().out) == refused
 
 
 def test_a_joint_that_the_other_logs_do_not_predict_is_refused_unless_accepted(folder, capsys):

@@ -33,7 +33,7 @@ def command(
     payload: tuple[str, ...] = (),
     scale: Literal["auto", "gains", "payload", "masses"] = "auto",
     torque: bool = False,
-    accept: tuple[Literal["error", "gravity"], ...] = (),
+    accept: tuple[Literal["alarms", "error", "gravity"], ...] = (),
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
@@ -57,8 +57,9 @@ def command(
         scale: what fixes the scale of the torques.
         torque: the logs hold joint torques in N m where they would hold currents, as ROS 2 efforts
             may; a column map says so by its field "torque".
-        accept: write the file although a joint of a log is further off what the others predict than
-            its friction (error), or gravity's torques are not those of the robot file (gravity).
+        accept: write the file although a log has torque in bursts as of contacts (alarms), a joint
+            is further off what the other logs predict than its friction (error), or gravity's
+            torques are not those of the robot file (gravity).
         reading: how logs are read.
         json: write the figures here as JSON.
     """
@@ -67,7 +68,7 @@ def command(
     from tauguard.datasets.arm_logs import not_shown
     from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.arm_file import save_arm
-    from tauguard.detectors.calibration.assessment import check_loads, left_out
+    from tauguard.detectors.calibration.assessment import check_bursts, check_loads, left_out
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
@@ -80,25 +81,27 @@ def command(
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
-    traces, recordings, arm = given.traces, given.recordings, given.arm
+    names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
+    traces = [recording.trace for recording in recordings]
     found = identify(arm, recordings, scale=given.scale)
     if given.scale == "gains":
-        weight = (given.numbers, found.arm.robot, list(traces.values()))
+        weight = (given.numbers, found.arm.robot, traces)
         hold_to("gravity", accept, lambda: check_weight(*weight))
-        check_loads(arm, list(traces), recordings)
-    elif (ratio := torque_per_ampere(found.arm, list(traces.values()))) < SMALL_GAIN:
+        check_loads(arm, names, recordings)
+    elif (ratio := torque_per_ampere(found.arm, traces)) < SMALL_GAIN:
         print(
             f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
             "they held joint torques: if they are in N m, say --torque"
         )
     held = left_out(arm, recordings, scale=given.scale) if each_can_be_left_out(recordings) else []
     shown = not_shown(list(given.all_traces.values()))
-    print_notes((*calibration_notes(found.arm, traces, recordings, held), *shown))
-    within = (found.arm, list(traces), recordings, held)
-    hold_to("error", accept, lambda: check_held_out(*within))
+    print_notes((*calibration_notes(found.arm, given.logs, held), *shown))
+    logs_of = (found.arm, names, recordings)
+    hold_to("alarms", accept, lambda: check_bursts(*logs_of))
+    hold_to("error", accept, lambda: check_held_out(*logs_of, held))
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
-    save_arm(found.arm, robot, target, scale=given.scale, logs=list(traces))
-    result = summary(list(traces), found, held, target) | {"scale": given.source}
+    save_arm(found.arm, robot, target, scale=given.scale, logs=names)
+    result = summary(names, found, held, target) | {"scale": given.source}
     report(result, found)
     if json is not None:
         write_json(json, result)

@@ -156,13 +156,12 @@ def learned(
     """The log in the robot's joints, and a detector that learned from its beginning."""
     import numpy as np
 
+    from tauguard.cli.free_logs import free_arm, free_detector
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import matched, parse_load
-    from tauguard.datasets.real_arms import known_arm, robot_numbers
+    from tauguard.datasets.real_arms import robot_numbers
     from tauguard.detectors.alarms.training import free_alarm
-    from tauguard.detectors.calibration.checks import check_signs, check_weight
     from tauguard.detectors.calibration.recording import Load, Recording, cut
-    from tauguard.detectors.scores.free_motion import FreeMotion
 
     numbers, held = robot_numbers(robot, trace.joint_names)
     print_notes(held)
@@ -175,18 +174,16 @@ def learned(
         )
     rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))
     load = Load() if payload is None else parse_load(payload)
-    first = Recording(cut(trace, slice(0, rows)), load)
-    arm, source = known_arm(robot, numbers, [first], columns, gains)
+    first = {log.name: Recording(cut(trace, slice(0, rows)), load)}
     try:
-        check_signs(arm, log.name, first.trace)
-        detector = FreeMotion().fit([first], arm)
-        check_weight(arm.robot, detector.arm.robot, [first.trace])
+        arm, source = free_arm(robot, numbers, first, columns, gains)
+        detector = free_detector(arm, first)
     except ValueError as error:
         raise ValueError(f"{log}, its first {quiet:g} s (--quiet): {error}") from None
     print_notes([f"learned from the first {quiet:g} s; gains: {source}"])
     detector = dataclasses.replace(detector, settle=quiet)
     detector = detector if payload is None else detector.carrying(load)
-    return trace, free_alarm(detector, [first.trace])
+    return trace, free_alarm(detector, [first[log.name].trace])
 
 
 def explained(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.detectors import ArmModel, RobotNumbers
     from tauguard.detectors.calibration.recording import Recording
+    from tauguard.detectors.scores.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
 
@@ -20,8 +21,7 @@ class FreeLogs:
 
     numbers: RobotNumbers  #: of the robot file
     all_traces: dict[str, Trace]  #: those in which no joint moves, too
-    traces: dict[str, Trace]  #: by file name
-    recordings: list[Recording]  #: the same with their loads
+    logs: dict[str, Recording]  #: by file name, with their loads
     arm: ArmModel
     source: str  #: what fixes the scale of the torques, in words for the user
     scale: str  #: the same as :func:`tauguard.detectors.calibration.identification.identify` has it
@@ -52,22 +52,76 @@ def free_logs(
     known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
     traces, notes = moving(read.traces)
     print_notes(notes)
-    recordings = [known[name] for name in traces]
     if not gains:
         check_named(robot, columns, list(traces.values()))
-    arm, source = initial_arm(read.numbers, recordings, columns, gains, scale)
+    recordings = {name: known[name] for name in traces}
+    arm, source = initial_arm(read.numbers, list(recordings.values()), columns, gains, scale)
     for name, trace in traces.items():
         check_signs(arm, name, trace)
     chosen = "gains" if source in ("preset", "torques") else source
-    return FreeLogs(read.numbers, read.traces, traces, recordings, arm, source, chosen)
+    return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
 
 
 #: Checks that ``--accept`` may pass over.
 ACCEPTABLE = ("alarms", "error", "gravity")
 
 
-def hold_to(name: str, accept: Collection[str], check: Callable[[], None]) -> None:
+def free_arm(
+    robot: Path,
+    numbers: RobotNumbers,
+    recordings: Mapping[str, Recording],
+    columns: str | None,
+    gains: tuple[float, ...],
+) -> tuple[ArmModel, str]:
+    """The arm that free motion begins with, and where its gains come from, in words.
+
+    Raises:
+        ValueError: gains that do not fit, or a torque of the wrong sign in a log.
+    """
+    from tauguard.datasets.real_arms import known_arm
+    from tauguard.detectors.calibration.checks import check_signs
+
+    arm, source = known_arm(robot, numbers, list(recordings.values()), columns, gains)
+    for name, recording in recordings.items():
+        check_signs(arm, name, recording.trace)
+    return arm, source
+
+
+def free_detector(
+    arm: ArmModel, recordings: Mapping[str, Recording], accept: Collection[str] | None = None
+) -> FittedFreeMotion:
+    """The detector of free motion that some logs teach.
+
+    Args:
+        arm: of :func:`free_arm`.
+        recordings: by file name.
+        accept: checks and logs that the user vouches for; None: the command has no such flag.
+
+    Raises:
+        ValueError: too little motion, another arm's gravity torques, much torque that is not
+            explained, or in bursts as of contacts.
+    """
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.real_arms import calibration_notes
+    from tauguard.detectors.calibration.assessment import check_bursts
+    from tauguard.detectors.calibration.checks import check_weight
+    from tauguard.detectors.scores.free_motion import FreeMotion
+
+    logs = list(recordings.values())
+    found = FreeMotion().fit(logs, arm)
+    weight = (arm.robot, found.arm.robot, [log.trace for log in logs])
+    hold_to("gravity", accept, lambda: check_weight(*weight))
+    print_notes(calibration_notes(found.arm, recordings, ()))
+    vouched = {name for name in recordings if {name, Path(name).stem} & set(accept or ())}
+    others = {name: log for name, log in recordings.items() if name not in vouched}
+    hold_to("alarms", accept, lambda: check_bursts(found.arm, list(others), list(others.values())))
+    return found
+
+
+def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
     """Run a check that the user may pass over by ``--accept NAME``; a note then says what is wrong.
+
+    None for ``accept``: the command has no such flag.
 
     Raises:
         ValueError: what the check raises, and the flag.
@@ -77,6 +131,8 @@ def hold_to(name: str, accept: Collection[str], check: Callable[[], None]) -> No
     try:
         check()
     except ValueError as error:
+        if accept is None:
+            raise
         if name not in accept:
             raise ValueError(f"{error}; if that is to be, say --accept {name}") from None
         print_notes([f"accepted as --accept {name} says: {error}"])

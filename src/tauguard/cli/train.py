@@ -73,8 +73,8 @@ def command(
         card: with --free, draw the card here (PNG).
         accept: with --free, logs to learn from even if they stand out, and what the detector may
             fail in: alarms (more in its own logs, each judged by the others, than
-            --false-alarms-per-hour), error (beyond the bounds for half of the time), gravity (not
-            that of the robot file).
+            --false-alarms-per-hour, or torque in bursts as of contacts), error (beyond the bounds
+            for half of the time), gravity (not that of the robot file).
         arm: of a dataset with several arms, the one that the detector is for.
         folds: with --traces, number of parts of the recordings that are left out in turn, load by
             load; each part takes another fit (default: 3). 1 is quicker and keeps a third of the
@@ -211,33 +211,27 @@ def free_motion(
     reading: Reading | None = None,
 ) -> None:
     """Train on logs in which nothing touched the arm, as far as that is known."""
-    from tauguard.cli.free_logs import ACCEPTABLE, hold_to
+    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, hold_to
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown, read_logs, with_loads
-    from tauguard.datasets.real_arms import calibration_notes, known_arm
     from tauguard.detectors import save_model
     from tauguard.detectors.alarms.training import free_alarm
-    from tauguard.detectors.calibration.checks import check_signs, check_weight
     from tauguard.detectors.evaluation.acceptance import check_own_alarms, check_own_error
-    from tauguard.detectors.scores.free_motion import FreeMotion
 
     read = read_logs(free, columns, robot, torque, reading)
     print_notes(read.notes)
     traces, recordings = read.traces, with_loads(read.traces, payload)
-    arm, _ = known_arm(robot, read.numbers, recordings, columns, gains)
-    for name, trace in traces.items():
-        check_signs(arm, name, trace)
+    own = dict(zip(traces, recordings, strict=True))
+    arm, _ = free_arm(robot, read.numbers, own, columns, gains)
     logs_kept = [name for name in accept if name not in ACCEPTABLE]
-    traces, recordings, sifted = sifted_logs(traces, recordings, arm, logs_kept)
-    detector = FreeMotion().fit(recordings, arm)
-    weight = (arm.robot, detector.arm.robot, list(traces.values()))
-    hold_to("gravity", accept, lambda: check_weight(*weight))
-    shown = not_shown(list(traces.values()))
-    print_notes((*calibration_notes(detector.arm, traces, recordings, ()), *shown))
+    own, sifted = sifted_logs(own, arm, logs_kept)
+    traces = {name: recording.trace for name, recording in own.items()}
+    detector = free_detector(arm, own, accept)
+    print_notes(not_shown(list(traces.values())))
     held = [log for log in sifted.kept if log not in sifted.accepted]
     hold_to("error", accept, lambda: check_own_error(held))
-    own = (sum(len(log.alarms) for log in held), sum(log.seconds for log in held))
-    counts = own if sifted.kept else (detector.alarms, detector.seconds)
+    seen = (sum(len(log.alarms) for log in held), sum(log.seconds for log in held))
+    counts = seen if sifted.kept else (detector.alarms, detector.seconds)
     if counts[1]:
         hold_to("alarms", accept, lambda: check_own_alarms(*counts, per_hour, held))
     save_model(free_alarm(detector, list(traces.values())), model)
@@ -247,13 +241,12 @@ def free_motion(
 
 
 def sifted_logs(
-    traces: dict[str, Trace], recordings: Sequence[Recording], arm: ArmModel, accept: Sequence[str]
-) -> tuple[dict[str, Trace], list[Recording], CrossValidation]:
+    recordings: dict[str, Recording], arm: ArmModel, accept: Sequence[str]
+) -> tuple[dict[str, Recording], CrossValidation]:
     """The logs to learn from; prints a note on each other one, and on what differs in these.
 
     Args:
-        traces: by file name.
-        recordings: the same with their loads.
+        recordings: by file name.
         arm: nominal numbers and drive gains.
         accept: names of logs to keep in any case.
 
@@ -264,14 +257,12 @@ def sifted_logs(
     from tauguard.datasets.arm_logs import log_named
     from tauguard.detectors.evaluation.cross_validation import cross_validate
 
-    names = list(traces)
+    names = list(recordings)
     accepted = [log_named(name, f"--accept {name}", names) for name in accept]
-    own = dict(zip(names, recordings, strict=True))
-    sifted = cross_validate(own, arm, accepted)
+    sifted = cross_validate(recordings, arm, accepted)
     print_notes(odd_notes(sifted))
     out = {log.name for log in sifted.left_out}
-    kept = [name for name in names if name not in out]
-    return {name: traces[name] for name in kept}, [own[name] for name in kept], sifted
+    return {name: recordings[name] for name in names if name not in out}, sifted
 
 
 def odd_notes(sifted: CrossValidation) -> list[str]:

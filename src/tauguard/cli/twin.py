@@ -72,7 +72,7 @@ def command(
     given, left = of_one_arm(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
     )
-    recordings, names = given.recordings, list(given.traces)
+    recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
     parts = pieces(recordings, PARTS)
@@ -95,7 +95,7 @@ def command(
         if each_can_be_left_out(recordings)
         else []
     )
-    notes = (*left, *calibration_notes(twin.arm, given.traces, recordings, apart), *twin.notes)
+    notes = (*left, *calibration_notes(twin.arm, given.logs, apart), *twin.notes)
     print_notes(notes)
     written = write_twin(replace(twin, notes=tuple(notes)), robot, out, names, given.source)
     rows = report(twin.arm.robot.joint_names, likeness, list(tried))
@@ -120,11 +120,11 @@ def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
     from tauguard.detectors.calibration.identification import identify
     from tauguard.twin.sorting import odd_logs
 
-    names, arm = list(given.traces), given.arm
+    names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
     if given.scale != "gains":
-        found = identify(arm, given.recordings, scale=given.scale).arm
+        found = identify(arm, recordings, scale=given.scale).arm
         arm = ArmModel(arm.robot, found.drive_gain)
-    odd = odd_logs(arm, names, given.recordings)
+    odd = odd_logs(arm, names, recordings)
     kept = [k for k in range(len(names)) if k not in odd]
     notes = [
         f"{names[k]} is left out: the other logs do not predict it. Did the arm carry something "
@@ -132,8 +132,7 @@ def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
         "touch it?"
         for k in odd
     ]
-    traces = {names[k]: given.traces[names[k]] for k in kept}
-    return replace(given, traces=traces, recordings=[given.recordings[k] for k in kept]), notes
+    return replace(given, logs={names[k]: recordings[k] for k in kept}), notes
 
 
 def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:

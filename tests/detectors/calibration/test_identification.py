@@ -7,11 +7,18 @@ import pytest
 
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
 from tauguard.detectors.calibration.arm_file import load_arm, save_arm
-from tauguard.detectors.calibration.assessment import explained, left_out, residual_rms, start_gains
+from tauguard.detectors.calibration.assessment import (
+    check_bursts,
+    explained,
+    left_out,
+    residual_rms,
+    start_gains,
+)
 from tauguard.detectors.calibration.identification import identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
 from tauguard.detectors.dynamics.physical_consistency import is_physically_consistent
 from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,
@@ -58,15 +65,52 @@ def test_a_log_it_has_not_seen(found):
     assert (nominal_rms > 2).all()
 
 
+@pytest.mark.parametrize("load", [Load(), None])
 @pytest.mark.parametrize(("first", "second"), [(1, 2), (0, 1)])
-def test_currents_of_two_joints_exchanged(logs, found, first, second):
+def test_currents_of_two_joints_exchanged(logs, found, first, second, load):
     order = [0, 1, 2]
     order[first], order[second] = order[second], order[first]
-    mixed = [Recording(dataclasses.replace(log, current=log.current[:, order])) for log in logs]
+    mixed = [
+        Recording(dataclasses.replace(log, current=log.current[:, order]), load) for log in logs
+    ]
     wrong = identify(ArmModel(nominal(), GAIN), mixed)
     with pytest.raises(ValueError, match="wrong order, signs"):
-        explained(wrong.arm, [r.trace for r in mixed])
-    assert explained(found.arm, logs) == ()
+        explained(wrong.arm, mixed)
+    assert explained(found.arm, [Recording(log, load) for log in logs]) == ()
+
+
+def test_an_unknown_load_is_explained_and_a_load_that_is_not_told_is_not(found):
+    heavy = record(20, load=3.0)
+    assert explained(found.arm, [Recording(heavy, None)]) == ()
+    with pytest.raises(ValueError, match="a load that was not named"):
+        explained(found.arm, [Recording(heavy)])
+
+
+def pushed(trace, every, torque):
+    """Pushes of 0.4 s on the last joint, from 2 s on."""
+    for at in np.arange(2.0, trace.t[-1] - 1, every):
+        trace = add_contact(trace, GAIN, Added(float(at), 0.4, (0.0, 0.5 * torque, torque), "push"))
+    return trace
+
+
+@pytest.mark.parametrize("others", [0, 2])
+def test_logs_that_are_touched_all_along_are_named_with_their_seconds(logs, others):
+    given = [Recording(pushed(record(7), 3.0, 15.0)), *map(Recording, logs[:others])]
+    names = ["touched", "a", "b"][: len(given)]
+    arm = identify(ArmModel(nominal(), GAIN), given).arm
+    with pytest.raises(ValueError, match="bursts, as contacts do, at") as caught:
+        check_bursts(arm, names, given)
+    line = str(caught.value)
+    seconds = [float(s) for s in line.split("do, at ")[1].split(" s ")[0].split(", ")[:-1]]
+    assert len(seconds) > 4
+    assert max(min(abs(s - at) for at in np.arange(2.0, 25, 3.0)) for s in seconds) < 0.3
+    assert line.count("is not explained") == 1
+    assert "touched" in line
+
+
+def test_free_logs_and_untold_loads_have_no_bursts(logs, found):
+    check_bursts(found.arm, ["a", "b", "c"], [Recording(log) for log in logs])
+    check_bursts(found.arm, ["heavy"], [Recording(record(20, load=3.0))])
 
 
 def test_each_log_left_out_once(logs, found):
