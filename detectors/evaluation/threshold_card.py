@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
@@ -14,14 +15,24 @@ from tauguard.detectors.estimation.observer import LOG_GAIN
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
 from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.features.free_bound import FREE_GAIN
 from tauguard.detectors.features.motion_regimes import motion_regimes
-from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.free_motion import SETTLE, FittedFreeMotion, Judged
 from tauguard.traces.trace import Trace
 
 #: Fraction of a torque on a standing joint that the detector sees for long enough, if the torque
 #: rises within 0.1 s, and if it takes 1 s. The observer (30/s) follows it while the baseline (0.15
 #: s) absorbs it.
 COUNTS, COUNTS_SLOWLY = 0.6, 0.15
+#: Pulses by which the number in motion is told [s], at so many places at least, and the share of
+#: the places where it is enough. An alarm needs as long above the bound [s].
+PULSE, PLACES, SHARE, LASTS = 0.3, 40, 0.9, 0.04
+#: The detector takes a part of a pulse for a load or for friction: so many times the torque is
+#: needed. Of pulses added to logs left out, 97 % were then found on a UR10e, 90 % on a UR5 and 92 %
+#: on a UR3; without it 75 %, and with the median bound for the number, 40 %.
+TRACKED = 1.25
+#: Where the logs have too few places: over the least bound in motion.
+LITTLE = 1.5
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
 #: Joints of the arms that libfranka speaks to.
@@ -37,7 +48,7 @@ class ThresholdCard:
     joints: tuple[str, ...]
     standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
     stopped: Array  #: on one that has just stopped [N m], (n,)
-    moving: Array  #: on one in motion, median over the logs; NaN: no log shows it [N m], (n,)
+    moving: Array  #: on one in motion, see `found_in_motion`; NaN: no log shows it [N m], (n,)
     starting: Array  #: on one that starts, NaN as well [N m], (n,)
     tool: dict[str, tuple[float, float]]
     """Force at the last link's origin [N]: "standing" and pushed within 0.1 s, "slowly" (the same,
@@ -94,15 +105,9 @@ def threshold_card(
     """
     bound, robot = detector.bound, detector.arm.robot
     judged = [detector.judge(trace) for trace in traces]
-    bounds = np.concatenate([j.bound for j in judged])
-    moving = ~np.concatenate([j.rest for j in judged])
     sliding = np.maximum(bound.moving[:, 0], bound.least)
-    usual = np.array(
-        [
-            float(np.median(b[m])) if m.any() else float(least)
-            for b, m, least in zip(bounds.T, moving.T, sliding, strict=True)
-        ]
-    )
+    usual = found_in_motion(judged)
+    usual = np.where(np.isfinite(usual), usual, LITTLE * sliding)
     usual = np.where(bound.shown, usual, np.nan)
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
@@ -131,6 +136,38 @@ def threshold_card(
         dict(detector.unseen),
         replayed(detector, traces, usual, starting),
     )
+
+
+def found_in_motion(judged: Sequence[Judged]) -> Array:
+    """The torque [N m] whose pulses on a moving joint are found, (n,); NaN: too little motion.
+
+    At many places of the logs it is computed how large a pulse of 0.3 s has to be, on top of the
+    residual that the log has there, to exceed the bound for as long as an alarm needs. Pulses of
+    either sign count. The number is enough at 90 % of the places.
+    """
+    found = np.full(judged[0].residual.shape[1], np.nan)
+    needed: list[list[Array]] = [[] for _ in found]
+    for part in judged:
+        dt = float(np.median(np.diff(part.t)))
+        length, lasts = round(PULSE / dt), max(3, round(LASTS / dt))
+        if len(part.t) <= length or length < lasts:
+            continue
+        follows = 1 - np.exp(-FREE_GAIN * dt * (np.arange(length) + 0.5))
+        places = np.arange(0, len(part.t) - length, max(1, length // 3))
+        moves = ~part.rest & (part.t - part.t[0] > 2 * SETTLE)[:, None]
+        for j, own in enumerate(needed):
+            rows = places[sliding_window_view(moves[:, j], length)[places].all(axis=1)]
+            left, bound = (
+                sliding_window_view(x[:, j], length)[rows] for x in (part.residual, part.bound)
+            )
+            for sign in (-1, 1):
+                enough = sliding_window_view((bound - sign * left) / follows, lasts, axis=1)
+                own.append(enough.max(axis=2).min(axis=1))
+    for j, own in enumerate(needed):
+        levels = np.concatenate([np.empty(0), *own])
+        if len(levels) >= PLACES:
+            found[j] = TRACKED * float(np.quantile(levels, SHARE))
+    return found
 
 
 def replayed(

@@ -281,3 +281,17 @@ def test_other_joints_are_refused(alarm):
     )
     with pytest.raises(ValueError, match="the trace has 1 joints, this detector 3"):
         alarm.detector.scores(one)
+
+
+def test_what_the_card_promises_in_motion_is_found(fitted, alarm):
+    """Pushes of the promised size, added to logs that training has not seen."""
+    moving = threshold_card(fitted, [record(seed) for seed in range(3)]).moving
+    rng, found = np.random.default_rng(4), []
+    for trace in (record(7), record(8)):
+        for start in rng.uniform(2.0, 7.0, 12):
+            for joint in range(3):
+                torque = moving * np.eye(3)[joint] * rng.choice([-1, 1])
+                push = Added(float(start), 0.4, tuple(torque), "push")
+                alarms = alarm.detect(add_contact(trace, GAIN, push)).alarms
+                found.append(any(start < one.start < start + 0.6 for one in alarms))
+    assert np.mean(found) >= 0.9
