@@ -16,8 +16,8 @@ from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, with
 
 #: Candidates of the angle over which friction turns around with the joint [rad], and the prior.
 PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
-#: Slower than this a joint shows it [rad/s].
-TURNING = 0.1
+#: Between these speeds a joint shows it [rad/s]. A slower one holds what its controller asks for.
+TURNING = (0.005, 0.1)
 #: Prior of the gear ratio.
 GEAR = 101.0
 #: Least half width of an interval, of the largest joint's number: no law of friction is truer.
@@ -71,7 +71,7 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
         gear=np.full(n, GEAR),
         current_limit=current_limit,
         electrical_time_constant=None,
-        friction=_turning(_friction(fits, arm.drive_gain), motions, torques),
+        friction=turned(_friction(fits, arm.drive_gain), motions, torques),
     )
     sensors = replace(_sensors(traces, n), left_over=left_over(arm, drive, parts))
     return Twin(arm, replace(drive, sensors=sensors), fits, _notes(arm, fits, traces))
@@ -144,7 +144,7 @@ def _friction(fits: Sequence[FrictionFit | None], gain: Array) -> Friction:
     )
 
 
-def _turning(friction: Friction, motions: Sequence[Motion], torques: Sequence[Array]) -> Friction:
+def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Array]) -> Friction:
     """Friction with the bristle stiffness that fits best while joints turn around."""
     level = friction.bristle_stiffness * USUAL
     errors = []
@@ -153,13 +153,12 @@ def _turning(friction: Friction, motions: Sequence[Motion], torques: Sequence[Ar
         for motion, torque in zip(motions, torques, strict=True):
             steps = np.diff(motion.t, prepend=motion.t[0])
             lost = friction_torque(one, motion.qd, motion.load, steps)
-            # Not at rest: there a joint holds what its controller asks for.
-            turns = motion.moving & (np.abs(motion.qd) < TURNING)
+            turns = (np.abs(motion.qd) > TURNING[0]) & (np.abs(motion.qd) < TURNING[1])
             error += (turns * (torque - motion.bodies - lost) ** 2).sum(axis=0)
         errors.append(error)
     best = np.array(PRESLIDING)[np.argmin(errors, axis=0)]
-    turned = np.array(errors).max(axis=0) > 0
-    return replace(friction, bristle_stiffness=level / np.where(turned, best, USUAL))
+    shown = np.array(errors).max(axis=0) > 0
+    return replace(friction, bristle_stiffness=level / np.where(shown, best, USUAL))
 
 
 def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:

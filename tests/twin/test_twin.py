@@ -11,7 +11,7 @@ from tauguard.models import Friction, load_arm
 from tauguard.twin import compare, identify_twin, with_intervals
 from tauguard.twin.description import write_twin
 from tauguard.twin.drive_fit import fit_friction
-from tauguard.twin.identify import left_over
+from tauguard.twin.identify import USUAL, left_over, turned
 from tauguard.twin.play import friction_torque, modelled
 from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 from tests.detectors.synthetic_arm import (
@@ -127,6 +127,19 @@ def test_the_error_of_a_programs_cut_off_is_bridged(logs):
     bridged = bridged_stop(replace(logs[0], qd=qd), error)
     assert np.abs(bridged[400:] - 1).max() < 1e-12
     np.testing.assert_array_equal(bridged[:490], error[:490])
+
+
+def test_the_angle_over_which_friction_turns_around_is_seen_while_a_joint_creeps():
+    # At a constant speed after a reversal, Dahl's bristle is 5 (1 - 2 exp(-angle / 2e-3)).
+    t = np.arange(800) * 0.01
+    way = np.where(t % 4 < 2, 1.0, -1.0)
+    torque = way * 5 * (1 - 2 * np.exp(-0.01 * (t % 2 + 0.01) / 2e-3))
+    column = (0.01 * way)[:, None]
+    motion = Motion(t, column, 0 * column, 0 * column)
+    one, level = np.ones(1), 5 * np.ones(1)
+    start = Friction(level, level, 0.1 * one, 0 * one, level / USUAL, 0 * one)
+    found = turned(start, [motion], [torque[:, None]])
+    assert level / found.bristle_stiffness == pytest.approx(2e-3)
 
 
 def test_quantum_of_a_signal():
