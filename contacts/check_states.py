@@ -1,4 +1,4 @@
-"""Checkers on a recorded run: what they would have reported, step by step."""
+"""Run checkers on a recorded sequence of states, step by step."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -14,11 +14,11 @@ from tauguard.traces import CheckedContacts
 def check_states(
     model: Any, states: Iterable[State | None], checkers: Sequence[str | Checker]
 ) -> tuple[CheckedContacts, ...]:
-    """Return what each checker reports in a sequence of states.
+    """The contacts that each checker reports in a sequence of states.
 
     Args:
         model: MjModel.
-        states: in the order of time. ``None`` marks a jump: there is no motion between the states
+        states: in order of time. ``None`` marks a jump: there is no motion between the states
             around it.
         checkers: names of registered checkers, or checkers.
 
@@ -43,7 +43,7 @@ def check_states(
 
 
 def _checked(model: Any, name: str, contacts: Contacts, times: Array) -> CheckedContacts:
-    """The rows by time [s], and by the names of their bodies and flexes."""
+    """Convert rows to times [s] and to names of bodies and flexes."""
     order = np.argsort(times, kind="stable")
     contacts, times = contacts.where(order), times[order]
     body = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)

@@ -1,4 +1,4 @@
-"""The one protocol of every contact checker: a state before, a state after, contacts."""
+"""The interface of contact checkers: a state before and a state after give contacts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tauguard.contacts._contacts import all_finite, carried
 
 Index = NDArray[np.int32]
 
-#: What may touch, by name: MuJoCo's geom types and its flexes.
+#: Names of what may touch: MuJoCo's geom types and its flexes.
 KINDS = (
     "plane",
     "hfield",
@@ -31,7 +31,7 @@ KINDS = (
 )
 
 
-#: The data from which the kinematics of a state follow, besides the model.
+#: Fields of MjData that determine the kinematics of a state.
 _POSE = int(
     mujoco.mjtState.mjSTATE_QPOS
     | mujoco.mjtState.mjSTATE_MOCAP_POS
@@ -44,12 +44,12 @@ _NO_VERTICES = np.zeros((0, 3))
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where everything is at one instant.
+    """Positions and velocities of the scene at one instant.
 
     Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1],
     with dx the difference of both xpos and w the shortest rotation vector from one xmat to the
     other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. Checkers
-    and the ground truth answer about this path.
+    and the ground truth report contacts on this path.
 
     Attributes:
         time: [s].
@@ -135,18 +135,19 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contacts of one step, one a row.
+    """Contacts of one step, one per row.
 
     Attributes:
-        time: When, as a fraction of the step in [0, 1]; 0 for contacts that exist at the start.
+        time: Fraction of the step in [0, 1]; 0 for contacts that exist at the start.
             (K,).
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
-        feature: Which vertex, edge or element of each partner, in the checker's own numbering (of
+        feature: Vertex, edge or element of each partner, in the checker's own numbering (of
             MuJoCo: ``contact.vert`` or ``contact.elem``); -1 if it names none. Shape (K, 2).
         point: World frame. Shape (K, 3), m; NaN where it is not known.
         normal: Unit vector from the first partner to the second. Shape (K, 3); NaN where unknown.
-        distance: Between both surfaces at ``time``, negative in penetration. Shape (K,), m.
+        distance: Signed distance of the surfaces at ``time``, negative in penetration. Shape (K,),
+            m.
     """
 
     time: Array
@@ -173,7 +174,7 @@ class Contacts:
 
     @classmethod
     def empty(cls) -> Contacts:
-        """No contact at all; the same object every time."""
+        """No contacts; every call returns the same object."""
         return _EMPTY
 
     @classmethod
@@ -206,18 +207,18 @@ _EMPTY = Contacts(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COL
 
 @runtime_checkable
 class Checker(Protocol):
-    """Reports what touches in a step. A factory ``(model, **options)`` makes one.
+    """Reports the contacts of a step. A factory ``(model, **options)`` makes a checker.
 
     Attributes:
-        name: As registered.
-        covers: Pairs of :data:`KINDS` that it answers for, see :func:`pair_kind`.
+        name: The registered name.
+        covers: Pairs of :data:`KINDS` that the checker can test, see :func:`pair_kind`.
     """
 
     name: str
     covers: frozenset[tuple[str, str]]
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the path between both states; :class:`State` defines the path."""
+        """The contacts on the path between both states; :class:`State` defines the path."""
         ...
 
 
@@ -226,7 +227,7 @@ _FACTORIES: dict[str, Factory] = {}
 
 
 def asked(one: Checker, before: State, after: State) -> Contacts:
-    """What the checker ``one`` reports of the step.
+    """The contacts that the checker ``one`` reports for the step.
 
     Raises:
         TypeError: its ``check`` returned something else than :class:`Contacts`.
@@ -241,12 +242,12 @@ def asked(one: Checker, before: State, after: State) -> Contacts:
 
 
 def register(name: str, factory: Factory, *, replace: bool = False) -> None:
-    """Make a checker known by ``name``.
+    """Register a checker under ``name``.
 
     Args:
         name: Not empty.
         factory: ``factory(model, **options)`` returns a :class:`Checker`.
-        replace: Replace another factory of that name.
+        replace: Whether to replace an existing factory of that name.
 
     Raises:
         ValueError: an empty name, a name that another factory has, or a factory that cannot be

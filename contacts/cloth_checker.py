@@ -1,4 +1,4 @@
-"""The checker ``cloth``: two-dimensional flexes against geoms, one another and themselves."""
+"""The checker ``cloth``: two-dimensional flexes against geoms, each other and themselves."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,21 +15,22 @@ from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs
 
 
 class ClothChecker:
-    """Times of impact of cloth whose vertices move linearly.
+    """Times of impact of cloth with linearly moving vertices.
 
     A flex is the union of its triangles, thickened by its radius, as in MuJoCo. Triangles against
     geoms: conservative advancement on support functions. Cloth against cloth, and against itself:
     candidates by :class:`tauguard.cloth.MeshCCD` at the distance of both radii, then the triangles
-    themselves. Never late; early by at most 1e-10 of the shapes' size in distance.
+    themselves. Times are never late; they are early by at most 1e-10 of the shapes' size in
+    distance.
 
     Args:
         model: MjModel.
         threshold: As for :class:`tauguard.contacts.RigidChecker`.
         skip: Kinds of geoms to leave out.
-        self_collision: Whether cloth is tested against cloth (the pairs that MuJoCo would test).
+        self_collision: Whether to test cloth against cloth (the pairs that MuJoCo would test).
 
     Raises:
-        ValueError: a flex that may touch something and is not two-dimensional, or a geom that may
+        ValueError: a flex that can collide and is not two-dimensional, or a geom that may
             touch one and is of a kind that cannot be handled (both named); an unknown threshold.
     """
 
@@ -71,7 +72,7 @@ class ClothChecker:
         self._last: tuple[State, State, Contacts] | None = None
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the path: at most one contact for a triangle and a geom or triangle.
+        """The contacts on the path: at most one for a triangle and a geom or triangle.
 
         Raises:
             ValueError: a state of another model, or that is not finite.
@@ -136,12 +137,12 @@ class _Flex:
         self.bodies = model.flex_vertbodyid[self.elements]
 
     def hangs_on(self, body: int) -> NDArray[np.bool_]:
-        """Triangles with a corner that ``body`` itself carries: MuJoCo leaves them out."""
+        """Triangles with a corner on ``body`` itself, which MuJoCo does not test."""
         return np.asarray((self.bodies == body).any(axis=1), dtype=bool)
 
 
 class _Cloths:
-    """Cloth against cloth: candidates of the mesh, then pairs of triangles."""
+    """Cloth against cloth: candidate features of the mesh, then pairs of triangles."""
 
     def __init__(
         self, model: Any, flexes: dict[int, _Flex], pairs: Pairs, reach: NDArray[np.float64]
@@ -190,7 +191,7 @@ class _Cloths:
         return out
 
     def _triangle_pairs(self, vf: Index, ee: Index) -> Index:
-        """Pairs of triangles, first flex first, that hold these features and no common body."""
+        """Pairs of triangles with these features and without a common body, first flex first."""
         of_vertex, faces = _expand(self._of_vertex, vf[:, 0], vf[:, 1])
         one, rest = _expand(self._of_edge, ee[:, 0], ee[:, 1])
         other, one = _expand(self._of_edge, rest, one)

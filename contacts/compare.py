@@ -1,4 +1,4 @@
-"""Several checkers on one run of a scene, beside MuJoCo's contacts and the ground truth."""
+"""Compare checkers on one run of a scene with MuJoCo's contacts and the ground truth."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ def compare(
     fine: int | None = None,
     keep: bool = False,
 ) -> Report:
-    """Run a scene in MuJoCo unchanged and let every checker judge every step.
+    """Run a scene in MuJoCo and ask every checker about every step.
 
     The checkers do not influence the run. All of them, and the ground truth, get the same path: see
     :class:`tauguard.contacts.State`.
@@ -47,14 +47,14 @@ def compare(
         scene: A :class:`ContactScene`, a model (which starts at rest in ``qpos0``), or the name of
             one of ``SCENES``.
         checkers: Names of registered checkers.
-        timestep: Of MuJoCo [s]; ``None``: the scene's.
-        seconds: How long [s]; ``None``: the scene's own time.
-        options: By checker, keyword arguments of its factory.
-        ground_truth: Whether true contacts are computed (slow); without them there is no precision
+        timestep: MuJoCo's time step [s]; ``None``: the scene's.
+        seconds: Duration [s]; ``None``: the scene's own.
+        options: Keyword arguments of the factory, by checker.
+        ground_truth: Whether to compute true contacts (slow); without them there is no precision
             or recall.
         fine: A second reference: the scene is also run with steps this many times shorter, up to
             its first contact (after it the two runs differ). ``None``: it is not.
-        keep: Whether the report keeps the states, for a recording.
+        keep: Whether the report keeps the states for a recording.
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the ground truth
@@ -90,7 +90,7 @@ def compare(
 
 
 def _scene(scene: ContactScene | mujoco.MjModel | str) -> ContactScene:
-    """The scene of a name or a model."""
+    """The scene that a name or a model stands for."""
     if isinstance(scene, str):
         if scene not in SCENES:
             raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
@@ -184,7 +184,7 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
 def _first_contact(
     scene: ContactScene, timestep: float, seconds: float
 ) -> tuple[float, set[tuple[str, str]]] | None:
-    """When MuJoCo alone, in steps of ``timestep`` [s], first lists touching surfaces, and which.
+    """Time and kinds of MuJoCo's first touching contact at steps of ``timestep`` [s].
 
     The kinds are those of :func:`pair_kind`.
     """
@@ -194,7 +194,7 @@ def _first_contact(
         if scene.control is not None:
             scene.control(model, data)
         now = float(data.time)
-        mujoco.mj_step(model, data)  # lists the contacts of the state it starts from
+        mujoco.mj_step(model, data)  # it lists the contacts at the start of the step
         touching = np.flatnonzero(data.contact.dist <= 0)
         if len(touching):
             both = (

@@ -1,4 +1,4 @@
-"""MuJoCo's geoms as the convex shapes of the native kernel."""
+"""Convert MuJoCo's geoms to the convex shapes of the native kernel."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,7 +10,7 @@ from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import Index, geom_kinds
 
-#: Numbers of the native cores: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
+#: Native numbers of shapes: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
 _CORES = {
     "plane": 0,
     "sphere": 1,
@@ -20,7 +20,7 @@ _CORES = {
     "box": 5,
     "mesh": 6,
 }
-#: Kinds that have one.
+#: Kinds of geoms with a native shape.
 CONVEX = tuple(_CORES)
 _NONE = np.zeros((0, 3))
 
@@ -32,7 +32,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
         model: MjModel.
         geoms: Their ids.
         checker: Name for messages.
-        surfaces: Whether a mesh is its surface instead of its convex hull.
+        surfaces: Whether to use the surface of a mesh instead of its convex hull.
 
     Raises:
         ValueError: a geom of a kind that has no convex shape (named).
@@ -53,7 +53,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
 
 
 def geom_name(model: Any, geom: int) -> str:
-    """The geom's name, or its number and body."""
+    """The geom's name, or its number and body if it has no name."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return repr(name)

@@ -9,9 +9,9 @@ from tauguard.contacts.checker import KINDS, Contacts, State, pair_kind
 
 
 class MujocoChecker:
-    """What MuJoCo's collision detection lists at the end of the step, hence at ``time`` 1.
+    """The contacts that MuJoCo's collision detection lists at the end of the step (``time`` 1).
 
-    It is what the next ``mj_step`` would start with. Distances are MuJoCo's; with speculative
+    The next ``mj_step`` would start with them. Distances are MuJoCo's; with speculative
     contacts they are predictions, not geometry.
 
     Args:
@@ -21,7 +21,7 @@ class MujocoChecker:
     name = "mujoco"
 
     def __init__(self, model: Any) -> None:
-        """Make an MjData to work in."""
+        """Make an MjData for the computation."""
         self._model = model
         self._data = mujoco.MjData(model)
         self._mocap = np.flatnonzero(model.body_mocapid >= 0)
@@ -33,7 +33,7 @@ class MujocoChecker:
         )
 
     def check(self, before: State, after: State) -> Contacts:
-        """The contacts at ``after``; ``before`` is not looked at."""
+        """The contacts at ``after``; ``before`` is ignored."""
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:] = after.qpos, after.qvel
         for body in self._mocap:

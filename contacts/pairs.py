@@ -1,4 +1,4 @@
-"""Which geoms and flexes may touch: MuJoCo's rules, applied once to a compiled model.
+"""The pairs of geoms and flexes that may touch: MuJoCo's rules, applied to a compiled model.
 
 The rules are those of the manual's chapter "Collision detection: selection": explicit pairs always
 count; other pairs need two bodies that are not welded together, not parent and child (unless the
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts.checker import Index, geom_kinds
 
-#: Kinds that MuJoCo never tests against one another.
+#: Kinds that MuJoCo never tests against each other.
 _NEVER = ({"plane"}, {"plane", "hfield"}, {"hfield"})
 
 
@@ -28,7 +28,7 @@ class Pairs:
     Attributes:
         first: Ids of geoms (or of flexes, between flexes). Shape (P,).
         second: Ids of geoms or flexes. Shape (P,).
-        margin: A force acts where the surfaces are closer than this. Shape (P,), m.
+        margin: A force acts if the surfaces are closer than this. Shape (P,), m.
         gap: MuJoCo lists contacts up to margin + gap. Shape (P,), m.
     """
 
@@ -45,7 +45,7 @@ class Pairs:
         return Pairs(self.first[rows], self.second[rows], self.margin[rows], self.gap[rows])
 
     def reach(self, threshold: str) -> Array:
-        """The distance that counts as contact: 0, the margin, or margin + gap; never below 0."""
+        """The largest distance of a contact: 0, the margin, or margin + gap; never below 0."""
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:
@@ -85,7 +85,7 @@ def geom_flex_pairs(model: Any) -> Pairs:
 
 
 def flex_pairs(model: Any) -> Pairs:
-    """Flexes that may touch one another, or themselves (then without margin)."""
+    """Flexes that may touch each other, or themselves (then without margin)."""
     rows = []
     for f in range(0 if _disabled(model) else model.nflex):
         own = int(model.flex_contype[f]) & int(model.flex_conaffinity[f])
@@ -101,7 +101,7 @@ def flex_pairs(model: Any) -> Pairs:
 
 
 def _dynamic(model: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of geoms that the bodies and masks allow; i < j."""
+    """Pairs of geoms (i < j) that the rules on bodies and masks allow."""
     i, j = np.triu_indices(model.ngeom, 1)
     body = model.geom_bodyid.astype(np.int64)
     weld = model.body_weldid[body]

@@ -13,13 +13,13 @@ from tauguard.contacts.run import Run
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where a checker and the ground truth differ."""
+    """A difference between a checker and the ground truth."""
 
     checker: str
     kind: str  #: "missed": an event without a report; "false": a report without a touch
     time: float  #: [s]
     partners: tuple[str, str]
-    depth: float  #: the true one, or the one that the checker reported [m]
+    depth: float  #: true depth of a missed event, or reported depth of a false one [m]
 
     def __str__(self) -> str:
         names = " and ".join(self.partners)
@@ -28,42 +28,42 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What MuJoCo did in one event."""
+    """MuJoCo's handling of one event."""
 
     partners: tuple[str, str]
     onset: float  #: [s]
     end: float  #: [s]
-    generated: bool  #: MuJoCo listed a contact of this pair during the event
-    held: bool  #: and it kept the partners from passing through one another
+    generated: bool  #: whether MuJoCo listed a contact of this pair during the event
+    held: bool  #: whether the contact kept the partners from passing through each other
 
 
 @dataclass(frozen=True)
 class Score:
-    """The score of one checker. ``None``: there was nothing to count, or no ground truth.
+    """The score of one checker. ``None``: there was no event to count, or no ground truth.
 
     Attributes:
-        checker: Its name.
+        checker: Name of the checker.
         events: Contacts of two partners, from touch to parting, over the pairs it covers.
         recalled: How many of these events it reported, at most one step outside them.
         reports: Steps and partners that it reported.
-        correct: How many of these reports are true, or no deeper than the tolerance.
+        correct: Number of these reports that are true, or no deeper than the tolerance.
         steps: Steps and partners that touch beyond the tolerance.
-        steps_found: How many of these it reported in the same step.
+        steps_found: Number of these that it reported in the same step.
         delay_ms: From an event's onset to its first report, median [ms].
-        first: Its first report of any pair [s].
+        first: Time of its first report of any pair [s].
         first_error_ms: How much later that is than the first contact of a finely stepped run of
             MuJoCo [ms]; ``None`` without such a run, or where it does not cover that pair.
         lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
-        normals: How many normals were compared.
-        opposite: How many of these are more than 90 degrees from MuJoCo's.
+        normals: Number of compared normals.
+        opposite: Number of these that are more than 90 degrees from MuJoCo's.
         us_per_step: Processor time of a call, median [us].
-        us_low: 10 % quantile.
-        us_high: 90 % quantile.
+        us_low: 10 % quantile of that time [us].
+        us_high: 90 % quantile of that time [us].
         over_mj_step: Processor time of a call over that of ``mj_step``.
         not_covered: Contacts that it reported of pairs it does not cover; they are not counted.
-        disagreements: By time.
+        disagreements: Differences from the ground truth, in order of time.
     """
 
     checker: str
@@ -90,7 +90,7 @@ class Score:
 
     @property
     def recall(self) -> float | None:
-        """Fraction of the events that were seen."""
+        """Fraction of the events that were reported."""
         return self.recalled / self.events if self.events and self.recalled is not None else None
 
     @property
@@ -110,15 +110,15 @@ class Report:
     over_mj_step: the same over ``mj_step``'s.
 
     Attributes:
-        scene: Its name.
+        scene: Name of the scene.
         timestep: [s].
-        steps: How many were run.
-        scores: One a checker.
-        outcomes: What MuJoCo made of every event, by onset.
-        disagreements: Of all checkers.
+        steps: Number of steps.
+        scores: One score per checker.
+        outcomes: MuJoCo's handling of every event, in order of onset.
+        disagreements: Differences of all checkers from the ground truth.
         first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
-        step_us: Of ``mj_step``, median [us].
-        state_us: Of copying a state with its kinematics, which all checkers share, median [us].
+        step_us: Median time of ``mj_step`` [us].
+        state_us: Median time of copying a state with its kinematics, which all checkers share [us].
         run: States and contacts, if they were kept.
     """
 
@@ -150,7 +150,7 @@ class Report:
         raise KeyError(f"{checker!r}: there are {', '.join(s.checker for s in self.scores)}")
 
     def rows(self) -> list[dict[str, Any]]:
-        """One flat dictionary a checker."""
+        """One flat dictionary per checker."""
         skip = {"disagreements", "checker"}
         return [
             {
@@ -197,7 +197,7 @@ class Report:
 
 
 def _by_partners(disagreements: Sequence[Disagreement]) -> list[str]:
-    """A line for each checker, kind and pair: the first time, and how often it occurs again."""
+    """A line for each checker, kind and pair: time of the first, and number of further ones."""
     found: dict[tuple[Any, ...], list[Disagreement]] = defaultdict(list)
     for one in disagreements:
         found[one.checker, one.kind, one.partners].append(one)

@@ -15,12 +15,12 @@ from tauguard.contacts.surface_pairs import SurfacePairs
 
 @dataclass(frozen=True)
 class Work:
-    """The work of the last call.
+    """Counts of work in the last call.
 
     Attributes:
-        moved: Bodies whose motion changed since the call before.
-        reused: Pairs answered from the call before, as neither body's motion changed.
-        candidates: Pairs whose swept boxes met.
+        moved: Bodies whose motion changed since the previous call.
+        reused: Pairs answered from the previous call, because neither body's motion changed.
+        candidates: Pairs whose swept boxes overlap.
     """
 
     moved: int
@@ -33,7 +33,8 @@ class RigidChecker:
 
     Boxes and meshes (their convex hulls) go through the kernel of :mod:`tauguard.rigid`; planes,
     spheres, capsules, cylinders and ellipsoids through conservative advancement on their support
-    functions: never late, early by at most 1e-10 of the shapes' size in distance.
+    functions. Times are never late; they are early by at most 1e-10 of the shapes' size in
+    distance.
 
     Args:
         model: MjModel.
@@ -42,7 +43,7 @@ class RigidChecker:
             lists them. A row whose surfaces do not touch has a positive distance.
         skip: Kinds of geoms to leave out.
         mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo; ``"surface"``: its triangles,
-            without an inside. Against meshes and boxes surfaces then have no margin and no depth.
+            without an interior. Against meshes and boxes surfaces then have no margin and no depth.
 
     Raises:
         ValueError: a geom that may touch something and is of a kind that cannot be handled
@@ -84,7 +85,7 @@ class RigidChecker:
         self._bodies = int(model.nbody)
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the path: the first contact of each pair.
+        """The first contact of each pair on the path.
 
         Raises:
             ValueError: a state of another model, or that is not finite.

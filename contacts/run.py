@@ -16,17 +16,17 @@ TOUCHING = 1e-8
 
 @dataclass
 class Run:
-    """What happened in a run, step by step; ``times`` has one entry more than the lists.
+    """The record of a run, step by step; ``times`` has one entry more than the lists.
 
     Attributes:
         model: MjModel.
-        times: Of the states [s].
-        contacts: By checker, one :class:`Contacts` a step.
-        touches: The true ones, one item a step; empty without ground truth.
-        seconds: By checker, what each call took [s].
-        step_seconds: What each ``mj_step`` took [s].
-        state_seconds: What copying each state took [s].
-        states: All of them where they were kept, else the first.
+        times: Times of the states [s].
+        contacts: One :class:`Contacts` per step, by checker.
+        touches: The true contacts, one item per step; empty without ground truth.
+        seconds: Duration of each call [s], by checker.
+        step_seconds: Duration of each ``mj_step`` [s].
+        state_seconds: Duration of copying each state [s].
+        states: All states if they were kept, otherwise the first.
     """
 
     model: Any

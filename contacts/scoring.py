@@ -1,4 +1,4 @@
-"""The score of a checker in one run, beside the ground truth and MuJoCo."""
+"""Score a checker in one run against the ground truth and MuJoCo."""
 
 import itertools
 from collections import defaultdict
@@ -14,7 +14,7 @@ from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
 from tauguard.contacts.run import TOUCHING, Run
 
 Covers = frozenset[tuple[str, str]]
-#: By geoms, flexes and features: depth [m], inner radius [m], normal.
+#: Depth [m], inner radius [m] and normal, by geoms, flexes and features.
 _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 
 
@@ -79,10 +79,10 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 def judge(
     model: Any, times: Sequence[float], touches: Sequence[Touches], mine: Sequence[Contacts]
 ) -> tuple[Outcome, ...]:
-    """For every event: did MuJoCo list it, and did the contact hold?
+    """Whether MuJoCo listed each event, and whether the contact held.
 
-    Held: listed, never deeper than the thinner partner's inner radius (planes and cloth have
-    none), and no geom or triangle is pushed the other way from one step to the next.
+    A contact held if it was listed and never deeper than the thinner partner's inner radius (planes
+    and cloth have none), and no geom or triangle is pushed the other way from one step to the next.
     """
     if not touches:
         return ()
@@ -131,7 +131,7 @@ def _covered(touches: Touches, kinds: Sequence[str], covers: Covers) -> Touches:
 
 
 def _mask(geom: Any, kinds: Sequence[str], covers: Covers) -> NDArray[np.bool_]:
-    """Which rows are of pairs in ``covers``; a partner without a geom (-1) is a flex."""
+    """Mask of the rows whose pairs are in ``covers``; a partner without a geom (-1) is a flex."""
     codes = np.array([KINDS.index(kind) for kind in (*kinds, "flex")])  # -1 finds the last
     table = np.zeros((len(KINDS), len(KINDS)), dtype=bool)
     for a, b in covers:
@@ -201,7 +201,7 @@ def _delay(truth: Sequence[Event], reports: dict[Pair, list[float]], step: float
 
 
 def _lead(mine: dict[Pair, list[float]], theirs: dict[Pair, list[float]]) -> float | None:
-    """By how much earlier than MuJoCo the first contact of a pair was reported, median [ms]."""
+    """Median lead of the first report of a pair before MuJoCo's [ms]."""
     leads = [1e3 * (theirs[pair][0] - mine[pair][0]) for pair in mine if pair in theirs]
     return float(np.median(leads)) if leads else None
 
@@ -241,7 +241,7 @@ def _deepest(contacts: Contacts) -> dict[tuple[Any, ...], tuple[float, NDArray[n
 
 
 def _passed(before: _Rows, rows: _Rows) -> bool:
-    """Whether a partner passed through: too deep, or the same features pushed the opposite way."""
+    """Whether a partner passed through: too deep, or with a reversed normal."""
     if any(depth >= inner for depth, inner, _ in rows.values()):
         return True
     return any(before[key][2] @ rows[key][2] < 0 for key in before.keys() & rows.keys())

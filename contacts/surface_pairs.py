@@ -1,4 +1,4 @@
-"""Meshes by their surface: pairs of a mesh with a mesh or a box, through :mod:`tauguard.rigid`."""
+"""Pairs of a mesh surface with a mesh or a box, tested by :mod:`tauguard.rigid`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -27,7 +27,7 @@ class SurfacePairs:
     """
 
     def __init__(self, model: Any, pairs: Sequence[tuple[int, int]]) -> None:
-        """Build one tree a geom, in its body's frame."""
+        """Build one tree per geom, in its body's frame."""
         self._pairs = list(pairs)
         self._body = model.geom_bodyid
         kinds = geom_kinds(model)
@@ -46,7 +46,7 @@ class SurfacePairs:
         }
 
     def check(self, before: State, after: State) -> Contacts:
-        """The first contact of each pair; where the surfaces meet at the start, its depth is 0."""
+        """The first contact of each pair; surfaces that intersect at the start have depth 0."""
         motions: dict[int, Motion] = {}
         rows = []
         for a, b in self._pairs:

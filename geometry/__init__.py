@@ -1,4 +1,4 @@
-"""What cloth and rigid share: exact signs, bounding volumes, thread pool, checked arrays."""
+"""Code that cloth and rigid share: exact signs, bounding volumes, thread pool, checked arrays."""
 
 from tauguard.geometry.arrays import finite, indices
 from tauguard.geometry.frozen import Rebuilt, frozen, frozen_finite, frozen_indices, sealed

@@ -1,4 +1,4 @@
-"""Conversion of arguments to the arrays that native kernels take, with checks."""
+"""Check arguments and convert them to the arrays that native kernels take."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

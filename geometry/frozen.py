@@ -1,4 +1,4 @@
-"""Arrays that nobody can change, for native kernels that keep what was checked."""
+"""Immutable arrays for native kernels, which keep arrays after they were checked."""
 
 from dataclasses import fields
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ def frozen(array: NDArray[_T]) -> NDArray[_T]:
 
 
 def sealed(array: NDArray[_T]) -> NDArray[_T]:
-    """A read-only view of an array that only the caller holds; no copy."""
+    """A read-only view, without a copy, of an array that only the caller holds."""
     array.setflags(write=False)
     return array[:]
 
@@ -27,14 +27,14 @@ def sealed(array: NDArray[_T]) -> NDArray[_T]:
 def frozen_finite(
     name: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
-    """As :func:`finite`, of a private copy, so that nothing can change it after the check."""
+    """As :func:`finite`, but a private copy, so that nothing can change it after the check."""
     return finite(name, frozen(finite(name, value, shape)), shape)
 
 
 def frozen_indices(
     name: str, value: ArrayLike, shape: tuple[int | None, ...], upper: int
 ) -> NDArray[np.int32]:
-    """As :func:`indices`, of a private copy, so that nothing can change it after the check."""
+    """As :func:`indices`, but a private copy, so that nothing can change it after the check."""
     return indices(name, frozen(indices(name, value, shape, upper)), shape, upper)
 
 
@@ -42,6 +42,6 @@ class Rebuilt:
     """Mixin of frozen dataclasses: a copy or an unpickled value passes the constructor's checks."""
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        """The class and its arguments, in their order."""
+        """The class and the arguments of its constructor."""
         given = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
         return type(self), given

@@ -8,7 +8,7 @@ MOST_THREADS = 1024
 
 
 def thread_count(threads: int) -> int:
-    """``threads`` with 0 as all processors.
+    """The number of threads; 0 stands for all processors.
 
     Raises:
         ValueError: no integer, negative, or more than 1024.

@@ -1,6 +1,6 @@
-"""Recordings in a browser: a server of their folder on 127.0.0.1, and rerun's own web viewer.
+"""Show recordings in a browser: a server of their folder on 127.0.0.1, and rerun's web viewer.
 
-The viewer comes with the rerun SDK, so it reads what this SDK has written. Nothing is fetched from
+The viewer is part of the rerun SDK, so it can read the SDK's files. Nothing is fetched from
 other hosts.
 """
 
@@ -25,8 +25,8 @@ from urllib.parse import quote, unquote
 HOST, PATIENCE = "127.0.0.1", 20.0
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
-#: Content policy: whoever wrote a page, it runs no script, which could lead to another host with
-#: what it read, and loads from and sends to no other host. Our own script is for opened files only.
+#: Content policy: a page runs no script, which could send its content to another host,
+#: and connects to no other host. Our own script runs only in pages opened as files.
 POLICY = (
     "default-src 'self' data:; script-src 'none'; style-src 'unsafe-inline'; form-action 'none'; "
     "base-uri 'none'"
@@ -40,11 +40,11 @@ class BrowserReplay:
         """Start both servers.
 
         Args:
-            folder: of ``.rrd`` files, and of an ``index.html`` that links to ``open/NAME.rrd``.
-            port: of the folder; 0 for a free one.
+            folder: holds ``.rrd`` files, and an ``index.html`` that links to ``open/NAME.rrd``.
+            port: port of the folder's server; 0 for a free one.
 
         Raises:
-            OSError: the port is taken, or the viewer did not come up.
+            OSError: the port is in use, or the viewer did not start.
         """
         handler = partial(_Folder, directory=str(folder))
         try:
@@ -89,13 +89,13 @@ class BrowserReplay:
 
 
 class _Server(http.server.ThreadingHTTPServer):
-    """The folder's server, which knows where the viewer is."""
+    """The folder's server, which knows the viewer's address."""
 
     daemon_threads = True
     viewer = address = ""
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that closes the connection early is not an error."""
+        """Ignore the error of a browser that closes the connection early."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -106,7 +106,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        """A file of the folder, the page, or a redirection to the viewer."""
+        """Send a file of the folder, the page, or a redirection to the viewer."""
         path = unquote(self.path.partition("?")[0])
         if not self._addressed():
             self.send_error(http.HTTPStatus.MISDIRECTED_REQUEST)
@@ -122,14 +122,14 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     def _addressed(self) -> bool:
         """Whether the request names this server as its host.
 
-        Otherwise a page of another host, whose name was pointed at 127.0.0.1 after it was loaded
+        Otherwise a page of another host, whose name was redirected to 127.0.0.1 after loading
         (DNS rebinding), could read the folder.
         """
         port = self.server.server_address[1]
         return self.headers.get_all("Host") in ([f"{HOST}:{port}"], [f"localhost:{port}"])
 
     def _own_file(self) -> bool:
-        """Whether the path is a regular file inside the folder and not reached through a link."""
+        """Whether the path is a regular file inside the folder, not behind a symbolic link."""
         file, folder = Path(self.translate_path(self.path)), Path(self.directory)
         if self.path.partition("?")[0] == "/":  # other names of the folder would be redirected
             file = folder / "index.html"
@@ -139,26 +139,26 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
         return file.is_file() and not any(part.is_symlink() for part in below)
 
     def do_HEAD(self) -> None:
-        """Heads alone are not served."""
+        """Refuse HEAD requests."""
         self.send_error(http.HTTPStatus.METHOD_NOT_ALLOWED)
 
     def list_directory(self, path: str | os.PathLike[str]) -> None:
-        """No folder is listed."""
+        """Refuse to list a folder."""
         self.send_error(http.HTTPStatus.NOT_FOUND)
 
     def end_headers(self) -> None:
-        """The viewer, and no other page, may read the files."""
+        """Allow the viewer, and no other page, to read the files."""
         self.send_header("Access-Control-Allow-Origin", self.server.viewer)
         self.send_header("Content-Security-Policy", POLICY)
         self.send_header("X-Content-Type-Options", "nosniff")
         super().end_headers()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Requests are not logged."""
+        """Do not log requests."""
 
 
 def _viewed(viewer: str, files: str, name: str) -> str:
-    """The viewer's address with a recording; WebGL draws it, since every browser has that."""
+    """The viewer's address with a recording, drawn by WebGL, which every browser supports."""
     return f"{viewer}/?url={quote(f'{files}/{quote(name)}', safe='')}&renderer=webgl"
 
 
@@ -174,7 +174,7 @@ def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
     program = Path(sys.executable).with_name("rerun")
     options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"{files}/none.rrd"]
     quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}
-    # `rerun` is a script that starts the program: as a group of their own both can be ended.
+    # `rerun` is a script that starts the program. In one process group both can be ended.
     viewer = subprocess.Popen(
         [program, *options], env=quiet, stdout=subprocess.DEVNULL, start_new_session=True
     )

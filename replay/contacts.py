@@ -1,4 +1,4 @@
-"""A run of any MuJoCo scene with the contacts that checkers saw in it, as a rerun recording."""
+"""Write a run of a MuJoCo scene with the contacts that checkers reported as a rerun recording."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -38,11 +38,11 @@ def write_contacts_rrd(
     Args:
         path: The ``.rrd`` file; written atomically.
         model: ``mujoco.MjModel``.
-        t: Rising [s]. Shape (T,).
-        positions: Of the bodies. Shape (T, nbody, 3), m.
-        rotations: Shape (T, nbody, 3, 3).
-        vertices: Of the flexes. Shape (T, nflexvert, 3), m.
-        marks: By checker, its contacts.
+        t: Times, rising [s]. Shape (T,).
+        positions: Positions of the bodies. Shape (T, nbody, 3), m.
+        rotations: Rotation matrices of the bodies. Shape (T, nbody, 3, 3).
+        vertices: Vertices of the flexes. Shape (T, nflexvert, 3), m.
+        marks: The contacts of each checker, by name.
         notes: Times [s] and texts, such as disagreements.
 
     Raises:
@@ -87,7 +87,7 @@ def write_contacts_rrd(
 def _eye(
     marks: Mapping[str, Marks], positions: Array, vertices: Array | None
 ) -> rrb.EyeControls3D | None:
-    """A viewing direction across the mean normal of the contacts: it shows both partners."""
+    """A viewing direction across the mean contact normal, which shows both partners."""
     known = [np.isfinite(seen[1]).all(axis=1) for seen in marks.values()]
     points = [seen[1][rows] for seen, rows in zip(marks.values(), known, strict=True)]
     normals = [seen[2][rows] for seen, rows in zip(marks.values(), known, strict=True)]
@@ -96,7 +96,7 @@ def _eye(
     target = np.median(np.concatenate(points), axis=0)
     normal = np.nan_to_num(np.concatenate(normals)).mean(axis=0)
     across = np.array([normal[1], -normal[0], 0.0])
-    if np.linalg.norm(across) < 0.1:  # a floor: from anywhere
+    if np.linalg.norm(across) < 0.1:  # a floor: any direction will do
         across = np.array([1.0, 0.0, 0.0])
     moving = positions[:, 1:] if vertices is None else vertices
     spread = moving.max(axis=(0, 1)) - moving.min(axis=(0, 1)) if moving.size else np.ones(3)
@@ -106,7 +106,7 @@ def _eye(
 
 
 def _blueprint(eye: rrb.EyeControls3D | None) -> rrb.Blueprint:
-    """The layout: scene, number of contacts by checker, and where the checkers disagree."""
+    """The layout: scene, number of contacts by checker, and disagreements."""
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(origin="/", name="scene", eye_controls=eye),

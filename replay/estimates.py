@@ -1,4 +1,4 @@
-"""Arrows that show a viewer a force, and the contact estimated after each alarm."""
+"""Arrows for forces, and for the contact that is estimated after each alarm."""
 
 from __future__ import annotations
 

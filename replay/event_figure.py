@@ -1,4 +1,4 @@
-"""A picture of ten seconds: the score with its threshold, and how fast the arm moved."""
+"""A figure of ten seconds: the score with its threshold, and the arm's speed."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ CROWDED = 8.0
 
 
 def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, title: str) -> None:
-    """Draw a stretch of a recording as PNG; the file is written atomically.
+    """Draw a part of a recording as PNG; the file is written atomically.
 
     Args:
         path: path of the picture.
-        trace: the stretch, with its truth.
-        detection: detection of that stretch.
+        trace: the part, with its truth.
+        detection: detection of that part.
         held: the score that was reached during the whole confirmation time, shape (T,) of that
             stretch. It is an alarm if it exceeds the threshold.
         title: title of the picture.
@@ -62,7 +62,7 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
 
 
 def _spread(axes: Any, detection: Detection) -> None:
-    """Use a logarithmic scale above the usual scores, if peaks would hide the threshold."""
+    """Use a logarithmic scale above usual scores if peaks would hide the threshold."""
     import numpy as np
 
     scores, edge = detection.score[np.isfinite(detection.score)], abs(detection.threshold)
@@ -75,7 +75,7 @@ def _spread(axes: Any, detection: Detection) -> None:
 
 
 def _drawn(values: Array) -> Array:
-    """Nothing is drawn where a detector has not settled."""
+    """Values with gaps for the time in which the detector settles."""
     import numpy as np
 
     return np.where(np.isfinite(values), values, np.nan)

@@ -1,4 +1,4 @@
-"""The page of wrong detections: a row and a picture of each, and what the words mean."""
+"""The page of wrong detections: a row and a picture of each, and definitions."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _figure(row: Mapping[str, Any]) -> str:
 
 
 def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
-    """What each word of the page means, as an HTML table.
+    """Definitions of the page's terms, as an HTML table.
 
     Args:
         late: a collision found later than this is late [s].

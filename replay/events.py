@@ -1,4 +1,4 @@
-"""The mistakes of a detector: recordings of ten seconds, and a page that opens them."""
+"""The errors of a detector: recordings of ten seconds, and a page that opens them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tauguard.detectors import CollisionAlarm, Matching
     from tauguard.traces import Alarm, Collision, Detection, Trace
 
-#: A recording begins this long before its event and lasts this long [s].
+#: Time of a recording before its event, and its length [s].
 BEFORE, LENGTH = 0.5, 10.0
 #: At most this many recordings are written for each kind of event.
 MOST = 100
@@ -31,7 +31,7 @@ def command_to_open(folder: Path) -> str:
 
 @dataclass(frozen=True)
 class Event:
-    """One mistake of a detector."""
+    """One error of a detector: a missed or late collision, or a false alarm."""
 
     kind: str  #: one of :data:`KINDS`
     at: float  #: onset of the collision, or start of the alarm [s]
@@ -40,11 +40,11 @@ class Event:
     link: int | None = None
     peak_torque: float | None = None  #: [N m]
     delay: float | None = None  #: [s]
-    note: str = ""  #: what else is worth knowing
+    note: str = ""  #: further information
 
     @property
     def text(self) -> str:
-        """All of it in one line."""
+        """The event in one line."""
         if self.link is None:
             what = f"False alarm at {self.at:.2f} s"
         else:
@@ -55,7 +55,7 @@ class Event:
 
 
 def events_of(matching: Matching, late: float) -> Iterator[Event]:
-    """Missed collisions, those found later than ``late`` [s], and false alarms, in this order."""
+    """Missed collisions, those found later than ``late`` [s], and false alarms, in order."""
     from tauguard.detectors.events import detection_window
 
     pairs = list(zip(matching.collisions, matching.delays, strict=True))
@@ -74,13 +74,13 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
 
 
 def _before(alarm: Alarm, collision: Collision) -> str:
-    """The alarm's start [s] as text, with enough digits that it reads earlier than the contact."""
+    """The alarm's start [s] as text, with enough digits to be before the contact."""
     text = f"{alarm.start:.2f}"
     return text if text != f"{collision.onset:.2f}" else f"{alarm.start:.3f}"
 
 
 def _covers(alarm: Alarm, collision: Collision) -> bool:
-    """Whether the alarm was already up when the contact began: it then detects nothing."""
+    """Whether the alarm was already on when the contact began; it then detects nothing."""
     return alarm.start < collision.onset <= alarm.end
 
 
@@ -93,7 +93,7 @@ class EventFolder:
         Args:
             folder: new, or one that this has written before.
             late: collisions found later than this are events [s].
-            alarm: the detector; without it the score counts sample by sample.
+            alarm: the detector; without it each sample's score is used alone.
 
         Raises:
             ValueError: the folder holds something else.
@@ -109,7 +109,7 @@ class EventFolder:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row for every recording: what happened, and its name as ``file``."""
+        """A row for every recording: its event, and its name as ``file``."""
         return self._rows
 
     @property
@@ -122,7 +122,7 @@ class EventFolder:
         )
 
     def add(self, name: str, matching: Matching, of: tuple[Trace, Detection]) -> None:
-        """Add the events of one recording. ``name`` tells a reader which recording it is."""
+        """Add the events of one recording, which ``name`` identifies for a reader."""
         from tauguard.replay.event_page import row_of
 
         trace, detection = of
@@ -164,7 +164,7 @@ class EventFolder:
         draw_event(file.with_suffix(".png"), part, found, shown, f"{event.text}\n{known}")
 
     def finish(self) -> Path:
-        """Write the page; its path."""
+        """Write the page; returns its path."""
         from tauguard.atomic_write import write_atomic
         from tauguard.replay.event_page import OFFLINE, definitions, events_html
         from tauguard.report.page import page
@@ -189,5 +189,5 @@ class EventFolder:
 
 
 def _own(path: Path) -> bool:
-    """Whether this command writes files of that name."""
+    """Whether this class writes files of that name."""
     return path.name == "index.html" or bool(OWN.fullmatch(path.name))

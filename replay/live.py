@@ -1,4 +1,4 @@
-"""A running simulation, shown in the rerun viewer or written to a file while it runs."""
+"""Show a running simulation in the rerun viewer, or write it to a file while it runs."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class LiveView:
         self._recording.log(origin, rr.Scalars(np.asarray(values, dtype=float).ravel()))
 
     def close(self) -> None:
-        """Send what is left; the viewer stays open."""
+        """Send the remaining data; the viewer stays open."""
         self._recording.flush()
         self._recording.disconnect()
 

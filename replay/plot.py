@@ -1,4 +1,4 @@
-"""A figure of a recording: currents, contact torques, and the detector's output."""
+"""Plot a recording: currents, contact torques, and the detector's output."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def plot(trace: Trace, detection: Detection | None = None) -> Figure:
     """The recording as a matplotlib figure; collisions are shaded, alarms are lines.
 
     Args:
-        trace: what was recorded.
-        detection: what a detector said about it.
+        trace: the recording.
+        detection: a detector's output for it.
 
     Raises:
         ValueError: a detection of another recording.

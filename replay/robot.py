@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 
 LARGEST_SHOWN_GROUP = 2  # in MuJoCo's viewer and the menagerie, group 3 holds collision geoms
-STICK_RADIUS = 0.02  # [m] of the lines that stand for links without geometry
+STICK_RADIUS = 0.02  # [m] radius of the capsules in place of links without geometry
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Shape:
     position: Array  #: [m], shape (3,)
     quat_wxyz: Array  #: shape (4,)
     rgba: Array  #: in [0, 1], shape (4,)
-    vertices: NDArray[np.float32] | None = None  #: of a mesh [m], shape (V, 3)
-    normals: NDArray[np.float32] | None = None  #: one a vertex, shape (V, 3)
+    vertices: NDArray[np.float32] | None = None  #: vertices of a mesh [m], shape (V, 3)
+    normals: NDArray[np.float32] | None = None  #: one per vertex, shape (V, 3)
     triangles: NDArray[np.int32] | None = None  #: vertex indices, shape (F, 3)
 
 
@@ -34,12 +34,12 @@ class Body:
 
     name: str
     shapes: tuple[Shape, ...]
-    moves: bool  #: False for what is fixed to the world
+    moves: bool  #: False for a body fixed to the world
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Where bodies are: rows are samples, columns bodies."""
+    """Poses of bodies: rows are samples, columns bodies."""
 
     positions: Array  #: world [m], shape (T, bodies, 3)
     quats_wxyz: Array  #: world, shape (T, bodies, 4)
@@ -86,7 +86,7 @@ def load_model(source: Any) -> Any:
 
 
 def bodies(model: Any) -> list[Body]:
-    """Every body of the model that has shapes, the world first."""
+    """All bodies of the model with shapes, the world first."""
     found = []
     for index in range(model.nbody):
         body = model.body(index)
@@ -105,7 +105,7 @@ def bodies(model: Any) -> list[Body]:
 
 
 def shape(model: Any, geom: int) -> Shape | None:
-    """A geom as a shape; None if it is hidden, a plane or a height field."""
+    """Convert a geom to a shape; None if it is hidden, a plane or a height field."""
     import mujoco
 
     kinds = {
@@ -167,7 +167,7 @@ def sticks(model: Any, index: int) -> list[Shape]:
 def motion(model: Any, joint_names: Sequence[str], q: Array) -> Motion:
     """World poses of all bodies for joint positions ``q`` [rad], shape (T, n).
 
-    Joints of the model that are not in ``joint_names`` stay where the model puts them.
+    Joints of the model that are not in ``joint_names`` keep the model's initial position.
 
     Raises:
         ValueError: a joint that the model lacks, or that is not a hinge or a slide.

@@ -1,4 +1,4 @@
-"""A trace as a rerun recording (``.rrd``). Only this module and :mod:`.live` import rerun."""
+"""Write a trace as a rerun recording (``.rrd``). Only this module and :mod:`.live` import rerun."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ from tauguard.replay.story import cut, first_moment, page
 from tauguard.traces.trace import Detection, Trace
 
 TIMELINE = "time"
-FRAME_RATE = 60.0  # [Hz] of the moving bodies
-SERIES_RATE = 200.0  # [Hz] of the charts
+FRAME_RATE = 60.0  # [Hz] rate of body poses
+SERIES_RATE = 200.0  # [Hz] rate of charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
-SCORE_TOP = 8.0  # times the threshold: end of the chart of the score, so that both are visible
+SCORE_TOP = (
+    8.0  # upper end of the score's chart in multiples of the threshold, so that both are visible
+)
 NORMAL = 0.06  # [m], length of a checked contact's normal
 COLOURS = np.array(
     [
@@ -60,12 +62,12 @@ def write_rrd(
     Args:
         path: the ``.rrd`` file; written atomically.
         trace: what to show.
-        detection: what a detector said about it.
+        detection: a detector's output for it.
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
-        whole: keep what comes before the first detection.
+        whole: keep the part before the first detection.
         explained: the diagnosis of each alarm; contacts are drawn as blue arrows.
-        about: a line above the text that says why the recording is shown.
+        about: a line above the text with the reason for showing the recording.
 
     Raises:
         ValueError: no model, a model without the trace's joints, an empty trace.
@@ -113,7 +115,7 @@ def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
 
 
 def thin(t: Array, rate: float, most: int) -> NDArray[np.int64]:
-    """First rows of bins of 1/``rate`` s; bins are longer if there would be over ``most``."""
+    """First rows of bins of 1/``rate`` s; bins are longer if there would be more than ``most``."""
     span = max(t[-1] - t[0], 1e-9)
     rate = min(rate, most / span)
     bins = np.floor((t - t[0]) * rate + 1e-6).astype(np.int64)
@@ -128,17 +130,17 @@ def extremes(values: Array, starts: NDArray[np.int64]) -> Array:
 
 
 def times(t: Array) -> list[Any]:
-    """The one timeline: seconds of the trace."""
+    """The only timeline: seconds of the trace."""
     return [rr.TimeColumn(TIMELINE, duration=t)]
 
 
 def entity(*parts: str) -> str:
-    """An entity path of parts that may hold any character."""
+    """An entity path whose parts may contain any character."""
     return "/".join(rr.escape_entity_path_part(part) for part in parts)
 
 
 def seen(trace: Trace, shown: Sequence[Body], moved: Motion) -> tuple[Array, float]:
-    """Center [m] and radius [m] of the moving bodies without the obstacles."""
+    """Centre [m] and radius [m] of the moving bodies, without obstacles."""
     names = trace.truth.obstacle_names if trace.truth is not None else ()
     arm = [i for i, body in enumerate(shown) if body.moves and body.name not in names] or [0]
     corners = moved.positions[:, arm].reshape(-1, 3)
@@ -176,7 +178,7 @@ def log_scene(
 
 
 def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved: Motion) -> None:
-    """A body's pose: once if it is fixed, else at every frame."""
+    """Log a body's pose: once if it is fixed, otherwise at every frame."""
     positions, quats = moved.positions[:, index], np.roll(moved.quats_wxyz[:, index], -1, axis=1)
     if not body.moves or (np.ptp(positions, axis=0) + np.ptp(quats, axis=0)[:3] == 0).all():
         pose = rr.Transform3D(translation=positions[0], quaternion=quats[0])
@@ -187,7 +189,7 @@ def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved
 
 
 def drawn(piece: Shape) -> Any:
-    """A shape in rerun's terms."""
+    """Convert a shape to a rerun archetype."""
     quat = [np.roll(piece.quat_wxyz, -1)]
     colour = [np.round(255 * np.clip(piece.rgba, 0, 1)).astype(np.uint8)]
     common = {"quaternions": quat, "colors": colour, "fill_mode": "solid"}
@@ -284,7 +286,7 @@ def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) 
 
 
 def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:
-    """The charts: currents, velocities, residuals, score and threshold, force."""
+    """Log the charts: currents, velocities, residuals, score and threshold, force."""
     starts = thin(trace.t, SERIES_RATE, MOST_POINTS)
     when = times(trace.t[starts])
 
@@ -308,7 +310,7 @@ def log_series(recording: Any, trace: Trace, detection: Detection | None) -> Non
 
 
 def log_states(recording: Any, trace: Trace, detection: Detection | None) -> None:
-    """Two lanes: the true contacts, and when the alarm was up."""
+    """Log two lanes: true contacts and alarms."""
     if trace.truth is not None:
         spans = [(c.onset, c.end, c.kind) for c in trace.truth.collisions]
         log_lane(recording, "states/truth", "free", spans, trace.t)
@@ -320,7 +322,7 @@ def log_states(recording: Any, trace: Trace, detection: Detection | None) -> Non
 def log_lane(
     recording: Any, place: str, rest: str, spans: list[tuple[float, float, str]], t: Array
 ) -> None:
-    """One lane of a state timeline: ``rest`` between the spans."""
+    """Log one lane of a state timeline: ``rest`` is the state between the spans."""
     first = float(t[0])
     changes = {first: rest}
     for start, end, name in sorted(spans):

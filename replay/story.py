@@ -18,14 +18,14 @@ def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
     onset = collision.onset
     last = collision.end if collision.kind == "clamp" else onset + ALARM_WINDOW
     if any(a.start < onset <= a.end for a in alarms):
-        return None  # it was up before, so it detects nothing
+        return None  # the alarm was on before, so it detects nothing
     return next((a for a in alarms if onset <= a.start <= last), None)
 
 
 def first_moment(trace: Trace, detection: Detection | None) -> float:
-    """Where to begin [s]: at the first alarm of a detected collision, else at the first sample.
+    """First time to show [s]: the first alarm of a detected collision, or else the first sample.
 
-    If the alarm comes after the collision's end, begin at that end, because the body that was hit
+    If the alarm starts after the collision's end, begin at that end, because the body that was hit
     is visible there.
     """
     if trace.truth is None or detection is None:
@@ -66,7 +66,7 @@ def cut(
 def page(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = (), about: str = ""
 ) -> str:
-    """The text beside the pictures, in Markdown: what happened, then how to read them."""
+    """The text beside the views, in Markdown: the events, then an explanation of the views."""
     lines = [f"## {about}", ""] if about else []
     if trace.truth is not None:
         lines += collision_table(trace, detection, explained)
@@ -105,7 +105,7 @@ def page(
 def collision_table(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()
 ) -> list[str]:
-    """Markdown rows of the collisions and when each was detected."""
+    """Markdown rows of the collisions and their detection times."""
     assert trace.truth is not None
     found = detection.alarms if detection is not None else ()
     rows = sorted(trace.truth.collisions, key=lambda c: c.onset)

@@ -1,4 +1,4 @@
-"""A simulated recording as frames, and frames as a file."""
+"""Render a simulated recording to frames, and write frames to a file."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tauguard.extras import extra
 from tauguard.replay.estimates import arrow
 from tauguard.traces import TARGETS, Trace
 
-#: Endings that Pillow writes, which comes with Matplotlib.
+#: File extensions that Pillow writes (Matplotlib installs it).
 PILLOW = (".gif", ".webp", ".png")
 #: Where the camera stands: azimuth and elevation [deg], distance in units of the arm's size.
 VIEW = (140.0, -18.0, 2.0)
-#: Of people and arms it is this far, in units of the diagonal of what they fill.
+#: Its distance from people and arms, in units of the diagonal of their bounding box.
 AROUND = 1.6
 
 
@@ -36,15 +36,15 @@ def frames(
     They show targets as balls, and an arrow for the strongest contact since the last picture.
 
     Args:
-        trace: as :func:`tauguard.traces.read_mcap` gives it.
-        start: start of what is drawn [s].
-        seconds: how much is drawn; None: to the end.
-        rate: pictures for each second of the recording.
+        trace: as returned by :func:`tauguard.traces.read_mcap`.
+        start: start of the drawn part [s].
+        seconds: length of the drawn part [s]; None: to the end.
+        rate: frames per second of the recording.
         size: height and width [px].
         view: the camera's azimuth and elevation [deg], and distance in units of the arm's size.
 
     Raises:
-        ValueError: no scene in it, or nothing in that time.
+        ValueError: the recording holds no scene, or no samples in that time.
         RuntimeError: no OpenGL; one line that says what to change.
     """
     import mujoco
@@ -81,14 +81,14 @@ def frames(
 
 
 def _stage(trace: Trace, row: int) -> Any:
-    """The recording's scene on a floor below everything that it shows."""
+    """The recording's scene on a floor below all its bodies."""
     import mujoco
 
     from tauguard.models.picture import FLOOR_HEIGHT, staged
     from tauguard.replay.robot import load_model
 
     text = trace.attachments["scene.xml"]
-    model = load_model(text)  # refuses what MuJoCo does not survive
+    model = load_model(text)  # refuses models that crash MuJoCo
     data = mujoco.MjData(model)
     _placer(model, data, trace)(row)
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
@@ -103,13 +103,13 @@ def _stage(trace: Trace, row: int) -> Any:
 
 
 def _people(model: Any, data: Any) -> Array:
-    """Where the capsules of people are [m], shape (k, 3)."""
+    """Positions of the capsules of people [m], shape (k, 3)."""
     named = [g for g in range(model.ngeom) if model.geom(g).name.startswith("person")]
     return np.array(data.geom_xpos[named])
 
 
 def _look(camera: Any, links: Array, people: Array, view: tuple[float, float, float]) -> None:
-    """At the links' middle; where there are people, so far away that all of them are seen."""
+    """A camera that looks at the middle of the links, and is far enough away to show all people."""
     spread = float(np.linalg.norm(np.ptp(links, axis=0)))
     camera.lookat[:] = links.mean(axis=0)
     camera.azimuth, camera.elevation, distance = view
@@ -121,13 +121,13 @@ def _look(camera: Any, links: Array, people: Array, view: tuple[float, float, fl
 
 
 def _targets(trace: Trace, t: float) -> Any:
-    """Where the targets were at a time [m], shape (arms, 3); none in other recordings."""
+    """Positions of the targets at a time [m], shape (arms, 3); None without targets."""
     rows = json.loads(trace.attachments.get(TARGETS, "[]"))
     return next((places for begin, places in reversed(rows) if begin <= t), np.zeros((0, 3)))
 
 
 def _contact(trace: Trace, last: int, row: int) -> Iterator[tuple[Array, Array]]:
-    """Point [m] and force [N] of the strongest contact after one row until another."""
+    """Point [m] and force [N] of the strongest contact between two rows."""
     if trace.truth is None:
         return
     some = slice(min(last + 1, row), row + 1)
@@ -138,7 +138,7 @@ def _contact(trace: Trace, last: int, row: int) -> Iterator[tuple[Array, Array]]
 
 
 def _placer(model: Any, data: Any, trace: Trace) -> Any:
-    """What puts the arm and the obstacles where a row of the recording has them."""
+    """A function that sets arm and obstacles to the poses of a row of the recording."""
     import mujoco
 
     joints = [int(model.joint(name).qposadr[0]) for name in trace.joint_names]

@@ -1,4 +1,4 @@
-"""From contacts in single steps to events, and which events a checker saw."""
+"""Join contacts of single steps to events, and find the events that a checker reported."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
 
-#: Shorter gaps than this between touching steps are part of one event, and never less than two
+#: Shorter pauses than this between touching steps are part of one event, and never less than two
 #: steps [s].
 GAP = 5e-3
 
@@ -16,16 +16,16 @@ Pair = tuple[tuple[str, int], tuple[str, int]]
 
 @dataclass(frozen=True)
 class Event:
-    """One contact of two partners, from touch to parting."""
+    """One contact of two partners, from touch to separation."""
 
     pair: Pair
     onset: float  #: first touch [s]
     end: float  #: end of the last step in which they touch [s]
-    depth: float  #: largest seen [m]
-    counts: bool  #: False: don't-care throughout
+    depth: float  #: largest penetration depth [m]
+    counts: bool  #: False: never deeper than the tolerance, so not scored
 
     def seen(self, times: Sequence[float], timestep: float) -> bool:
-        """Whether a checker's ``times`` [s] contain one in the event or within a step of it."""
+        """Whether one of a checker's ``times`` [s] is in the event or within a step of it."""
         return any(self.onset - timestep <= t <= self.end + timestep for t in times)
 
 

@@ -23,10 +23,10 @@ class Step:
     origin: Array  #: the body's origin at s = 0, for each geom, shape (ngeom, 3) [m]
     shift: Array  #: dx, shape (ngeom, 3) [m]
     turn: Array  #: w in the world frame, shape (ngeom, 3) [rad]
-    arm: Array  #: from the body's origin to the geom's centre at s = 0, shape (ngeom, 3) [m]
+    arm: Array  #: vector from the body's origin to the geom's centre at s = 0, shape (ngeom, 3) [m]
     xmat: Array  #: the geom's rotation at s = 0, shape (ngeom, 3, 3)
     vertices: Array  #: flex vertices at s = 0, shape (V, 3) [m]
-    travel: Array  #: and how far they move, shape (V, 3) [m]
+    travel: Array  #: displacement of flex vertices, shape (V, 3) [m]
 
     @classmethod
     def between(cls, model: Any, before: State, after: State) -> Step:
@@ -58,6 +58,6 @@ class Step:
         return center, turn.as_matrix() @ self.xmat[geoms]
 
     def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
-        """How far rotation can move points of ``geoms`` within ``radius`` (K,) of the centre."""
+        """Bound of the motion by rotation of points within ``radius`` (K,) of the centre."""
         spin = np.linalg.norm(self.turn[geoms], axis=1)
         return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))

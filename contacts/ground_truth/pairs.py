@@ -1,4 +1,4 @@
-"""Which geoms and flexes may touch by MuJoCo's rules: a second, independent implementation."""
+"""The pairs that may touch by MuJoCo's rules: a second, independent implementation."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def geom_pairs(model: Any) -> Index:
 
 
 def meet(contype: Any, conaffinity: Any, i: int, j: int) -> bool:
-    """Whether the collision bits of two geoms let them touch."""
+    """Whether the collision bits of two geoms allow contacts."""
     return bool(contype[i] & conaffinity[j] or contype[j] & conaffinity[i])
 
 

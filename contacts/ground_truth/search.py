@@ -1,9 +1,9 @@
-"""First contact and depth along a path, from a distance and a bound on its change alone.
+"""Find first contact and depth along a path, given a distance and a bound on its change.
 
 A signed distance d(s) between two things whose points move by at most L relative to one another
 over the step obeys |d(s) - d(t)| <= L |s - t|. Hence d has no zero in [a, b] while
 d(a) + d(b) > L (b - a): intervals are halved until each is cleared, known to be deep, or shorter
-than the resolution (Piyavskii 1972; the same bound moves a conservative advancement on). Samples
+than the resolution (Piyavskii 1972; conservative advancement uses the same bound). Samples
 alone would prove nothing about the times between them.
 """
 
@@ -24,10 +24,8 @@ Distance = Callable[[NDArray[Any], Array], Array]
 class Found:
     """The result of a search for each pair; every field has shape (N,)."""
 
-    time: (
-        Array  #: of the first touch, fraction of the step, late by less than resolution / L; or inf
-    )
-    depth: Array  #: largest depth seen [m]; 0 where none
+    time: Array  #: first touch, fraction of the step, late by less than resolution / L; or inf
+    depth: Array  #: largest depth found [m]; 0 without penetration
     near: NDArray[np.bool_]  #: closer to contact than the resolution, and not known to be deep
 
 
@@ -37,10 +35,10 @@ def search(
     """Find the first touch of each pair and whether any is deeper than ``tolerance``.
 
     Args:
-        distance: of pairs at given times.
-        bound: L of each pair [m], shape (N,).
+        distance: function that gives the distances of pairs at given times.
+        bound: bound L of each pair [m], shape (N,).
         tolerance: depth above which a pair counts [m]; the search stops looking for more.
-        resolution: distances below it are not told apart from touching [m].
+        resolution: smaller distances count as touching [m].
     """
     n = len(bound)
     rows = np.arange(n)
@@ -67,7 +65,7 @@ def search(
         np.minimum.at(first, rows[short], b[short])
         keep = open_ & ~short
         rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
-        # Both ends are clear for d / L: split at the middle of the remaining interval.
+        # Both ends are free of contact over d / L: split the remaining interval in the middle.
         low = a + np.maximum(da, 0) / bound[rows]
         high = np.maximum(b - np.maximum(db, 0) / bound[rows], low)
         middle = np.clip((low + high) / 2, a + 0.05 * (b - a), b - 0.05 * (b - a))
@@ -81,7 +79,7 @@ def search(
 
 
 def _polish(distance: Distance, first: Array, bound: Array, resolution: float) -> None:
-    """Bisect the last stretch before each first touch, in place."""
+    """Bisect the last interval before each first touch, in place."""
     rows = np.flatnonzero(np.isfinite(first) & (first > 0))
     high = first[rows]
     low = np.maximum(high - 2 * resolution / bound[rows], 0.0)

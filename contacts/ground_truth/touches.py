@@ -1,4 +1,4 @@
-"""Which pairs touch on the path that checkers get, and when."""
+"""Find the pairs that touch on the checkers' path, and the times."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from tauguard.contacts.ground_truth.motion import Step
 from tauguard.contacts.ground_truth.pairs import Index, flex_geoms, geom_pairs
 from tauguard.contacts.ground_truth.search import Found, search
 
-#: A pair that is never deeper than this is not scored, whether reported or not [m].
+#: A pair that never penetrates deeper than this is not scored [m].
 TOLERANCE = 1e-5
 #: Kinds of geoms that a flex may meet here.
 FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
@@ -23,14 +23,14 @@ FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mes
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """Pairs that touch within one step, one a row.
+    """Pairs that touch within one step, one per row.
 
     Attributes:
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
-        time: Of the first touch, as a fraction of the step. Shape (K,).
+        time: Time of the first touch, as a fraction of the step. Shape (K,).
         depth: Largest depth found; the search for depth ends above the tolerance. Shape (K,), m.
-        counts: False: not scored, as it is never deeper than :data:`TOLERANCE`. Shape (K,).
+        counts: False: not scored, because the depth never exceeds :data:`TOLERANCE`. Shape (K,).
     """
 
     geom: Index
@@ -48,8 +48,8 @@ class GroundTruth:
 
     Rigid pairs by ``mj_geomDistance`` at poses in between, flex elements (triangles of thickness
     2 ``flex_radius``) in closed form against spheres, capsules and planes, by coal's GJK against
-    other convex geoms. Margins do not count: a pair touches where its surfaces do. It is slow and
-    shares no code with the checkers.
+    other convex geoms. Margins are ignored: a pair touches if its surfaces do. This code is slow
+    and shares no code with the checkers.
 
     Args:
         model: the scene's.
@@ -60,7 +60,7 @@ class GroundTruth:
     """
 
     def __init__(self, model: Any) -> None:
-        """Note the pairs and each geom's size about its centre."""
+        """Find the pairs, and each geom's radius about its centre."""
         self.model = model
         self._data = mujoco.MjData(model)
         kinds = geom_kinds(model)
@@ -142,7 +142,7 @@ class GroundTruth:
         return out
 
     def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
-        """The row of a flex and a geom: time of the first element that touches, largest depth."""
+        """The row of a flex and a geom: time of an element's first touch, and largest depth."""
         model = self.model
         begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
         elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)

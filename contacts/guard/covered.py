@@ -14,23 +14,23 @@ from tauguard.contacts.guard.report import Pair, Partner
 from tauguard.contacts.guard.tunnelling import elements
 from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
 
-#: Layers eroded from both partners, as fractions of half their thickness. Where the eroded shapes
+#: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes
 #: of the last level never meet, the pair cannot have passed through itself anywhere.
 LEVELS = (0.0, 0.5, 0.75, 0.95)
-#: Of geoms against flexes there is one more level, no deeper than this many radii of the flex:
+#: Geoms against flexes have one more level, no deeper than this many radii of the flex:
 #: MuJoCo pushes a cloth's triangles out of a geom each by its own shortest way.
 NEAR_FLEX = 4.0
 
-#: Numbers in the native module of what carries the parameters of a contact.
+#: Native numbers of the carriers of contact parameters.
 _PLACES = {"pair": 0, "geom": 1, "flex": 2}
 
 
 class Covered:
-    """Gives a native guard its pairs.
+    """Chooses the pairs and shapes of a native guard.
 
     Attributes:
-        pairs: Those that are covered, by their numbers; flexes against flexes last.
-        sheets: Of flexes against flexes, by their ids.
+        pairs: Covered pairs, by their numbers; flexes against flexes come last.
+        sheets: Covered pairs of flexes, by their ids.
         uncovered: Pairs that may touch and are not covered.
 
     Args:

@@ -1,4 +1,4 @@
-"""Energy and momentum of a scene, before and after."""
+"""Energy and momentum of a scene before and after a step."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +21,7 @@ class EnergyBalance:
 
 
 class EnergyMeter:
-    """Computes :class:`EnergyBalance` on data of its own.
+    """Computes :class:`EnergyBalance` with its own MjData.
 
     Args:
         model: the scene's.
@@ -33,7 +33,7 @@ class EnergyMeter:
         self._sheets = sheets_of(model)
 
     def between(self, first: Array, last: Array) -> EnergyBalance:
-        """From one state (``mjSTATE_INTEGRATION``) to another."""
+        """The balance between two states (``mjSTATE_INTEGRATION``)."""
         rows = [self._read(state) for state in (first, last)]
         return EnergyBalance(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]))
 
@@ -50,7 +50,7 @@ class EnergyMeter:
 
 
 def sheets_of(model: Any) -> list[Sheet]:
-    """The elastic flexes of triangles, whose stretch energy MuJoCo leaves out."""
+    """The elastic flexes of triangles, whose stretch energy MuJoCo does not count."""
     return [
         _sheet(model, flex)
         for flex in range(model.nflex)

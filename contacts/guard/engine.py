@@ -33,22 +33,22 @@ FUNCTIONS = (
     "mj_mulJacVec",
     "mj_jacBodyCom",
     "mj_integratePos",
-    "_mjPRIVATE_setTlsLogHandler",  # the way of the Python binding: errors become exceptions
+    "_mjPRIVATE_setTlsLogHandler",  # as in the Python binding: errors become exceptions
     "_mjPRIVATE_getGlobalLogHandler",
 )
-#: Flags of features whose state or distances a guarded step cannot take back.
+#: Flags of features whose state or distances a guarded step cannot roll back.
 REFUSED = {
     "ipc": mujoco.mjtEnableBit.mjENBL_IPC,
     "speculative": mujoco.mjtEnableBit.mjENBL_SPECULATIVE,
     "sleep": mujoco.mjtEnableBit.mjENBL_SLEEP,
 }
-#: Parts of the state that kinematics follow from.
+#: Parts of the state that determine the kinematics.
 POSE = int(
     mujoco.mjtState.mjSTATE_QPOS
     | mujoco.mjtState.mjSTATE_MOCAP_POS
     | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 )
-#: All that a step depends on.
+#: Parts of the state that determine a step.
 INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 _MODEL_ARRAYS = (
@@ -95,16 +95,16 @@ _TYPES = {
 
 
 def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
-    """Everything that the native guard reads and calls, by name.
+    """Addresses of all fields and functions that the native guard uses, by name.
 
     Args:
         model: MjModel.
-        data: MjData that is stepped.
+        data: the MjData to step.
         end: another MjData of the model.
-        other: one more; ``end`` will do where there are no mocap bodies.
+        other: a third MjData; without mocap bodies it may be ``end``.
 
     Raises:
-        RuntimeError: the installed MuJoCo lays out its structs otherwise than it declares.
+        RuntimeError: the structs of the installed MuJoCo differ from their declared layout.
     """
     out = {name: function_address(name) for name in FUNCTIONS}
     out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
@@ -151,7 +151,7 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
 
 
 def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
-    """Fields that the binding shows are where the layout says."""
+    """Check the layout against the fields that the binding exposes."""
     same = (
         ctypes.c_double.from_address(found["timestep"]).value == model.opt.timestep,
         ctypes.c_int.from_address(found["cone"]).value == model.opt.cone,
@@ -172,7 +172,7 @@ def _array(owner: Any, name: str) -> int:
 
 
 def _structs() -> Any:
-    """MuJoCo's declarations by the name of the struct; their import takes long."""
+    """MuJoCo's declarations by the name of the struct (a slow import)."""
     from mujoco.introspect.structs import STRUCTS
 
     return STRUCTS

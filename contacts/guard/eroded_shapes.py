@@ -1,4 +1,4 @@
-"""Geoms without a layer of their surface, as shapes of the native kernel."""
+"""Geoms eroded by a layer of their surface, as shapes of the native kernel."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ _NONE = np.zeros((0, 3))
 
 
 class ErodedShapes:
-    """The shapes of a model's geoms at any depth, added to a native guard once each.
+    """The shapes of a model's geoms at any depth; each is added to a native guard once.
 
     Args:
         model: MjModel.
         kinds: The kind of each geom.
-        guard: Where shapes are added.
+        guard: The native guard that receives the shapes.
     """
 
     def __init__(self, model: Any, kinds: list[str], guard: Guard) -> None:
-        """Nothing is added yet."""
+        """Start without shapes."""
         self._model, self._kinds, self._guard = model, kinds, guard
         self._hulls: dict[int, _Hull] = {}
         self._added: dict[tuple[int, float], int] = {}
 
     def radius(self, geom: int) -> float:
-        """Half the least thickness of a geom [m]; 0 for a plane, whose surface is its middle."""
+        """Half the smallest thickness of a geom [m]; 0 for a plane."""
         size, kind = self._model.geom_size[geom], self._kinds[geom]
         if kind in ("sphere", "capsule"):
             return float(size[0])
@@ -41,7 +41,7 @@ class ErodedShapes:
         return self._hull(geom).radius if kind == "mesh" else 0.0
 
     def add(self, geom: int, layer: float) -> int:
-        """The number of the shape of ``geom`` less a layer [m], which is below its radius."""
+        """The number of the shape of ``geom`` eroded by a layer [m] thinner than its radius."""
         key = (geom, layer)
         if key not in self._added:
             self._added[key] = self._new(geom, layer)
@@ -68,7 +68,7 @@ class ErodedShapes:
 
 
 def frame_on_body(model: Any, geom: int) -> tuple[Array, Array]:
-    """Where MuJoCo's kinematics put a geom on its body: position (3,) [m] and rotation (9,).
+    """Position (3,) [m] and rotation (9,) of a geom on its body in MuJoCo's kinematics.
 
     A geom that had the frame of its body or of the body's inertia when the model was compiled
     keeps it, whatever ``geom_pos`` and ``geom_quat`` say (``geom_sameframe``).
@@ -101,7 +101,7 @@ class _Hull:
         try:
             self._faces = np.unique(ConvexHull(vertices).equations, axis=0)
         except QhullError:
-            return  # flat: nothing but its middle
+            return  # flat: its middle surface only
         # The largest ball inside: n.x + r <= -d for every face.
         n, d = self._faces[:, :3], self._faces[:, 3]
         ball = linprog([0, 0, 0, -1], np.c_[n, np.ones(len(n))], -d, bounds=[(None, None)] * 4)
@@ -109,7 +109,7 @@ class _Hull:
             self._middle, self.radius = ball.x[:3], float(ball.x[3])
 
     def core(self, layer: float) -> Array:
-        """Its corners, without a layer."""
+        """The corners of the hull eroded by a layer."""
         from scipy.spatial import HalfspaceIntersection, QhullError
 
         if layer <= 0 or self._faces is None:
@@ -120,7 +120,7 @@ class _Hull:
             corners = corners[np.isfinite(corners).all(axis=1)]
         except QhullError:
             corners = _NONE
-        if len(corners) < 4:  # a very thin body: towards the middle instead
+        if len(corners) < 4:  # a very thin body: scale towards the middle instead
             corners = self._middle + (1 - layer / self.radius) * (self._vertices - self._middle)
         # The mesh's own centre is in every eroded shape, although a thinner end may lie deeper.
         about_centre = (1 - layer / self.radius) * self._vertices

@@ -1,7 +1,7 @@
-"""Fields of a model that a guard compares between two steps, and the values that it refuses.
+"""The model's fields that a guard compares between two steps, and values that it refuses.
 
-It starts anew where a field has changed that it has copied from. Other numbers only have to be
-valid. Contact parameters that the guard writes itself are looked at by the native part.
+If a field that the guard has copied has changed, the guard starts anew. Other numbers only have to
+be valid. The native part compares contact parameters that the guard writes itself.
 """
 
 import functools
@@ -17,24 +17,24 @@ from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
 from tauguard.contacts.guard.engine import PHYSICS
 
-#: Which pairs there are.
+#: Fields that determine the pairs.
 _PAIRS = (
     *("geom_type", "geom_contype", "geom_conaffinity", "geom_bodyid", "geom_dataid"),
     *("flex_contype", "flex_conaffinity", "flex_selfcollide", "flex_rigid", "flex_dim"),
     *("body_weldid", "body_parentid", "body_dofnum", "exclude_signature"),
     *("pair_geom1", "pair_geom2"),
 )
-#: Shapes, and where they are on their bodies.
+#: Fields of shapes and of their poses on bodies.
 _SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
     *("flex_radius", "flex_elem", "flex_vertbodyid"),
 )
-#: Stiffness of elastic flexes, and what turns or is carried by mocap bodies.
+#: Stiffness of elastic flexes, and fields on rotation and on mocap bodies.
 _MOTION = (
     *("flex_stiffness", "flexedge_length0", "jnt_type", "eq_type", "eq_objtype"),
     *("eq_obj1id", "eq_obj2id", "body_mocapid", "site_bodyid"),
 )
-#: Numbers of contacts' directions.
+#: Allowed numbers of contact dimensions.
 _DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
 _CONDIM = (1, 3, 4, 6)
 #: Objects whose numbers must be valid, by the rules of followed_fields.hpp: limits may be infinite.
@@ -43,7 +43,7 @@ _FINITE, _NOT_NAN, _NOT_NEGATIVE = range(3)
 _LIMITS = re.compile("range|yield|_user")
 _MASSES = ("body_mass", "body_inertia", "flex_radius")
 _WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # by the guard itself
-#: MuJoCo normalizes quaternions when it compiles, and takes them for unit ones afterwards.
+#: MuJoCo normalizes quaternions when it compiles a model, and later assumes unit length.
 _UNIT = 1e-6
 
 Regions = list[tuple[int, int]]
@@ -54,7 +54,7 @@ def followed_fields(model: Any, options: Regions) -> Regions:
 
     Args:
         model: MjModel.
-        options: of fields that are no arrays.
+        options: names of scalar fields of ``opt``.
     """
     out = list(options)
     for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS):
@@ -98,7 +98,7 @@ def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
 
     Args:
         model: MjModel.
-        physics: of options, all of which must be finite.
+        physics: names of options, all of which must be finite.
     """
     out = [(*region, _FINITE) for region in physics]
     for name, rule in _rules().items():
@@ -138,7 +138,7 @@ def refuse_values(model: Any) -> None:
 
 
 def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str) -> None:
-    """The first row of a field with a wrong entry."""
+    """Refuse a field with a wrong entry; the message has the first such row."""
     rows = getattr(model, name)
     found = np.argwhere(wrong(rows))
     if len(found):

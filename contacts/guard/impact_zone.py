@@ -1,4 +1,4 @@
-"""The last resort: penetrating partners move rigidly together for one sub-step (impact zone)."""
+"""Impact zones, the last resort: penetrating partners move rigidly together for a sub-step."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,26 +33,26 @@ def impact_zone(
     hits: Sequence[Hit],
     judge: Callable[[], list[Hit]],
 ) -> tuple[list[Hit], float]:
-    """Take a sub-step again so that no pair passes through.
+    """Repeat a sub-step so that no pair passes through.
 
     The velocity at its end is changed by as little as possible, in the metric of the inertia, so
     that the partners of each hit do not move relative to each other (rigid impact zones: Provot
     1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds none, except for
     the work of mocap bodies. The bodies then follow that velocity for the sub-step. Pairs that meet
-    on this new path are added. If this does not end, or the inertia that an edit has left gives no
+    on this new path are added. If this does not end, or the inertia after an edit gives no
     finite velocity, everything except mocap bodies stands still for the sub-step.
 
     Args:
         model: MjModel.
         data: MjData after the failed sub-step; its kinematics are those of the start, its mocap
             poses those of the end.
-        qpos: At the sub-step's start.
-        length: Of the sub-step [s].
+        qpos: Joint positions at the sub-step's start.
+        length: Length of the sub-step [s].
         hits: The pairs that passed through.
-        judge: Judges the path from the start to ``data.qpos``.
+        judge: Finds the pairs that pass through on the path from the start to ``data.qpos``.
 
     Returns:
-        All hits whose partners were stopped, and the work that mocap bodies did by it [J].
+        All hits whose partners were stopped, and the resulting work of mocap bodies [J].
     """
     stopped, velocity = list(hits), data.qvel.copy()
     for _ in range(ROUNDS):
@@ -97,7 +97,7 @@ def _joined(
 
 
 def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> tuple[Array, Array]:
-    """Jacobian of the relative motion of a hit's partners, shape (R, nv), and what is carried."""
+    """Jacobian of the relative motion of a hit's partners, shape (R, nv), and mocap velocity."""
 
     def of(body: int, point: Array, count: int) -> tuple[Array, Array]:
         jacobian = np.zeros((6, model.nv))
@@ -125,7 +125,7 @@ def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> 
 def _apart(
     a: Sequence[tuple[Array, Array]], b: Sequence[tuple[Array, Array]]
 ) -> tuple[Array, Array]:
-    """Differences of rows and of velocities, one below the other."""
+    """Differences of rows and of velocities, stacked."""
     pairs = list(zip(a, b, strict=True))
     return (
         np.concatenate([one[0] - other[0] for one, other in pairs]),

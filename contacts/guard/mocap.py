@@ -1,4 +1,4 @@
-"""The bodies that mocap bodies carry, and their velocity, for impact zones."""
+"""The velocity of bodies attached to mocap bodies, for impact zones."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ class MocapVelocityField:
             self._step.append((data.mocap_pos[number] - data.xpos[body], turn))
 
     def velocity(self, body: int, point: Array) -> Array:
-        """Of a point on a body, and its turning: what its carrier gives it, shape (6,)."""
+        """Linear velocity of a body's point, and angular velocity, due to mocap, shape (6,)."""
         carrier = int(self._carrier[body])
         out = np.zeros(6)
         for (number, start), (way, turn) in zip(self._start, self._step, strict=True):
@@ -48,7 +48,7 @@ class MocapVelocityField:
 
 
 def pulled(model: Any) -> NDArray[np.uint8]:
-    """By equality: whether something that a mocap body carries takes part in it."""
+    """For each equality, whether a body attached to a mocap body takes part in it."""
     carried = model.body_mocapid[model.body_rootid] >= 0
     flexes = [bool(carried[_bodies(model, flex)].any()) for flex in range(model.nflex)]
     kinds, objects = mujoco.mjtEq, mujoco.mjtObj
@@ -66,7 +66,7 @@ def pulled(model: Any) -> NDArray[np.uint8]:
 
 
 def _bodies(model: Any, flex: int) -> NDArray[np.int32]:
-    """Bodies that a flex hangs on, by its vertices, or by nodes where it is interpolated."""
+    """Bodies of a flex's vertices, or of its nodes if it is interpolated."""
     vertices = model.flex_vertadr[flex] + np.arange(model.flex_vertnum[flex])
     nodes = model.flex_nodeadr[flex] + np.arange(model.flex_nodenum[flex])
     bodies = np.concatenate([model.flex_vertbodyid[vertices], model.flex_nodebodyid[nodes]])

@@ -1,4 +1,4 @@
-"""What one guarded step did."""
+"""The report of one guarded step."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Pair = tuple[Partner, Partner]
 
 
 def partner_name(model: Any, partner: Partner) -> str:
-    """``geom 'cup'``, ``flex 'sheet'``; by its number where it has no name."""
+    """The partner as text: ``geom 'cup'`` or ``flex 'sheet'``; a number replaces a missing name."""
     kind, number = partner
     if kind == "geom":
         return f"geom {geom_name(model, number)}"
@@ -29,9 +29,9 @@ def partner_name(model: Any, partner: Partner) -> str:
 class Cut:
     """One sub-step that was rolled back."""
 
-    time: float  #: at which the next attempt ends [s]
-    pair: Pair  #: that would have passed through, become too deep, or separated unseen
-    stiffened: bool  #: its contact parameters were changed, until the pair parts
+    time: float  #: end time of the next attempt [s]
+    pair: Pair  #: the pair that would have passed through, become too deep, or separated unseen
+    stiffened: bool  #: its contact parameters are changed until the pair separates
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,17 @@ class StepReport:
     """The report of one guarded step; ``guard.partners(pair)`` gives the names of a pair."""
 
     steps: int  #: calls of ``mj_step``, including those that were rolled back
-    contacts: int  #: contacts that MuJoCo listed, the most in any accepted sub-step
+    contacts: int  #: largest number of contacts that MuJoCo listed in an accepted sub-step
     cuts: tuple[Cut, ...] = ()
-    restored: tuple[Pair, ...] = ()  #: pairs whose contact parameters are as before again
-    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: the work ran out
+    restored: tuple[Pair, ...] = ()  #: pairs whose original contact parameters were restored
+    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: ``most`` was reached
     impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
-    energy_added: float = 0.0  #: by constraint forces in sub-steps, losses left out [J]
+    energy_added: float = 0.0  #: by constraint forces in sub-steps, without losses [J]
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property
     def exhausted(self) -> bool:
-        """Whether the work ran out: a pair may have passed through (:attr:`passed` names it)."""
+        """Whether ``most`` was reached: the pairs in :attr:`passed` may have passed through."""
         return bool(self.passed)
 
     @cached_property

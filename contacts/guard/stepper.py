@@ -1,4 +1,4 @@
-"""Steps that let nothing through: plain steps, or sub-steps in which the solver stops approach."""
+"""Steps without tunnelling: plain steps, or sub-steps in which the solver stops the approach."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
 from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
-#: What the native part goes by.
+#: Settings of the native part.
 SETTINGS = {
     "beyond": 1e-5,  # how far beyond the touch a cut sub-step goes, so that MuJoCo finds it [m]
     "room": 1.25,  # margins over what the pair travelled in the attempt that failed
-    "smallest": 1 / 64,  # a step is never cut into sub-steps shorter than this fraction of it
+    "smallest": 1 / 64,  # length of the shortest sub-step, as a fraction of the step
     "push": 0.2,  # fraction of a depth that is pushed out in each step
-    "watched": 10,  # energy is counted for so many steps that stand after a rollback
-    "look": 16,  # whether pairs have parted is looked up at least every so many steps
+    "watched": 10,  # number of accepted steps after a rollback in which energy is counted
+    "look": 16,  # number of steps after which separation of pairs is checked at the latest
     "allowed": 0.01,  # energy budget: fraction of the first kinetic energy that contacts may add
     "deeper_geom": 1 / 8,  # sub-steps above this fraction may not deepen a held pair
-    "deeper_flex": 1 / 2,  # the same of a flex
+    "deeper_flex": 1 / 2,  # the same for a flex
     "turned": 1.0,  # rotation in a step above which its whole turns are counted [rad]
 }
 
@@ -41,25 +41,25 @@ SETTINGS = {
 class GuardedStepper:
     """``mj_step`` that lets no pair pass through itself.
 
-    Between two steps everything in ``model`` and ``data`` may be changed: the next step goes by it,
-    or refuses it by name. Geoms that an edit moves do not sweep the way in between. An error of
-    MuJoCo's or an exception in ``each`` leaves the state of before the step. Copies, deep copies
-    and unpickled guards continue with the same bits; a plain copy shares model and data.
+    Between two steps everything in ``model`` and ``data`` may be changed. The next step uses the
+    change, or refuses it by name. The path of a geom that an edit moves is not checked. An error of
+    MuJoCo's or an exception in ``each`` restores the state before the step. Copies, deep copies and
+    unpickled guards continue with the same bits; a plain copy shares model and data.
 
     A plain step is tried first. It is accepted, with the bits of ``mj_step``, unless the verdict
-    finds a pair that becomes too deep or that touches and parts unseen. Otherwise the state is
-    rolled back, the pair made stiff until it parts, and the step taken in sub-steps: one up to the
-    touch, and from there on sub-steps in which the solver stops the approach. A sub-step that still
-    fails is halved; where that does not help, the partners move rigidly together
-    (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`). All but the last runs in C++.
+    finds a pair that becomes too deep or that touches and separates unseen. Otherwise the state is
+    rolled back, the pair is made stiff until it separates, and the step is taken in sub-steps: one
+    up to the touch, and then sub-steps in which the solver stops the approach. A sub-step that
+    still fails is halved. If that does not help, the partners move rigidly together
+    (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`).
 
     Args:
         model: the scene's. Its ``opt.timestep``, margins and contact parameters are changed within
-            a step and put back; ``stiff`` ones when their pair parts.
-        data: what is stepped.
+            a step and restored; those of ``stiff`` pairs are restored when the pair separates.
+        data: the MjData to step.
         checkers: which pairs are covered, as the checkers of that name: ``rigid`` geoms against
             geoms, ``cloth`` flexes against geoms, one another and themselves. :attr:`uncovered`
-            lists what may touch and is not.
+            lists the pairs that may touch and are not covered.
         stiff: whether the contacts of pairs that caused a rollback are made stiff.
         most: calls of ``mj_step`` that one step may cost before partners are stopped.
 
@@ -75,7 +75,7 @@ class GuardedStepper:
         stiff: bool = True,
         most: int = 40,
     ) -> None:
-        """Copy the shapes and make room for one saved state."""
+        """Copy the shapes and allocate one saved state."""
         if most < 2:
             raise ValueError(f"most {most}: expected 2 or more steps")
         self._rigid, self._cloth = names(checkers)
@@ -101,7 +101,7 @@ class GuardedStepper:
         self._cover()
 
     def _cover(self) -> None:
-        """Tell the native guard the pairs and shapes that the model has now."""
+        """Give the native guard the model's present pairs and shapes."""
         model = self._model
         self._guard.clear()
         covered = Covered(model, self._guard, self._rigid, self._cloth)
@@ -121,19 +121,19 @@ class GuardedStepper:
         self._guard.follow_numbers(numbers(model, self._physics))
 
     def _follow(self) -> None:
-        """Go by what was changed since the last step, or refuse it."""
+        """Follow the changes since the last step, or refuse them."""
         _refuse(self._model, self._data)
         if self._guard.changed():
             self._cover()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Model, data and what is known of earlier steps."""
+        """Model, data and the memory of earlier steps."""
         self._follow()
         names = ("_model", "_data", "_rigid", "_cloth", "_stiff", "_most")
         return {name: getattr(self, name) for name in names} | {"saved": self._guard.saved()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Continue from there."""
+        """Restore model, data and memory."""
         saved = state.pop("saved")
         self.__dict__.update(state)
         self._start()
@@ -141,12 +141,12 @@ class GuardedStepper:
 
     @property
     def model(self) -> Any:
-        """The scene's; another one, recompiled for instance, needs a guard of its own."""
+        """The scene's model. Another model, also a recompiled one, needs a new guard."""
         return self._model
 
     @property
     def data(self) -> Any:
-        """What is stepped."""
+        """The data that is stepped."""
         return self._data
 
     @property
@@ -156,7 +156,7 @@ class GuardedStepper:
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """Those that are covered."""
+        """The covered pairs."""
         return self._pairs
 
     def partners(self, pair: Pair) -> tuple[str, str]:
@@ -170,10 +170,10 @@ class GuardedStepper:
 
     @property
     def uncovered(self) -> tuple[Pair, ...]:
-        """Pairs that may touch by MuJoCo's rules and that no promise is made of.
+        """Pairs that may touch by MuJoCo's rules and are not covered.
 
         These are height fields and signed distance fields against anything, flexes against flexes
-        unless both are of triangles, and what ``checkers`` leaves out.
+        unless both are of triangles, and pairs that ``checkers`` excludes.
         """
         return self._uncovered
 
@@ -181,8 +181,8 @@ class GuardedStepper:
     def sunk(self) -> tuple[Pair, ...]:
         """Pairs that were deep in one another when one of them last moved.
 
-        An edit or the scene itself put them there. A pair is not followed until it has parted, so
-        it may leave on either side unreported.
+        The cause is an edit or the scene itself. Such a pair is not followed until it has
+        separated, so it may leave on either side unreported.
         """
         return self._named(self._guard.sunk())
 
@@ -195,17 +195,17 @@ class GuardedStepper:
         """Advance by one ``model.opt.timestep``.
 
         Args:
-            each: called at the end of every sub-step of a step that was cut, ``data`` being there;
-                a step that stands whole does not call it.
+            each: called at the end of every sub-step of a step that was cut, with ``data`` at that
+                time; a step that is accepted whole does not call it.
 
         Raises:
             ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
-                ``speculative`` or ``sleep`` (their state or distances cannot be taken back); the
+                ``speculative`` or ``sleep`` (their state or distances cannot be rolled back); the
                 integrator RK4; an unknown friction cone; a contact filter
                 (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none;
                 a mass, contact parameter or other number of the model that is not finite, a
                 negative mass. Nothing was stepped.
-            mujoco.FatalError: an error of MuJoCo's; the state is that of before.
+            mujoco.FatalError: an error of MuJoCo's; the state before the step is restored.
             RuntimeError: called within a step of this guard: by another thread, or in a callback.
         """
         contacts = self._guard.step(self, each)
@@ -216,9 +216,9 @@ class GuardedStepper:
         return self._quiet[contacts]
 
     def reset(self) -> None:
-        """Take the present state as new: mocap bodies are where they were put.
+        """Start anew at the present state, with mocap bodies at their given poses.
 
-        Contact parameters are put back and nothing is known of earlier steps. A change of
+        Contact parameters are restored and the memory of earlier steps is cleared. A change of
         ``data.time`` between two steps does the same for the mocap poses at the next one.
         """
         self._guard.reset()
@@ -228,7 +228,7 @@ class GuardedStepper:
         self._guard.close()
 
     def __enter__(self) -> GuardedStepper:
-        """Itself; leaving the block calls :meth:`close`."""
+        """The guard itself; leaving the block calls :meth:`close`."""
         return self
 
     def __exit__(
@@ -272,7 +272,7 @@ class GuardedStepper:
         return self._tunnelling.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
 
     def _impact_zone(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
-        """Stop the partners of these rows from the positions at that address on.
+        """Stop the partners of these rows, starting from the positions at the given address.
 
         Returns also the work that mocap bodies did through these contacts [J].
         """
@@ -296,7 +296,7 @@ class GuardedStepper:
 
 
 def _turning(model: Any) -> NDArray[np.int32]:
-    """Degrees of freedom that turn a body."""
+    """Indices of the rotational degrees of freedom."""
     kinds, out = mujoco.mjtJoint, []
     for joint in range(model.njnt):
         dof, kind = int(model.jnt_dofadr[joint]), model.jnt_type[joint]

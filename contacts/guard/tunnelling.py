@@ -1,4 +1,4 @@
-"""Flexes of triangles against each other and themselves: do their middle surfaces cross?"""
+"""Find crossings of the middle surfaces of flexes of triangles, with each other and themselves."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,16 +11,16 @@ from tauguard.cloth import Groups, MeshCCD
 
 
 class TunnellingEvents:
-    """Which vertices and faces, and which edges, cross in a step.
+    """Finds vertices that cross faces, and edges that cross edges, in a step.
 
     Args:
         model: MjModel.
-        pairs: of two-dimensional flexes, by their ids.
+        pairs: pairs of two-dimensional flexes, by their ids.
         first: number of the first of these pairs.
     """
 
     def __init__(self, model: Any, pairs: Sequence[tuple[int, int]], first: int) -> None:
-        """Build the mesh of all flexes that take part."""
+        """Build the mesh of all flexes in ``pairs``."""
         meets = np.zeros((model.nflex, model.nflex), dtype=bool)
         for a, b in pairs:
             meets[a, b] = meets[b, a] = True
@@ -31,11 +31,11 @@ class TunnellingEvents:
         self._number = {pair: first + k for k, pair in enumerate(pairs)}
 
     def find(self, x_t0: Array, x_t1: Array) -> list[tuple[int, list[int], float]]:
-        """A row for each crossing: the pair's number, the vertices, how far they move [m].
+        """A row for each crossing: the pair's number, the vertices, and their displacement [m].
 
         Args:
             x_t0: Vertices of all flexes at the start of a step. Shape (V, 3), m.
-            x_t1: At its end.
+            x_t1: The same at its end.
         """
         frame = self._mesh.find(x_t0, x_t1)
         faces, edges = self._mesh.faces, self._mesh.edges
@@ -52,7 +52,7 @@ class TunnellingEvents:
 
 
 def elements(model: Any, flex: int) -> NDArray[np.int32]:
-    """The simplices of a flex by the vertices of all flexes. Shape (E, corners)."""
+    """The simplices of a flex, as indices into the vertices of all flexes. Shape (E, corners)."""
     corners = int(model.flex_dim[flex]) + 1
     start, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
     local = model.flex_elem[start : start + corners * count].reshape(-1, corners)

@@ -1,4 +1,4 @@
-"""Scenes in which contacts are hard to find, each holding only what it needs."""
+"""Small scenes whose contacts are hard to find."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Arms that touch rigid things: boxes on both sides, and one another over a table."""
+"""Arms that touch rigid objects: boxes on both sides, and each other over a table."""
 
 import mujoco
 import numpy as np
@@ -8,9 +8,9 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import SceneSpec, Table, compose, load_arm
 from tauguard.models.scene import INTEGRATORS
 
-#: Between the pedestals of both arms [m].
+#: Distance between the pedestals of both arms [m].
 DISTANCE = 1.0
-#: How far their first three joints swing [rad].
+#: Amplitudes of their first three joints [rad].
 REACH = (0.15, 0.25, 0.1)
 
 
@@ -55,7 +55,7 @@ def two_arms(speed: float = 1.0) -> ContactScene:
     table = Table(position=(DISTANCE / 2, 0.15, 0.5), half_extents=(0.2, 0.5, 0.02))
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False, table=table)).xml)
     other = load_arm("cura6").spec
-    for geom in other.geoms:  # they meet the first arm and the table, not one another
+    for geom in other.geoms:  # they collide with the first arm and the table, not with each other
         if geom.contype or geom.conaffinity:
             geom.contype, geom.conaffinity = 4, 3
     frame = spec.worldbody.add_frame(pos=[DISTANCE, 0.3, 0], quat=[0, 0, 0, 1])

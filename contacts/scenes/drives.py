@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import Control
 
-#: Wanted positions and velocities at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
+#: Reference positions and velocities at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
 Reference = Callable[[float], tuple[Array, Array]]
 #: Natural frequency of every joint's loop [rad/s].
 BANDWIDTH = 25.0
@@ -50,7 +50,7 @@ def follow(
     Args:
         model: model of the whole scene.
         qpos: the pose whose inertia sets the gains, shape (nq,).
-        arms: of each arm its places in qpos, in qvel, and its reference.
+        arms: indices in qpos and in qvel, and the reference, of each arm.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos

@@ -1,4 +1,4 @@
-"""Fabrics and bodies: a hanging cloth in the arm's way, a sleeve over it, a garment on a chest."""
+"""Scenes with fabrics: a cloth in the arm's path, a sleeve on the arm, a garment on a chest."""
 
 import mujoco
 import numpy as np
@@ -10,9 +10,9 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import BodyProxy, Cloth, Scene, SceneSpec, compose
 from tauguard.models.cloth import add_sheet
 
-#: Of the fabrics here: 400 N/m over their width, a soft knit [Pa].
+#: Young's modulus of the fabrics: 400 N/m over their width, a soft knit [Pa].
 FABRIC_YOUNG = 2e5
-#: Which geom of the arm wears the sleeve: the capsule of the forearm's link.
+#: The geom inside the sleeve: the capsule of the forearm's link.
 SLEEVED_LINK = "link3"
 
 
@@ -89,7 +89,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
     scene = compose(SceneSpec(labels=False, proxies=(chest,), cloth=cloth, integrator="discrete"))
     spec = mujoco.MjSpec.from_string(scene.xml)
     worn = spec.geom("chest")
-    worn.contype, worn.conaffinity = 4, 6  # meets the cloth; the arm meets it by contact pairs
+    worn.contype, worn.conaffinity = 4, 6  # collides with the cloth; the arm has contact pairs
     for flex in spec.flexes:
         flex.contype, flex.conaffinity = 6, 5
     return _moving("garment_chest", scene, spec.compile(), 0.7, turn(scene.home, 0, speed, 0.6))
@@ -98,7 +98,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
 def _moving(
     name: str, scene: Scene, model: mujoco.MjModel, seconds: float, reference: Reference
 ) -> ContactScene:
-    """``scene``, perhaps compiled anew as ``model``, whose arm follows ``reference``."""
+    """The contact scene of ``scene`` (or of its new ``model``), whose arm follows ``reference``."""
     joints = [model.joint(joint) for joint in scene.joint_names]
     places = np.array([joint.qposadr[0] for joint in joints])
     dofs = np.array([joint.dofadr[0] for joint in joints])

@@ -1,4 +1,4 @@
-"""Fast spheres against thin objects, which steps of fixed length skip."""
+"""Fast spheres against thin objects; discrete steps miss such contacts."""
 
 import mujoco
 import numpy as np
@@ -11,9 +11,9 @@ from tauguard.models.scene import INTEGRATORS
 BALL_RADIUS = 0.010  #: [m]
 PLATE_HALF_THICKNESS = 0.001  #: [m]
 BALL_MASS = 0.020  #: [kg]
-#: Of the cloth: 20 kN/m over its width, a woven fabric [Pa].
+#: Young's modulus of the cloth: 20 kN/m over its width, a woven fabric [Pa].
 CLOTH_YOUNG = 1e7
-#: The ball's surface is this far from the cloth's at the start, before ``offset`` [m].
+#: Initial distance of the ball's surface from the cloth's, without ``offset`` [m].
 BALL_GAP = 0.005
 #: Contact parameters stiff enough that a fast ball does not sink through: solref, solimp.
 STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))
@@ -23,7 +23,7 @@ MODES = {
     "speculative": int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
     "ipc": int(mujoco.mjtEnableBit.mjENBL_IPC),
 }
-#: Where the ball hits the cloth, as weights of one face's three vertices.
+#: Impact points on the cloth, as weights of one face's three vertices.
 IMPACT_POINTS = {
     "vertex": (1.0, 0.0, 0.0),
     "edge": (0.5, 0.5, 0.0),
@@ -50,7 +50,7 @@ def ball_cloth(
             0.003 s with the ball's default 0.02 s.
         mode: one of :data:`MODES`.
         count: vertices along each side of the cloth.
-        pinned: which of its vertices are held, see :class:`tauguard.models.Cloth`.
+        pinned: fixed vertices, see :class:`tauguard.models.Cloth`.
 
     Raises:
         ValueError: an unknown impact point or mode, a speed that is not above 0.

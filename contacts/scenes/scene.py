@@ -19,9 +19,9 @@ class ContactScene:
 
     name: str
     model: mujoco.MjModel
-    qpos: Array  #: where it starts, shape (nq,)
-    qvel: Array  #: how fast, shape (nv,)
-    seconds: float = 1.0  #: after which everything of interest has happened [s]
+    qpos: Array  #: initial positions, shape (nq,)
+    qvel: Array  #: initial velocities, shape (nv,)
+    seconds: float = 1.0  #: duration until all contacts of interest have happened [s]
     control: Control | None = None
 
     def start(self, timestep: float | None = None) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -13,8 +13,8 @@ from tauguard.models.obstacles import add_table
 from tauguard.models.scene import INTEGRATORS
 from tauguard.untrusted_input import reading
 
-SIZE = 0.15  #: longest side of the thing [m]
-HEIGHT = 0.05  #: of its lowest point above the table at the start [m]
+SIZE = 0.15  #: longest side of the mesh [m]
+HEIGHT = 0.05  #: initial height of its lowest point above the table [m]
 
 
 def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactScene:
@@ -23,7 +23,7 @@ def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactSc
     Args:
         mesh: a file that trimesh can read, for example the Stanford bunny; scaled to 15 cm.
             ``None``: a lumpy ball of 1,280 triangles.
-        speed: downwards, at the start [m/s].
+        speed: initial speed, downwards [m/s].
 
     Raises:
         FileNotFoundError: no such file.

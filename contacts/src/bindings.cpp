@@ -33,7 +33,7 @@ Answer answer(const std::vector<Row>& rows, const Counts& counts) {
                         nb::make_tuple(counts.moved, counts.reused, counts.candidates));
 }
 
-// The geoms of a scene and which of them meet.
+// The geoms of a scene and the pairs that may touch.
 class Scene {
  public:
   void add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
@@ -43,7 +43,7 @@ class Scene {
     geoms_.add(std::move(shape), body, frame);
   }
 
-  // The surface of the geom added last, instead of its hull.
+  // Gives the geom that was added last its surface, in place of its hull.
   void surface(Rows3 vertices, IntRows faces) {
     const std::vector<Vec3> points = vectors(vertices);
     Surface surface;

@@ -75,7 +75,7 @@ struct Engine {
   double *other_energy, *other_mocap_pos, *other_mocap_quat;
   const double *other_xpos, *other_xmat, *other_flexvert;
 
-  // Values of MuJoCo's enumerations; flags that are refused.
+  // Values of MuJoCo's enumerations, and refused flags.
   int discrete, runge_kutta, pyramidal, elliptic, refsafe, newton, equality, override_flag, refused;
   void* const* contact_filter;      // MuJoCo's global callback
   std::size_t at_stack, at_frames;  // mjData's pointers into its stack

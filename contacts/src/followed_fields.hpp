@@ -54,7 +54,7 @@ class Numbers {
   Numbers() = default;
   explicit Numbers(std::vector<Region> regions) : regions_(std::move(regions)) { compare(); }
 
-  // Whether all are valid; they are looked at only where one has changed.
+  // Whether all numbers are valid; a region is checked only after a change.
   bool valid() {
     if (!followed_.changed()) return true;
     for (const auto& [at, size, rule] : regions_) {

@@ -181,8 +181,8 @@ class Guard {
     pulled_.clear();
   }
 
-  // Call this after all was added. `sheets`: whether flexes are covered against flexes, which the
-  // owner's `_tunnelling_events` finds.
+  // Call this after all pairs were added. `sheets`: whether flexes are covered against flexes,
+  // which the owner's `_tunnelling_events` finds.
   void start(bool sheets) {
     if (stepper_)
       stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),
@@ -344,7 +344,7 @@ class Guard {
   Engine engine_;
   FollowedFields fields_;
   Numbers numbers_;
-  nb::object held_;   // what the addresses point into
+  nb::object held_;   // keeps the objects behind the addresses alive
   nb::handle owner_;  // of the step that is being made
   Settings s_{};
   double allowed_ = 0;

@@ -68,7 +68,7 @@ class Mocap {
   struct Pose {
     double pos[3], quat[4];
   };
-  using Poses = std::vector<Pose>;  // indexed indexed by mocap number
+  using Poses = std::vector<Pose>;  // indexed by mocap number
 
   bool jumps() const { return moves_ && jumps_; }
   void read(Poses* poses) const;

@@ -25,7 +25,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
   push_ = s_.push / whole_;
-  if (hits.empty()) {  // the pair was the pair was only pushed out too fast
+  if (hits.empty()) {  // the pair was only pushed out too fast
     push_ = 0;
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;

@@ -276,7 +276,7 @@ std::vector<int> Stepper::release() {
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
     // Pairs with a moving mocap body are left out: it sinks into others within a whole step, and a
-    // stiff contact would throw them away.
+    // stiff contact would eject them.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

@@ -18,9 +18,9 @@ struct PairHit {
   int pair, deepest;
   bool passed;   // its last eroded shapes met: the pair would have passed through itself
   bool lost;     // they met at the start already and had been apart: the pair is no longer tracked
-  bool brushed;  // it touched and parted again within the step, no eroded shapes met
+  bool brushed;  // it touched and separated within the step, no eroded shapes met
   double time;   // of the first touch, as a fraction of the step; 0 if it touched at the start
-  double way;    // no two of its points approach each other further in the step [m]
+  double way;    // upper bound of the approach of its points in the step [m]
   std::vector<std::int32_t> features;  // simplices of the flex that came deepest
   std::vector<std::int32_t> corners;   // flexes against flexes: vertices that crossed
 };
@@ -57,13 +57,13 @@ struct Settings {
 
 class Stepper {
  public:
-  // Finds what crosses between two flexes in a step.
+  // Finds the crossings of two flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
   // Joins the partners of each pair that passed in the last sub-step in an impact zone, from `qpos`
   // on.
   struct Stopped {
     std::vector<int> pairs;
-    double work;  // of mocap bodies [J]
+    double work;  // work of mocap bodies [J]
   };
   using ImpactZone = std::function<Stopped(const std::vector<PairHit>&, const double*, double)>;
 
@@ -77,14 +77,14 @@ class Stepper {
   void set_callbacks(TunnellingEvents tunnelling, ImpactZone impact_zone) {
     tunnelling_ = std::move(tunnelling), impact_zone_ = std::move(impact_zone);
   }
-  // Advances by one timestep; `each` is called after every sub-step. True if the number of contacts
-  // says all; otherwise report() has more.
+  // Advances by one timestep; `each` is called after every sub-step. Returns true if the number of
+  // contacts is the whole report; otherwise report() has more.
   bool step(const std::function<void()>& each);
   std::vector<PairHit> judge();
   std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
   // Restores every contact parameter.
   void close();
-  // The state was set from outside: forgets the steps before.
+  // The state was set from outside: clears the memory of earlier steps.
   void reset();
   // Replaces the covered pairs, as in the constructor; the memory of pairs that are in both is
   // kept.
@@ -94,7 +94,7 @@ class Stepper {
   bool acceptable() const;
   // Restores the state at the start after an exception in a step.
   void abandon();
-  // Writes or reads all that is known of earlier steps.
+  // Writes or reads the memory of earlier steps.
   template <class Archive>
   void archive(Archive& a) {
     verdict_.archive(a), mocap_.archive(a), budget_.archive(a), stiffening_.archive(a);
@@ -134,9 +134,8 @@ class Stepper {
   Rows rows_;
   TunnellingEvents tunnelling_;
   ImpactZone impact_zone_;
-  std::unordered_map<std::uint64_t, int>
-      number_;              // the number the number of a pair, by its partners
-  std::vector<int> spins_;  // rotational degrees of freedom
+  std::unordered_map<std::uint64_t, int> number_;  // the number of a pair, by its partners
+  std::vector<int> spins_;                         // rotational degrees of freedom
 
   bool stepping_ = false;  // the state of the start is in first_
   std::vector<double> first_, saved_, velocity_, qpos_, x_t1_, turn_;

@@ -1,4 +1,4 @@
-// Contact parameters written for as long as a guarded contact lasts, and put back after it.
+// Contact parameters that are changed while a guarded contact lasts, and restored after it.
 #pragma once
 
 #include <array>

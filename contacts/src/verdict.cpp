@@ -24,7 +24,7 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
   return !d.overlap && d.lower > needed;
 }
 
-// What is known of a pair from earlier steps: nothing, that some of its eroded shapes were apart,
+// The memory of a pair from earlier steps: nothing, that some of its eroded shapes were apart,
 // or that none were.
 enum : char { unknown, apart, sunk };
 
@@ -126,7 +126,7 @@ void Verdict::update(const Poses& p) {
     motions_[b] = motion_between(now, now + 3, now + 12, now + 15, turn);
     still_[b] = motions_[b].speed == 0 && std::equal(now, now + 12, now + 12);
     if (turn && motions_[b].speed > M_PI)
-      last_[24 * b] = NAN;  // poses alone do not tell the number of turns
+      last_[24 * b] = NAN;  // poses alone do not determine the number of turns
   }
   for (std::size_t e = 0; e < entries_.size(); ++e)
     if (whole_[e] && fresh_[entries_[e].body])

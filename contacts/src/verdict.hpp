@@ -1,4 +1,4 @@
-// Which pairs pass through one another in a step, by their eroded shapes.
+// Finds the pairs that pass through each other in a step, by their eroded shapes.
 //
 // A shape is eroded by a layer of its surface. Levels go from the whole shape (0) to almost its
 // middle (the last). A pair is judged at the shallowest level at which it is apart at the start. As
@@ -17,7 +17,7 @@ struct Hit {
   std::int32_t deepest;  // the deepest level that met; the number of levels: all shapes meet at
                          // the start, and did not at the start of the step before
   double t;              // when the whole shapes first touch; 0 where they do at the start
-  double way;            // no two points of the pair approach each other further in the step [m]
+  double way;            // upper bound of the approach of the pair's points in the step [m]
 };
 
 class Verdict {
@@ -32,14 +32,14 @@ class Verdict {
                      std::vector<std::int32_t> elements, int corners,
                      std::vector<std::uint8_t> skip);
 
-  // Forgets the steps before.
+  // Clears the memory of earlier steps.
   void forget();
   void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
   std::size_t rigid_pairs() const { return pairs_.size(); }
-  // What is known of a pair from the steps before: one entry, or one for each simplex.
+  // The memory of a pair from earlier steps: one entry, or one for each simplex.
   std::vector<char> known(std::size_t pair) const;
-  // Sets what is known of a pair. Ignored if the number of entries differs.
+  // Sets the memory of a pair. Ignored if the number of entries differs.
   void set_known(std::size_t pair, const std::vector<char>& known);
   // Pairs whose shapes were too deep in one another for even the last eroded ones to be apart.
   std::vector<int> sunk_pairs() const;

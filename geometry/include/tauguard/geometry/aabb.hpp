@@ -31,7 +31,7 @@ struct Aabb {
     for (int k = 0; k < 3; ++k) lo[k] -= by, hi[k] += by;
   }
 
-  // Touching counts.
+  // Touching boxes overlap.
   bool overlaps(const Aabb& o) const {
     return lo[0] <= o.hi[0] && o.lo[0] <= hi[0] && lo[1] <= o.hi[1] && o.lo[1] <= hi[1] &&
            lo[2] <= o.hi[2] && o.lo[2] <= hi[2];

@@ -143,7 +143,7 @@ class Dyadic {
   }
 
   // The digits of a number in units of 2^exponent, where `exponent` is at most the number's own;
-  // nothing is copied.
+  // without a copy.
   class Shifted {
    public:
     Shifted(const Dyadic& a, std::int64_t exponent)

@@ -73,7 +73,7 @@ TAUGUARD_INLINE unsigned bits(Mask4 c) {
   return unsigned(x[0] | x[1] | x[2] | x[3]);
 }
 
-// It has another name because Clang takes vectors of one size for the same type.
+// It has its own name because Clang treats vectors of one size as the same type.
 TAUGUARD_INLINE unsigned bits8(Mask8 c) {
   const Mask8 x = c & Mask8{1, 2, 4, 8, 16, 32, 64, 128};
   std::uint64_t word[4];

@@ -36,7 +36,7 @@ class Limbs {
       far_ = std::move(o.far_);
       capacity_ = o.capacity_;
       o.capacity_ = near_capacity;
-    } else {  // fits whatever storage is here
+    } else {  // fits the present storage
       std::memcpy(data(), o.near_, o.size_ * sizeof(std::uint64_t));
     }
     size_ = o.size_;

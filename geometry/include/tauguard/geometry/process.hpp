@@ -8,7 +8,7 @@
 namespace tauguard::geometry {
 
 #if defined(_WIN32)
-inline long process_number() { return 1; }  // no fork there
+inline long process_number() { return 1; }  // this system has no fork
 #else
 inline long process_number() { return static_cast<long>(getpid()); }
 #endif

@@ -118,7 +118,7 @@ class ThreadPool {
     try {
       while (workers_.size() < helpers)
         workers_.emplace_back([this, i = workers_.size()] { serve(i); });
-    } catch (const std::system_error&) {  // no more threads to be had: fewer do the work
+    } catch (const std::system_error&) {  // the system gives no more threads: fewer do the work
     }
   }
 
@@ -144,7 +144,7 @@ class ThreadPool {
       wait_awake([&] { return generation_ != seen; });
       {
         std::unique_lock<std::mutex> lock(mutex_);
-        // A worker that this job does not count (or one born after it started) sleeps through it.
+        // A worker that is not part of this job (or was created after its start) sleeps.
         wake_.wait(lock, [&] { return generation_ != seen; });
         seen = generation_;
         if (stop_) return;
