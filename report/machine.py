@@ -75,7 +75,10 @@ def load_line(begin: float | None, end: float | None) -> str:
     text = f"load: {begin} before, {end} after, {cores} core{'s' if cores > 1 else ''}"
     if max(known) <= BUSY * cores:
         return text
-    return f"{text}: a busy machine; do not trust times and ratios of times, errors hold"
+    return (
+        f"{text}: a busy machine; times are too long and their ratios rough, measure again on an "
+        "idle one; errors hold"
+    )
 
 
 def versions() -> dict[str, str]:

@@ -50,18 +50,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         text = f"{missed} missed of {of:,}; time within {error:.0e}"
         axes = "microseconds a pair that meets", "largest error of the time [steps]"
         yield Point(question, row["method"], number(row["us_hit"]) or 0.0, error, text, role, *axes)
-    known = [row for row in table_rows(rows, "distance") if row["known"]]
-    for method, time, key, role in (
-        ("tauguard", "distance_ns", "error", "ours"),
-        ("coal", "coal_ns", "coal_error", "peer"),
-    ):
-        if known:
-            # of each kind of pair alike: pairs that exact arithmetic decides take 50 times as long
-            cost = 1e-3 * statistics.geometric_mean(number(row[time]) or 0.0 for row in known)
-            error = min(1.0, max(row[key] for row in known))  # coal's may be any number
-            question, text = "signed distance of two bodies", f"within {error:.0e} of the size"
-            axes = "microseconds a pair, geometric mean", "largest error, fraction of the size"
-            yield Point(question, method, cost, error, text, role, *axes)
+    yield from _distances(table_rows(rows, "distance"))
     for row in table_rows(rows, "figure 1.1 volumes"):
         question, cost = "bounding volumes of pieces of a mesh", 1e-3 * row["test_ns"]["median"]
         text = f"{row['volume']}, {row['tightness']:.2g} times the hull's volume"
@@ -72,6 +61,23 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         yield _mesh(own, volume, "batch_mean_us", "ours" if volume == "obb" else "")
     if "obb" in meshes:
         yield _mesh(meshes["obb"], "coal, OBBRSS", "coal_mean_us", "peer")
+
+
+def _distances(rows: Sequence[Row]) -> Iterator[Point]:
+    """Random pairs, and hard cases, in which exact arithmetic decides (50 times as long)."""
+    for hard, name in ((False, "random pairs"), (True, "hard cases")):
+        own = [row for row in rows if (row["outcome"] == "hard case") == hard]
+        for method, time, key in (("tauguard", "distance_ns", ""), ("coal", "coal_ns", "coal_")):
+            known = [row[f"{key}error"] for row in own if row["known"]]
+            if not known:
+                continue
+            cost = 1e-3 * statistics.geometric_mean(number(row[time]) or 0.0 for row in own)
+            error = min(1.0, max(known))  # coal's may be any number
+            wrong, of = _count([row[f"{key}wrong_sign"] for row in own])
+            text = f"within {error:.0e} of the size; {wrong:,} wrong signs of {of:,}"
+            axes = "microseconds a pair, geometric mean", "largest error, fraction of the size"
+            role, question = "peer" if key else "ours", f"signed distance of two bodies, {name}"
+            yield Point(question, method, cost, error, text, role, *axes)
 
 
 def _count(rates: Sequence[Any]) -> tuple[int, int]:

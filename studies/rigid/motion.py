@@ -30,6 +30,8 @@ NOTES = {
     "pairs that coal says meet before the time found; distance_at_toi: coal's largest at that time "
     "[m]; coal_disagrees: hits that differ (it stops at 1e-6 m).",
 }
+#: Pairs of a call whose time is measured.
+LEAST = 500
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
@@ -78,7 +80,7 @@ def impact_rows(rng: np.random.Generator, kind: str, n: int) -> list[Row]:
         {
             **base,
             "method": "tauguard",
-            **peer.times(call, touch),
+            **peer.times(call, touch, LEAST),
             **impact_errors(early, touch, toi),
         },
         {**base, **over_coal, **impact_errors(early, touch, coal_toi)},
@@ -95,5 +97,5 @@ def rounded_row(rng: np.random.Generator, kinds: tuple[str, str], n: int) -> Row
     def call(rows: NDArray[np.intp]) -> Impacts:
         return time_of_impact(take(a, rows), take(b, rows), take(ma, rows), take(mb, rows))
 
-    columns = peer.motion_columns(call, distance, farthest(a) + farthest(b))
+    columns = peer.motion_columns(call, distance, farthest(a) + farthest(b), least=LEAST)
     return {"study": "motion of bodies with radii", "pair": "-".join(kinds), **columns}

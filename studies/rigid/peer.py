@@ -43,12 +43,17 @@ def outcomes(toi: Array) -> dict[str, NDArray[np.intp]]:
 
 
 def times(
-    call: Callable[[NDArray[np.intp]], Impacts], toi: Array, repeats: int = 3
+    call: Callable[[NDArray[np.intp]], Impacts], toi: Array, least: int = 1
 ) -> dict[str, dict[str, float] | None]:
-    """Processor time of a pair that touches and of one that does not [us]."""
-    chosen = {name: index for name, index in outcomes(toi).items() if len(index)}
+    """Processor time of a pair that touches and of one that does not [us].
+
+    Fewer pairs than ``least`` are asked several times in one call: otherwise their time would be
+    that of the call.
+    """
+    found = {name: index for name, index in outcomes(toi).items() if len(index)}
+    chosen = {name: np.resize(index, max(len(index), least)) for name, index in found.items()}
     calls = {name: partial(call, index) for name, index in chosen.items()}
-    spent = time_in_turn(calls, repeats, time.process_time)
+    spent = time_in_turn(calls, 3, time.process_time)
     us = {f"us_{name}": per(spent[name], len(index), 1e6) for name, index in chosen.items()}
     return {"us_hit": us.get("us_hit"), "us_miss": us.get("us_miss")}
 
@@ -58,6 +63,7 @@ def motion_columns(
     distance: MovingDistance,
     lever: Array | float,
     most: int | None = None,
+    least: int = 1,
 ) -> Row:
     """Time of impact judged by coal's distance, before the time found and at it.
 
@@ -66,6 +72,7 @@ def motion_columns(
         distance: coal's, of the same pairs.
         lever: sum of both bodies' largest distances from the origins of their frames [m].
         most: advance only this many pairs of each outcome (default: all).
+        least: pairs of a call whose time is measured.
     """
     every = np.arange(distance.n)
     found = call(every)
@@ -90,7 +97,7 @@ def motion_columns(
     return {
         "pairs": distance.n,
         "hits": int(found.hit.sum()),
-        **times(call, found.time_of_impact),
+        **times(call, found.time_of_impact, least),
         "coal_us": 1e6 * float(distance.seconds[asked].mean()),
         "coal_calls": float(distance.calls[asked].mean()),
         "met_before": int((early & (found.time_of_impact > 0)).sum()),
