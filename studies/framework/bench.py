@@ -2,6 +2,7 @@
 
 import importlib
 import io
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -12,12 +13,15 @@ import tyro
 from studies import STUDIES
 from studies.framework.jobs import Workers
 from studies.framework.pareto import draw_points
-from studies.framework.rows import Incomplete
+from studies.framework.rows import Incomplete, table_rows
 from studies.framework.study import Part, all_parts, find, package
 from tauguard.atomic_write import atomic_file
 from tauguard.report import Row, measured, table, write_json
 from tauguard.report.charts import STYLE
 from tauguard.report.machine import load, load_line
+
+#: Tables that are always printed.
+SHORT = ("headline", "summary")
 
 
 def command(
@@ -29,11 +33,14 @@ def command(
     robot: str | None = None,
     keep: Path | None = None,
     workers: int | None = None,
+    tables: bool = False,
     json: Path | None = None,
     figure: Path | None = None,
     out: Path = Path("bench"),
 ) -> None:
-    """Run a study of speed against error, or one part of it, and print its tables.
+    """Run a study of speed against error, or one part of it, and print what it found.
+
+    Printed are time and error of each method and what was asked; `--tables` prints every table.
 
     `tauguard bench all` runs every part of every study and writes figures and tables into a folder.
     Parts that the folder holds are not run again. `tauguard report` makes one page of the folder.
@@ -47,6 +54,7 @@ def command(
         keep: folder of the job cache. Jobs whose results it holds are not run again, unless
             versions or the sources of simulation and detectors have changed.
         workers: processes of the parts that use several (default: all processors).
+        tables: print every table.
         json: write the rows here as JSON.
         figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -57,7 +65,7 @@ def command(
     if name == "all":
         from studies.framework.collect import collect
 
-        if detector or robot or keep or workers or json or figure:
+        if detector or robot or keep or workers or tables or json or figure:
             raise ValueError("bench all takes --quick, --seed and --out alone")
         if collect(out, all_parts(), quick=quick, seed=seed):
             raise SystemExit(1)
@@ -74,6 +82,7 @@ def command(
             one,
             quick=quick,
             seed=seed,
+            tables=tables,
             json_path=_own_path(json, full, chosen),
             figure_path=_own_path(figure, full, chosen) or Path(f"bench-{full}.png"),
             options={key: value for key, value in given.items() if key in one.options},
@@ -114,6 +123,7 @@ def run_part(
     *,
     quick: bool,
     seed: int,
+    tables: bool,
     json_path: Path | None,
     figure_path: Path,
     options: Mapping[str, str],
@@ -130,7 +140,10 @@ def run_part(
             raise ValueError(f"{path}: no folder {path.parent}; make it first")
     module, before = part.load(), load()
     rows, broken = _measured(module, quick, seed, options)
-    print(table(printed(module, rows), notes=module.NOTES))
+    every, short = printed(module, rows), brief(module, rows)
+    print(table(every if tables else short, notes=module.NOTES))
+    if not tables and short != every:
+        print("every table: --tables")
     print(load_line(before, load()))
     with atomic_file(figure_path) as stream:
         stream.write(chart(module, rows, figure_path.suffix[1:] or "png"))
@@ -174,6 +187,26 @@ def _of_our_own(error: BaseException) -> bool:
 def printed(module: Any, rows: list[Row]) -> list[Row]:
     """What is printed of a part's rows."""
     return list(module.table(rows)) if hasattr(module, "table") else rows
+
+
+def brief(module: Any, rows: list[Row]) -> list[Row]:
+    """What is printed unless every table is asked for: the points of the figure, and the summary.
+
+    Parts without points have all their tables.
+    """
+    make = getattr(importlib.import_module(module.__package__), "points", None)
+    points = list(make(rows)) if make else []
+    if not points:
+        return printed(module, rows)
+    return [
+        {
+            "study": own.question,
+            "method": own.method,
+            own.cost_axis: own.cost,
+            own.error_axis: own.error_text if math.isnan(own.error) else own.error,
+        }
+        for own in points
+    ] + [row for name in SHORT for row in table_rows(rows, name)]
 
 
 def chart(module: Any, rows: list[Row], kind: str = "png") -> bytes:

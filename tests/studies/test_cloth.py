@@ -2,7 +2,7 @@
 
 
 def test_volumes_and_growth_are_measured(bench):
-    found, printed = bench("cloth-volumes")
+    found, printed = bench("cloth-volumes", "--tables")
     rows = [row for row in found["rows"] if row["study"] == "volume"]
     assert len({row["scene"] for row in rows}) == 5
     boxes, kdops = (

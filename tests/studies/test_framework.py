@@ -146,7 +146,15 @@ def test_a_part_is_measured_judged_printed_drawn_and_written(checkout):
     row, summary = written["rows"]
     assert (row["seed"], row["quick"], row["robot"]) == (3, False, None)
     assert (summary["question"], summary["met"]) == ("how far", False)
-    assert "a: What the columns mean." in done.stdout
+    short = done.stdout
+    assert "a: What the columns mean." not in short
+    assert re.search(
+        r"^a question\n\nmethod +microseconds +error\n.*\nours +40 +0.5\n", short, re.M
+    )
+    assert re.search(r"^how far +1 m +2 m +no\nevery table: --tables\n", short, re.M)
+    whole = checkout("bench", "first-good", "--tables").stdout
+    assert "a: What the columns mean." in whole
+    assert "every table" not in whole
     assert re.search(r"^load: ", done.stdout, re.MULTILINE)
     assert (checkout.folder / "bench-first-good.png").read_bytes().startswith(b"\x89PNG")
 
