@@ -78,7 +78,8 @@ def _frames(rows: Sequence[Row]) -> Iterator[Point]:
     largest = max(peers, key=lambda row: number(row["ab2pf_ms"]) or 0.0, default={"scene": None})
     for peer in (row for row in peers if row["scene"] == largest["scene"]):
         own = next(row for row in frames if row["scene"] == peer["scene"])
-        question = f"a frame of {own['scene']}, {own['triangles']:,} triangles, beside {peer['peer']}"
+        what = f"a frame of {own['scene']}, {own['triangles']:,} triangles"
+        question = f"{what}, beside {peer['peer']}"
         ours = 1e3 * (number(peer["ab2pf_ms"]) or 0.0)
         error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
         yield Point(question, "ab2pf", ours, math.nan, error, "ours")
