@@ -8,6 +8,7 @@ content refuses damage; numbers are range-checked by the classes that take them.
 from __future__ import annotations
 
 import importlib.metadata
+import io
 import json
 import os
 import zipfile
@@ -129,16 +130,20 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
 
 def _container(path: Path) -> Mapping[str, Any]:
     """The outer dictionary of a file of ours."""
-    import skops.io
-
     try:
         data = path.read_bytes()
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    unknown: set[str] = set()
     try:
-        _bounded(path)
-        unknown = skops.io.get_untrusted_types(data=data)
-        found = None if unknown else skops.io.loads(data, trusted=[])
+        with zipfile.ZipFile(path) as archive:
+            _bounded(archive)
+            arrays = {
+                name: np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
+                for name in archive.namelist()
+                if name.endswith(".npy")
+            }
+            found = _value(json.loads(archive.read("schema.json")), arrays, unknown)
     except Exception as error:  # whatever a damaged archive makes the readers of its parts raise
         earlier = _json_format(data)
         if earlier:
@@ -154,20 +159,43 @@ def _container(path: Path) -> Mapping[str, Any]:
     return found
 
 
-def _bounded(path: Path) -> None:
+def _value(node: Any, arrays: Mapping[str, Any], unknown: set[str]) -> Any:
+    """What a node of a skops schema holds: dictionaries, lists, arrays, numbers and text.
+
+    skops itself imports scikit-learn and pytest for this, which takes seconds.
+
+    Args:
+        node: as ``skops.io`` wrote it.
+        arrays: by the names of their files.
+        unknown: gets the names of other types.
+    """
+    loader, kind = node["__loader__"], f"{node['__module__']}.{node['__class__']}"
+    if (loader, kind) == ("DictNode", "builtins.dict"):
+        parts = node["content"].items()
+        return {name: _value(part, arrays, unknown) for name, part in parts}
+    if (loader, kind) == ("ListNode", "builtins.list"):
+        return [_value(part, arrays, unknown) for part in node["content"]]
+    if loader == "JsonNode":
+        return json.loads(node["content"])
+    if (loader, kind) == ("NdArrayNode", "numpy.ndarray"):
+        return arrays[node["file"]]
+    unknown.add(kind)
+    return None
+
+
+def _bounded(archive: zipfile.ZipFile) -> None:
     """Refuse an archive that unpacks to more than :data:`LARGEST`, and arrays larger than theirs.
 
     Raises:
         ValueError: says which.
     """
-    with zipfile.ZipFile(path) as archive:
-        total = sum(member.file_size for member in archive.infolist())
-        if total > LARGEST:
-            raise ValueError(f"unpacks to {total / 2**20:.0f} MB, expected {LARGEST >> 20} at most")
-        for member in archive.infolist():
-            if member.filename.endswith(".npy"):
-                with archive.open(member) as file:
-                    _check_array(file, member.file_size)
+    total = sum(member.file_size for member in archive.infolist())
+    if total > LARGEST:
+        raise ValueError(f"unpacks to {total / 2**20:.0f} MB, expected {LARGEST >> 20} at most")
+    for member in archive.infolist():
+        if member.filename.endswith(".npy"):
+            with archive.open(member) as file:
+                _check_array(file, member.file_size)
 
 
 def _check_array(file: Any, size: int) -> None:

@@ -1,97 +1,67 @@
-"""The registry of detection methods: a name, and what makes its settings with their defaults."""
+"""The registry of detection methods: a name, and what makes its settings with their defaults.
+
+A method's module is imported when the method is made or read: those that learn from contacts need
+scikit-learn, which takes longer to import than a log to judge.
+"""
 
 from __future__ import annotations
 
 import difflib
 import importlib
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
-from tauguard.detectors.alarms.alarm import CollisionAlarm
-from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
-from tauguard.detectors.calibration.recording import LoadDeviation
-from tauguard.detectors.dynamics.friction import FrictionModel
-from tauguard.detectors.dynamics.robot import RobotNumbers
-from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.estimation.noise_model import NoiseModel
-from tauguard.detectors.estimation.velocity import SensorNoise
-from tauguard.detectors.faults.inputs import UsualInput
-from tauguard.detectors.features.free_bound import Bound
-from tauguard.detectors.features.front_end import FrontEnd, Scaling
-from tauguard.detectors.features.windows import WindowShape
-from tauguard.detectors.scores.baselines import (
-    Cusum,
-    FittedCusum,
-    FittedThresholds,
-    MovingThresholds,
-    ResidualThresholds,
-)
-from tauguard.detectors.scores.currents import (
-    CurrentNetwork,
-    CurrentThreshold,
-    FittedCurrentNetwork,
-    FittedCurrentThreshold,
-    Inputs,
-)
-from tauguard.detectors.scores.detector import Detector
-from tauguard.detectors.scores.free_motion import FittedFreeMotion, FreeMotion
-from tauguard.detectors.scores.kernel import KernelMachine
-from tauguard.detectors.scores.learned import (
-    Boosting,
-    OneOutput,
-    PlainSrqSvr,
-    SrqSvr,
-    WindowNetwork,
-)
-from tauguard.detectors.scores.regressors import Forest, Network
-from tauguard.detectors.scores.windowed import FittedWindowed
-from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
+if TYPE_CHECKING:
+    from tauguard.detectors.scores.detector import Detector
+
+
+def _score(module: str, maker: str) -> Any:
+    return attrgetter(maker)(importlib.import_module(f"tauguard.detectors.scores.{module}"))()
+
 
 #: Every method, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {
-    "srq-svr": SrqSvr,
-    "srq-svr-plain": PlainSrqSvr,
-    "current-network": CurrentNetwork,
-    "current-network-static": CurrentNetwork.static,
-    "current-threshold": CurrentThreshold,
-    "residual-thresholds": ResidualThresholds,
-    "moving-thresholds": MovingThresholds,
-    "cusum": Cusum,
-    "window-network": WindowNetwork,
-    "boosting": Boosting,
-    "free-motion": FreeMotion,
+    "srq-svr": partial(_score, "learned", "SrqSvr"),
+    "srq-svr-plain": partial(_score, "learned", "PlainSrqSvr"),
+    "current-network": partial(_score, "currents", "CurrentNetwork"),
+    "current-network-static": partial(_score, "currents", "CurrentNetwork.static"),
+    "current-threshold": partial(_score, "currents", "CurrentThreshold"),
+    "residual-thresholds": partial(_score, "baselines", "ResidualThresholds"),
+    "moving-thresholds": partial(_score, "baselines", "MovingThresholds"),
+    "cusum": partial(_score, "baselines", "Cusum"),
+    "window-network": partial(_score, "learned", "WindowNetwork"),
+    "boosting": partial(_score, "learned", "Boosting"),
+    "free-motion": partial(_score, "free_motion", "FreeMotion"),
 }
 
-#: Classes that a model file may hold, by their names there.
-FILE_TYPES: dict[str, type] = {
-    kind.__qualname__: kind
-    for kind in (
-        ArmModel,
-        BesideFreeMotion,
-        Bound,
-        CollisionAlarm,
-        NoiseModel,
-        FittedCurrentNetwork,
-        FittedCurrentThreshold,
-        FittedCusum,
-        FittedFreeMotion,
-        FittedThresholds,
-        FittedWindowed,
-        Forest,
-        FrictionModel,
-        FrontEnd,
-        Inputs,
-        KernelMachine,
-        LoadDeviation,
-        Network,
-        OneOutput,
-        RobotNumbers,
-        Scaling,
-        SensorNoise,
-        SpeedNormalisation,
-        UsualInput,
-        WindowShape,
-    )
+#: Modules of the classes that a model file may hold, by their names there.
+FILE_TYPES: dict[str, str] = {
+    name: f"tauguard.detectors.{module}"
+    for module, names in {
+        "alarms.alarm": "CollisionAlarm",
+        "alarms.beside_free_motion": "BesideFreeMotion",
+        "calibration.recording": "LoadDeviation",
+        "dynamics.friction": "FrictionModel",
+        "dynamics.robot": "RobotNumbers",
+        "estimation.estimator": "ArmModel",
+        "estimation.noise_model": "NoiseModel",
+        "estimation.velocity": "SensorNoise",
+        "faults.inputs": "UsualInput",
+        "features.free_bound": "Bound",
+        "features.front_end": "FrontEnd Scaling",
+        "features.windows": "WindowShape",
+        "scores.baselines": "FittedCusum FittedThresholds",
+        "scores.currents": "FittedCurrentNetwork FittedCurrentThreshold Inputs",
+        "scores.free_motion": "FittedFreeMotion",
+        "scores.kernel": "KernelMachine",
+        "scores.learned": "OneOutput",
+        "scores.regressors": "Forest Network",
+        "scores.windowed": "FittedWindowed",
+        "thresholds.speed_normalisation": "SpeedNormalisation",
+    }.items()
+    for name in names.split()
 }
 
 #: Modules of others that the user has named in this process.
@@ -153,7 +123,8 @@ def file_type(name: str) -> type:
         ValueError: not one of ours, nor of a module that was named in this process.
     """
     if name in FILE_TYPES:
-        return FILE_TYPES[name]
+        ours: type = getattr(importlib.import_module(FILE_TYPES[name]), name)
+        return ours
     module, _, own = name.partition(":")
     if module not in _NAMED:
         raise ValueError(

@@ -217,6 +217,18 @@ def test_the_list_of_commands_leaves_heavy_libraries_unloaded():
     assert not loaded_by(code, (*HEAVY, "mujoco", "pinocchio", "tyro"))
 
 
+def test_models_are_looked_for_without_the_learning_libraries():
+    code = (
+        "from tauguard.detectors import load_model\n"
+        "from tauguard.detectors.evaluation.metrics import poisson_rate\n"
+        "from tauguard.detectors.registry import make_detector\n"
+        "make_detector('free-motion'); poisson_rate(1, 1.0)\n"
+        "try: load_model('none.skops')\n"
+        "except ValueError: pass"
+    )
+    assert not loaded_by(code, ("sklearn", "skops", "pandas", "scipy.stats"))
+
+
 def test_nothing_generic_is_importable_by_itself(tmp_path):
     code = "import datasets"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)

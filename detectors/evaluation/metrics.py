@@ -19,14 +19,14 @@ Rate = dict[str, Any]
 
 def poisson_rate(count: int, hours: float) -> Rate:
     """Events per hour with the exact (Garwood) Poisson 95 % interval; ``n`` is the count."""
-    from scipy import stats
+    from scipy.special import gammaincinv  # scipy.stats loads for seconds
 
     if count < 0 or not hours >= 0:
         raise ValueError(f"{count} events in {hours} h: expected 0 or more")
     if hours == 0:
         return {"value": None, "low": None, "high": None, "n": count, "hours": 0.0}
-    low = 0.0 if count == 0 else float(stats.chi2.ppf(0.025, 2 * count) / 2)
-    high = float(stats.chi2.ppf(0.975, 2 * count + 2) / 2)
+    low = 0.0 if count == 0 else float(gammaincinv(count, 0.025))
+    high = float(gammaincinv(count + 1, 0.975))
     return {
         "value": count / hours,
         "low": low / hours,
