@@ -38,10 +38,10 @@ _MOTION = (
 _DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
 _CONDIM = (1, 3, 4, 6)
 #: Objects whose numbers must be valid, by the rules of followed_fields.hpp: limits may be infinite.
-_OBJECTS = re.compile("(body|jnt|dof|geom|pair|flex|eq|tendon|actuator)_")
+_OBJECTS = re.compile("(body|jnt|dof|geom|pair|flex|eq|site|tendon|wrap|actuator)_|qpos(0|_spring)")
 _FINITE, _NOT_NAN, _NOT_NEGATIVE = range(3)
 _LIMITS = re.compile("range|yield|_user")
-_MASSES = ("body_mass", "body_inertia", "flex_radius")
+_MASSES = ("body_mass", "body_inertia", "dof_armature", "tendon_armature", "flex_radius")
 _WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # by the guard itself
 #: MuJoCo normalizes quaternions when it compiles a model, and later assumes unit length.
 _UNIT = 1e-6
@@ -113,8 +113,8 @@ def refuse_values(model: Any) -> None:
 
     Raises:
         ValueError: a number that is not finite (limits may be infinite), a negative mass, moment of
-            inertia, radius or size, a quaternion that is not of unit length, an unknown type of
-            geom or number of contact dimensions (field, row and value).
+            inertia, armature, radius or size, a quaternion that is not of unit length, an unknown
+            type of geom or number of contact dimensions (field, row and value).
     """
     for name, rule in _rules().items():
         _refuse_rows(model, name, np.isnan if rule == _NOT_NAN else _infinite, "not finite")
