@@ -7,6 +7,7 @@ be valid. The native part compares contact parameters that the guard writes itse
 import functools
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -19,21 +20,25 @@ from tauguard.contacts.guard.engine import PHYSICS
 
 #: Fields that determine the pairs.
 _PAIRS = (
-    *("geom_type", "geom_contype", "geom_conaffinity", "geom_bodyid", "geom_dataid"),
+    *("geom_type", "geom_contype", "geom_conaffinity", "geom_dataid"),
     *("flex_contype", "flex_conaffinity", "flex_selfcollide", "flex_rigid", "flex_dim"),
-    *("body_weldid", "body_parentid", "body_dofnum", "exclude_signature"),
-    *("pair_geom1", "pair_geom2"),
+    *("exclude_signature", "pair_geom1", "pair_geom2"),
 )
 #: Fields of shapes and of their poses on bodies.
 _SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
-    *("flex_radius", "flex_elem", "flex_vertbodyid"),
+    *("flex_radius", "flex_elem"),
 )
 #: Stiffness of elastic flexes, and fields on rotation and on mocap bodies.
 _MOTION = (
-    *("flex_stiffness", "flexedge_length0", "jnt_type", "eq_type", "eq_objtype"),
-    *("eq_obj1id", "eq_obj2id", "body_mocapid", "site_bodyid"),
+    *("flex_stiffness", "flexedge_length0", "eq_type", "eq_objtype", "eq_obj1id", "eq_obj2id"),
 )
+#: How the model is built; MuJoCo reads and writes beyond its arrays where this is edited.
+_STRUCTURE = re.compile(
+    "(body|jnt|dof|tree|geom|site|flex|tendon|wrap|actuator|sensor|mesh|hfield)_.*(adr|num|id|row)$"
+    "|(jnt|wrap)_type$"
+)
+_NOT_STRUCTURE = re.compile("geom_dataid|.*matid")
 #: Allowed numbers of contact dimensions.
 _DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
 _CONDIM = (1, 3, 4, 6)
@@ -54,10 +59,10 @@ def followed_fields(model: Any, options: Regions) -> Regions:
 
     Args:
         model: MjModel.
-        options: names of scalar fields of ``opt``.
+        options: address and size in bytes of the followed options.
     """
     out = list(options)
-    for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS):
+    for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS, *_structure()):
         array = getattr(model, name)
         if array.size:
             out.append((array.ctypes.data, array.nbytes))
@@ -65,6 +70,34 @@ def followed_fields(model: Any, options: Regions) -> Regions:
     for row in hull_rows(model).tolist():
         out.append((vertices[row].ctypes.data, vertices[row].nbytes))
     return out
+
+
+@functools.cache
+def _structure() -> tuple[str, ...]:
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    names = [name for name in dir(model) if _STRUCTURE.match(name)]
+    return tuple(name for name in names if not _NOT_STRUCTURE.match(name))
+
+
+def structure(model: Any) -> dict[str, NDArray[np.int32]]:
+    """Copies of the fields that say how the model is built, by name."""
+    return {name: getattr(model, name).copy() for name in _structure()}
+
+
+def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
+    """Refuse another structure than the one the model was built with.
+
+    Raises:
+        ValueError: the field and row, with both values.
+    """
+    for name, before in built.items():
+        now = getattr(model, name)
+        if (now != before).any():
+            row = int(np.argwhere(now != before)[0, 0])
+            raise ValueError(
+                f"{name}: row {row} is {now[row].tolist()}, compiled was {before[row].tolist()}; "
+                "change the MjSpec and recompile it"
+            )
 
 
 def hull_rows(model: Any) -> NDArray[np.int64]:
@@ -128,6 +161,9 @@ def refuse_values(model: Any) -> None:
         _refuse_rows(model, name, lambda rows: ~np.isin(rows, _CONDIM), "not 1, 3, 4 or 6")
     kinds = [int(kind) for kind in mujoco.mjtGeom.__members__.values()]
     _refuse_rows(model, "geom_type", lambda rows: ~np.isin(rows, kinds), "no type of MuJoCo's")
+    for name, least, end in _targets(model):
+        outside = partial(_outside, least=least, end=end)
+        _refuse_rows(model, name, outside, "no such object")
     for name in ("geom_quat", "body_iquat"):
         _refuse_rows(model, name, _not_unit, "not of unit length")
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
@@ -137,6 +173,26 @@ def refuse_values(model: Any) -> None:
         raise ValueError(f"mesh_vert: row {row} is {model.mesh_vert[row].tolist()}, not finite")
 
 
+def _targets(model: Any) -> list[tuple[str, Any, Any]]:
+    """Fields of ids: the least one of each row, and the end of their range."""
+    geoms, kind, of = mujoco.mjtGeom, model.geom_type, model.eq_type
+    field = kind == geoms.mjGEOM_HFIELD
+    needed = np.isin(kind, (geoms.mjGEOM_MESH, geoms.mjGEOM_SDF, geoms.mjGEOM_HFIELD))
+    ends = np.full(len(of), model.nflex)
+    ends[of == mujoco.mjtEq.mjEQ_JOINT] = model.njnt
+    ends[of == mujoco.mjtEq.mjEQ_TENDON] = model.ntendon
+    bound = np.isin(of, (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD))
+    at_sites = model.eq_objtype == mujoco.mjtObj.mjOBJ_SITE
+    ends[bound] = np.where(at_sites, model.nsite, model.nbody)[bound]
+    return [
+        ("pair_geom1", 0, model.ngeom),
+        ("pair_geom2", 0, model.ngeom),
+        ("geom_dataid", np.where(needed, 0, -1), np.where(field, model.nhfield, model.nmesh)),
+        ("eq_obj1id", 0, ends),
+        ("eq_obj2id", np.where(bound, 0, -1), ends),
+    ]
+
+
 def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str) -> None:
     """Refuse a field with a wrong entry; the message has the first such row."""
     rows = getattr(model, name)
@@ -144,6 +200,10 @@ def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str
     if len(found):
         row = int(found[0, 0])
         raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, {defect}")
+
+
+def _outside(ids: NDArray[np.int32], least: Any, end: Any) -> NDArray[np.bool_]:
+    return np.asarray((ids < least) | (ids >= end))
 
 
 def _infinite(rows: Array) -> NDArray[np.bool_]:

@@ -16,7 +16,13 @@ from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
 from tauguard.contacts.guard.engine import INTEGRATION, PHYSICS, REFUSED, addresses
-from tauguard.contacts.guard.followed_fields import followed_fields, numbers, refuse_values
+from tauguard.contacts.guard.followed_fields import (
+    followed_fields,
+    numbers,
+    refuse_structure,
+    refuse_values,
+    structure,
+)
 from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
@@ -98,6 +104,7 @@ class GuardedStepper:
         ]
         self._guard = Guard(found, settings, held)
         self._quiet: dict[int, StepReport] = {}  # by the number of contacts
+        self._built = structure(model)
         self._cover()
 
     def _cover(self) -> None:
@@ -117,11 +124,11 @@ class GuardedStepper:
             self._tunnelling = TunnellingEvents(model, covered.sheets, first)
         self._meter: EnergyMeter | None = None
         self._guard.start(self._tunnelling is not None)
-        self._guard.follow(followed_fields(model, self._flags))
-        self._guard.follow_numbers(numbers(model, self._physics))
+        self._guard.follow(followed_fields(model, self._flags), numbers(model, self._physics))
 
     def _follow(self) -> None:
         """Follow the changes since the last step, or refuse them."""
+        refuse_structure(self._model, self._built)
         _refuse(self._model, self._data)
         if self._guard.changed():
             self._cover()
@@ -204,7 +211,8 @@ class GuardedStepper:
                 integrator RK4; an unknown friction cone; a contact filter
                 (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none;
                 a mass, contact parameter or other number of the model that is not finite, a
-                negative mass. Nothing was stepped.
+                negative mass; an edited address, count or id by which the model is built. Nothing
+                was stepped.
             mujoco.FatalError: an error of MuJoCo's; the state before the step is restored.
             RuntimeError: called within a step of this guard: by another thread, or in a callback.
         """

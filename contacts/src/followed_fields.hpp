@@ -13,11 +13,12 @@ namespace tauguard::contacts {
 
 class FollowedFields {
  public:
+  using Regions = std::vector<std::pair<std::uintptr_t, std::size_t>>;
   FollowedFields() = default;
   // Addresses and sizes in bytes; their present values are the reference. Arrays that are
   // neighbours in MuJoCo's buffer, where each begins at a multiple of 64 bytes, are compared as
   // one.
-  explicit FollowedFields(std::vector<std::pair<std::uintptr_t, std::size_t>> regions) {
+  explicit FollowedFields(Regions regions) {
     std::sort(regions.begin(), regions.end());
     for (const auto& [at, size] : regions) {
       const char* from = reinterpret_cast<const char*>(at);
@@ -26,6 +27,11 @@ class FollowedFields {
       else
         fields_.push_back({from, from + size});
     }
+    take();
+  }
+  // Makes the present values the reference.
+  void take() {
+    copy_.clear();
     for (const Field& field : fields_) copy_.insert(copy_.end(), field.from, field.end);
   }
   bool changed() const {
@@ -52,17 +58,15 @@ class Numbers {
   enum Rule { finite, not_nan, not_negative };
   using Region = std::tuple<std::uintptr_t, std::size_t, int>;  // address, bytes, rule
   Numbers() = default;
-  explicit Numbers(std::vector<Region> regions) : regions_(std::move(regions)) { compare(); }
+  explicit Numbers(std::vector<Region> regions) : regions_(std::move(regions)) {}
 
-  // Whether all numbers are valid; a region is checked only after a change.
-  bool valid() {
-    if (!followed_.changed()) return true;
+  // Whether all numbers are valid.
+  bool valid() const {
     for (const auto& [at, size, rule] : regions_) {
       const double* x = reinterpret_cast<const double*>(at);
       for (std::size_t i = 0; i < size / sizeof *x; ++i)
         if (!obeys(x[i], rule)) return false;
     }
-    compare();
     return true;
   }
 
@@ -71,13 +75,31 @@ class Numbers {
     if (rule == not_nan) return x == x;
     return std::isfinite(x) && (rule == finite || x >= 0);
   }
-  void compare() {
-    std::vector<std::pair<std::uintptr_t, std::size_t>> fields;
-    for (const auto& [at, size, rule] : regions_) fields.emplace_back(at, size);
-    followed_ = FollowedFields(std::move(fields));
-  }
   std::vector<Region> regions_;
-  FollowedFields followed_;
+};
+
+// The fields of a model that a guard has copied from, and the numbers that only have to be valid.
+class FollowedModel {
+ public:
+  FollowedModel() = default;
+  FollowedModel(FollowedFields::Regions fields, std::vector<Numbers::Region> numbers)
+      : fields_(fields), numbers_(numbers) {
+    for (const auto& [at, size, rule] : numbers) fields.emplace_back(at, size);
+    all_ = FollowedFields(std::move(fields));
+  }
+  // Whether a field that was copied has changed.
+  bool changed() const { return fields_.changed(); }
+  // The same, or whether a number is not valid.
+  bool to_look_at() {
+    if (!all_.changed()) return false;
+    if (fields_.changed() || !numbers_.valid()) return true;
+    all_.take();
+    return false;
+  }
+
+ private:
+  FollowedFields fields_, all_;
+  Numbers numbers_;
 };
 
 }  // namespace tauguard::contacts

@@ -171,10 +171,10 @@ class Guard {
 
   // The fields of the model that the guard has copied from (their present values are the
   // reference), and numbers that only have to be valid: address, size [bytes], Numbers::Rule.
-  using Regions = std::vector<std::pair<std::uintptr_t, std::size_t>>;
-  void follow(const Regions& fields) { fields_ = FollowedFields(fields); }
-  void follow_numbers(std::vector<Numbers::Region> rows) { numbers_ = Numbers(std::move(rows)); }
-  bool changed() const { return fields_.changed(); }
+  void follow(FollowedFields::Regions fields, std::vector<Numbers::Region> numbers) {
+    model_ = FollowedModel(std::move(fields), std::move(numbers));
+  }
+  bool changed() const { return model_.changed(); }
   // Removes all that was added since the last start.
   void clear() {
     verdict_ = Verdict{}, pairs_.clear(), last_.clear(), sheets_.clear(), spins_.clear();
@@ -204,7 +204,7 @@ class Guard {
     refuse_within_step();
     const Stepping stepping(this);
     owner_ = owner;
-    if (fields_.changed() || !numbers_.valid() || !stepper_->acceptable()) owner.attr("_follow")();
+    if (model_.to_look_at() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {
@@ -342,8 +342,7 @@ class Guard {
   }
 
   Engine engine_;
-  FollowedFields fields_;
-  Numbers numbers_;
+  FollowedModel model_;
   nb::object held_;   // keeps the objects behind the addresses alive
   nb::handle owner_;  // of the step that is being made
   Settings s_{};
@@ -386,8 +385,7 @@ void bind_guard(nb::module_& m) {
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
       .def("sunk", &Guard::sunk)
-      .def("follow", &Guard::follow, "fields"_a)
-      .def("follow_numbers", &Guard::follow_numbers, "rows"_a)
+      .def("follow", &Guard::follow, "fields"_a, "numbers"_a)
       .def("changed", &Guard::changed)
       .def("clear", &Guard::clear)
       .def("saved", &Guard::saved)

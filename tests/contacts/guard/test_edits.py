@@ -88,6 +88,7 @@ PADDLE = '<body mocap="true" pos="0 0 3"><geom size=".1"/></body>'
         (option("o_solref", [np.nan, 1]), "opt.o_solref: [nan, 1.0], not finite"),
         (put("geom_condim", 0, 7), "geom_condim: row 0 is 7, not 1, 3, 4 or 6"),
         (put("geom_type", 0, 99), "geom_type: row 0 is 99, no type of MuJoCo's"),
+        (put("geom_dataid", 2, 0), "geom_dataid: row 2 is 0, no such object"),
         (put("mocap_pos", 0, np.nan, of="data"), "mocap_pos: row 0 is"),
         (put("mocap_quat", 0, np.inf, of="data"), "mocap_quat: row 0 is"),
     ],
@@ -113,6 +114,32 @@ def test_what_cannot_be_followed_is_refused_by_name_until_it_is_taken_back(edit,
         if not name.startswith("_"):
             setattr(model.opt, name, getattr(kept.opt, name))
     data.mocap_pos[:], data.mocap_quat[:] = poses
+    assert lowest(guard) > 0
+
+
+@pytest.mark.parametrize(
+    ("field", "row", "value"),
+    [
+        *(("body_geomnum", 1, 99), ("body_dofadr", 1, 50), ("dof_Madr", 3, -7)),
+        *(("jnt_qposadr", 0, 5), ("jnt_type", 0, 1), ("geom_bodyid", 1, 0)),
+        *(("actuator_trnid", (0, 0), 40), ("actuator_actnum", 0, -1), ("sensor_objid", 0, 70)),
+    ],
+)
+def test_how_the_model_is_built_is_not_edited(field, row, value):
+    """MuJoCo would read beyond its arrays: many of these ended the process."""
+    extra = """<actuator><motor name="m" site="s"/></actuator>
+      <sensor><framepos objtype="body" objname="ball"/></sensor>"""
+    model = model_of(bodies=BALL.replace("/></body>", '/><site name="s"/></body>'), extra=extra)
+    data, guard = falling(model)
+    guard.step()
+    kept = int(getattr(model, field)[row])
+    before = bits(model, data)
+    getattr(model, field)[row] = value
+    for _ in range(2):
+        with pytest.raises(ValueError, match=rf"{field}: row \d is .*{value}.*recompile"):
+            guard.step()
+        assert bits(model, data) == before
+    getattr(model, field)[row] = kept
     assert lowest(guard) > 0
 
 
