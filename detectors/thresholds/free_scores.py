@@ -35,6 +35,7 @@ class FreeScores:
     speeds: Array  #: recent speed where it stands [rad/s], shape (P,)
     seconds: float  #: of collision-free motion
     floor: FreeScores | None = None  #: of the plain thresholds beneath the score
+    interval: float = 0.0  #: between two samples [s]
 
     @classmethod
     def of(cls, level: Array, trace: Trace, settle: float) -> FreeScores:
@@ -57,7 +58,7 @@ class FreeScores:
         samples = max(1, round(PIECE / trace.dt))
         peaks, where = block_maxima(level[rows], samples)
         speeds = recent_speed(trace.qd, trace.dt)[rows][where]
-        return cls(peaks, speeds, len(rows) * trace.dt)
+        return cls(peaks, speeds, len(rows) * trace.dt, interval=trace.dt)
 
     @property
     def piece(self) -> float:

@@ -37,7 +37,13 @@ class Tail:
     count: int  #: peaks above the base
 
     @classmethod
-    def of(cls, peaks: Array, count: int, shapes: tuple[float, float] | None = None) -> Tail:
+    def of(
+        cls,
+        peaks: Array,
+        count: int,
+        shapes: tuple[float, float] | None = None,
+        usual: float = USUAL_SHAPE,
+    ) -> Tail:
         """From the ``count`` largest peaks and the next one.
 
         Their excesses tell scale and shape by probability-weighted moments (Hosking & Wallis 1987).
@@ -45,8 +51,9 @@ class Tail:
         Args:
             peaks: in descending order, shape (N,), N >= 1.
             count: at most N - 1 are used.
-            shapes: lowest and highest shape; ``None``: the one nearest to :data:`USUAL_SHAPE` that
-                is within :data:`BEYOND_CHANCE` standard errors of the estimate.
+            shapes: lowest and highest shape; ``None``: the one nearest to ``usual`` that is within
+                :data:`BEYOND_CHANCE` standard errors of the estimate.
+            usual: see ``shapes``.
         """
         count = min(count, len(peaks) - 1)
         if count < 2:
@@ -59,7 +66,7 @@ class Tail:
         if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
             return cls(float(peaks[0]), 0.0, 0.0, 0)
         found = 2 - mean / (mean - 2 * weighted)
-        shape = float(np.clip(found, *shapes)) if shapes else _likely_shape(found, count)
+        shape = float(np.clip(found, *shapes)) if shapes else _likely_shape(found, count, usual)
         return cls(float(peaks[count]), mean * (1 - shape), shape, count)
 
     def level(self, allowed: float) -> float:
@@ -76,19 +83,20 @@ def shape_error(count: int) -> float:
     return float(np.sqrt(4 / 3 / max(count, 1)))
 
 
-def _likely_shape(found: float, count: int) -> float:
+def _likely_shape(found: float, count: int, usual: float) -> float:
     """The shape nearest to the usual one that an estimate of ``count`` peaks allows."""
     found, margin = float(np.clip(found, *SHAPES)), BEYOND_CHANCE * shape_error(count)
-    return float(np.clip(USUAL_SHAPE, found - margin, found + margin))
+    return float(np.clip(usual, found - margin, found + margin))
 
 
-def tail_level(peaks: Array, allowed: float, count: int) -> float:
+def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SHAPE) -> float:
     """The level that ``allowed`` peaks are expected to exceed, along their :class:`Tail`.
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
         allowed: above 0; at or above ``count`` it is the peak that so many exceed.
         count: at most N - 1 are used.
+        usual: shape of the tail where the peaks do not show another.
 
     Raises:
         ValueError: no peaks, or a number allowed that is not above 0.
@@ -97,11 +105,19 @@ def tail_level(peaks: Array, allowed: float, count: int) -> float:
         raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
     if allowed >= max(min(count, len(peaks) - 1), 1):
         return float(peaks[min(int(allowed), len(peaks) - 1)])
-    return Tail.of(peaks, count).level(allowed)
+    return Tail.of(peaks, count, usual=usual).level(allowed)
 
 
 #: Fraction of the blocks whose peaks the tail is fitted to.
 TAIL = 0.05
+
+#: The same of a log whose samples are further apart than :data:`SLOW` [s]. Whether a brake acts
+#: just after a sample or just before the next decides how large the residual is: such peaks are
+#: rare, and the wider the interval, the heavier their tail. Chosen on four simulated arms.
+SLOW_TAIL, SLOW = 0.1, 0.015
+
+#: The usual shape of a slow log grows with its interval from this one on [s].
+HEAVIER = 0.02
 
 
 def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
@@ -121,7 +137,10 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
         raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
     peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
     hours = sum(one.seconds for one in scores) / 3600
-    return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
+    interval = max(one.interval for one in scores)
+    usual = min(USUAL_SHAPE * max(interval / HEAVIER, 1.0), SHAPES[1])
+    count = max(2, round((SLOW_TAIL if interval > SLOW else TAIL) * len(peaks)))
+    return tail_level(peaks, per_hour * hours, count, usual)
 
 
 #: Rate at which a learned score and the plain thresholds beneath it have equal levels [1/h].

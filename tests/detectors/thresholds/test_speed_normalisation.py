@@ -161,3 +161,25 @@ def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_state
     assert low < true < high
     assert low < 1.0 < high
     assert expected.threshold(1.0, confidence=0.95) > threshold
+
+
+def test_thresholds_of_slow_logs_allow_for_their_heavier_tail():
+    """24 minutes show the shape badly: with that of fast logs too many hard stops are alarms."""
+    rng, blocks = np.random.default_rng(2), 24 * 120
+    rates = {1 / 23.8: [], 1e-3: []}
+    for _ in range(60):
+        peaks = np.repeat(pareto(rng, blocks, 0.5), 25)
+        for interval, found in rates.items():
+            scores = [FreeScores(peaks, np.ones(len(peaks)), blocks / 2, interval=interval)]
+            above = stats.genpareto(0.5).sf(threshold_for_rate(scores, 1.0))
+            found.append(7200 * above)
+    slow, fast = map(np.mean, rates.values())
+    assert 0.5 < slow < 1.6 < 2 < fast
+
+
+@pytest.mark.parametrize("hz", [23.8, 1e3])
+def test_scores_know_the_interval_of_their_log(hz):
+    t = np.arange(0, 20, 1 / hz)
+    still = np.zeros((len(t), 1))
+    trace = Trace(("j",), t, still, still, still)
+    assert FreeScores.of(np.zeros(len(t)), trace, 1.0).interval == pytest.approx(1 / hz)
