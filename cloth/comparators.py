@@ -1,4 +1,4 @@
-"""For comparison only: narrow phases of earlier work, which miss collisions and report false ones.
+"""For comparison only: narrow phases of earlier work, with missed and false collisions.
 
 They use the candidates, data layout, compiler flags and threads of ab2pf, so a comparison
 measures the narrow phase alone. ``comparators.hpp`` says what was taken from which publication
@@ -53,11 +53,11 @@ def solve(
     Args:
         vertex: Vertex and face, otherwise edge and edge.
         x_t0: Positions at the start of the step. Shape (V, 3).
-        x_t1: At its end. Shape (V, 3).
-        rows: Four vertices a query. Shape (N, 4).
+        x_t1: Positions at its end. Shape (V, 3).
+        rows: Four vertices per query. Shape (N, 4).
         method: One of :data:`METHODS`.
-        hit: Written. Shape (N,).
-        out: toi, point, normal, weights as in :class:`tauguard.cloth.Impacts`, written for hits
+        hit: Output. Shape (N,).
+        out: Output: toi, point, normal, weights as in :class:`tauguard.cloth.Impacts`, for hits
             only.
 
     Returns:

@@ -26,7 +26,7 @@ class FrameStats:
             ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),
             ``total``; and ``vf_narrow``, ``ee_narrow``: the narrow phase alone, summed over
             threads [s].
-        builds: Trees built from nothing in this frame.
+        builds: Trees that were built anew in this frame.
         bytes: Memory that the mesh keeps between frames.
     """
 
@@ -44,14 +44,15 @@ class Frame:
     Attributes:
         vf: Colliding vertices and faces, shape (M, 2), sorted.
         ee: Colliding edges (rows of ``MeshCCD.edges``), smaller first, shape (K, 2), sorted.
-        vf_impacts: Of ``vf``, row by row; all are hits.
-        ee_impacts: Of ``ee``, row by row.
+        vf_impacts: Impacts of the rows of ``vf``; all are hits.
+        ee_impacts: Impacts of the rows of ``ee``.
         pe: Colliding isolated vertices and isolated edges (rows of ``MeshCCD.edges``), shape
             (P, 2), sorted. Other vertices meet edges as ends of edges or corners of faces.
         pp: Colliding isolated vertices, smaller first, shape (Q, 2), sorted.
-        pe_impacts: Of ``pe``; weights are of the point and the edge's ends, shape (P, 3).
-        pp_impacts: Of ``pp``; weights are ones, shape (Q, 2).
-        stats: How the answer was reached.
+        pe_impacts: Impacts of ``pe``; weights are those of the point and the edge's ends, shape (P,
+            3).
+        pp_impacts: Impacts of ``pp``; weights are ones, shape (Q, 2).
+        stats: Counts and times of the computation.
     """
 
     vf: NDArray[np.int32]

@@ -1,4 +1,4 @@
-"""Which parts of a mesh may meet."""
+"""Groups of vertices, and the pairs of groups to test."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from tauguard.geometry import Rebuilt, frozen, frozen_indices
 
 @dataclass(frozen=True, eq=False)
 class Groups(Rebuilt):
-    """The group of every vertex, and a table that says which groups meet.
+    """The group of every vertex, and a table of the pairs of groups to test.
 
     Both are read-only copies.
 

@@ -1,14 +1,15 @@
-"""Single queries: does a moving vertex meet a moving face, do two moving edges meet?
+"""Single queries: contact of a moving vertex and face, or of two moving edges.
 
-Points also meet edges and points, which the same kernels treat as faces without area.
+There are also queries of points with edges and points, which the kernels treat as faces
+without area.
 
 ab2pf takes the given doubles as exact. A query is a hit if and only if there is a contact at
 some time of the step in exact arithmetic. ``toi`` is at most 1e-9 of the step before the first
-such time. The cost of a query is bounded. First its cubic is cut three times, into at most three
-pieces with one root each, which take 40 Newton steps each. Queries that stay open are cut into at
-most 124 intervals, with 20 separating directions each. The rest is decided by a fixed number of
+such time. The cost of a query is bounded. First its cubic is split three times, into at most three
+pieces with one root each, which take 40 Newton steps each. Undecided queries are split into at
+most 124 intervals, with 20 separating directions each. A fixed number of signs decides the rest:
 signs of polynomials of degree 3, in integers of fixed width and then of any length. Most queries
-take some 20 ns, those that the fixed width decides 3 us. The worst take 200 us for positions of
+take some 20 ns, and those that need the fixed width 3 us. The worst take 200 us for positions of
 similar magnitude, and 0.2 s if magnitudes within one query span 10^600, the widest range of
 doubles. A query with a minimum distance takes at most 4001 cuts, uses no exact arithmetic and is
 conservative.
@@ -23,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.geometry import finite
 
-#: Methods of the narrow phase by name, both right on all finite doubles. "exact" uses exact
+#: Methods of the narrow phase by name; both are correct for all finite doubles. "exact" uses exact
 #: arithmetic throughout (some 100 us a query) and is the reference of "ab2pf".
 METHODS: dict[str, int] = {"ab2pf": 0, "exact": 1}
 
@@ -38,13 +39,13 @@ class Impacts:
         point: The point of contact at that time; NaN without a hit. Shape (N, 3).
         normal: Unit normal at that time: of the face by its winding, (f1 - f0) x (f2 - f0), or of
             both edges, (ea1 - ea0) x (eb1 - eb0). Its sign does not tell from which side the
-            features come, and with a ``min_distance`` it is not the direction between them. Zeros
-            for a face without area or parallel edges, NaN where there is no hit. Shape (N, 3).
-        weights: Of the four vertices of a row: (1, w, w, w) of the vertex and the face's vertices,
-            or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4); (N, 3) of a point and an
-            edge's ends, (N, 2) of two points.
+            features approach, and with a ``min_distance`` it is not the direction between them. It
+            is zero for a face without area or parallel edges, and NaN without a hit. Shape (N, 3).
+        weights: Weights of a row's four vertices: (1, w, w, w) of the vertex and the face's
+            vertices, or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4); (N, 3) of a
+            point and an edge's ends, (N, 2) of two points.
 
-    Where coordinates are beyond 1e75 or all below 1e-60, normal and weights can be zero or NaN.
+    If coordinates exceed 1e75 or are all below 1e-60, normal and weights can be zero or NaN.
     """
 
     hit: NDArray[np.bool_]
@@ -122,7 +123,7 @@ def _solve_points(
 
 
 def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
-    """The number of a method, or a ``ValueError`` that lists the names there are."""
+    """The number of a method; ``ValueError`` with the known names for another name."""
     if not isinstance(method, str) or method not in methods:
         raise ValueError(
             f"method {method!r}: there are {', '.join(methods)}; the methods that "
@@ -132,7 +133,7 @@ def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
 
 
 def checked_distance(min_distance: float, method: str) -> float:
-    """A finite distance of at least 0 (0 unless the method is ab2pf), or a ``ValueError``."""
+    """A finite distance of at least 0 (0 unless the method is ab2pf); ``ValueError`` otherwise."""
     distance = np.nan
     try:
         array = np.asarray(min_distance)

@@ -1,11 +1,11 @@
-"""Continuous collision detection of a deforming triangle mesh, one call a frame.
+"""Continuous collision detection of a deforming triangle mesh, with one call per frame.
 
 The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), refitted every frame, and the
 front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). Three choices are
-our own. Vertices, edges and faces have separate trees with 16 features to a leaf, so that every
-elementary pair comes up exactly once. Volumes may *move*: instead of one interval that covers
-the step they have one at each of its ends. This leaves fewer candidates and misses nothing (see
-``k_dop.hpp``). And features can be added and removed without a rebuild (``update_topology``).
+our own. Vertices, edges and faces have separate trees with 16 features per leaf, so that every
+elementary pair is tested exactly once. Volumes may *move*: instead of one interval that covers
+the step they have an interval at each of its ends. This gives fewer candidates and no misses (see
+``k_dop.hpp``). Features can be added and removed without a rebuild (``update_topology``).
 """
 
 import time
@@ -42,12 +42,12 @@ class MeshCCD:
     Args:
         faces: Shape (F, 3), three different vertices each; may be empty. Only vertices that a face,
             an edge or a point uses take part.
-        method: How the narrow phase decides: one of :data:`tauguard.cloth.METHODS`.
+        method: Method of the narrow phase, one of :data:`tauguard.cloth.METHODS`.
         threads: 0 means all processors. Results do not depend on it.
-        groups: Which parts meet. ``None``: every part meets every part and itself.
-        volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
-        edges: Edges of no face (rods, wires), shape (L, 2); edges that a face has are ignored.
-        points: Vertices of no face or edge that take part (particles), shape (P,).
+        groups: Parts to test against each other. ``None``: every part against all and itself.
+        volume: One of :data:`VOLUMES`. All find the same collisions; they differ in cost.
+        edges: Edges without a face (rods, wires), shape (L, 2); edges of faces are ignored.
+        points: Vertices without face or edge to test (particles), shape (P,).
 
     Attributes:
         method, threads, volume: As given, ``threads`` with 0 as the number of processors.
@@ -66,7 +66,7 @@ class MeshCCD:
             volume.
     """
 
-    #: What ``method`` may be, with the numbers of the native module.
+    #: Values of ``method``, with the numbers of the native module.
     methods: ClassVar[Mapping[str, int]] = METHODS
 
     def __init__(
@@ -179,14 +179,14 @@ class MeshCCD:
         fresh: bool = False,
         limit: int = MOST_CANDIDATES,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Pairs that the broad phase leaves: volumes overlap, no vertex is shared, groups meet.
+        """Candidates of the broad phase: volumes overlap, no common vertex, groups to test.
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
             min_distance: Pairs that come this close count, in the unit of the positions.
             fresh: Descend from the root instead of the last frame's front. The answer is the same.
-            limit: Most candidates of either kind (some 30 bytes each).
+            limit: Largest number of candidates of either kind (some 30 bytes each).
 
         Returns:
             Rows (vertex, face), shape (M, 2), and rows of two edges (smaller first), shape (K, 2),
@@ -213,7 +213,7 @@ class MeshCCD:
         fraction: float = 0.9,
         limit: int = MOST_COLLISIONS,
     ) -> float:
-        """The fraction ``s`` of a step that is free of contact; a solver scales its step by it.
+        """A fraction ``s`` of a step without contact, by which a solver scales its step.
 
         The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)`` is rounded to doubles and tested
         again until it has no contact. So rounding cannot add a contact, and the next step starts
@@ -223,11 +223,11 @@ class MeshCCD:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
             min_distance: Smallest distance allowed, in the unit of the positions.
-            fraction: Part of the path to the first contact that is used, above 0 and below 1.
+            fraction: Fraction of the path to the first contact to use, above 0 and below 1.
             limit: As in :meth:`find`.
 
         Returns:
-            1.0 if nothing meets in the whole step. 0.0 if something touches at its start, or no
+            1.0 if the whole step has no contact. 0.0 if there is contact at its start, or no
             positive step is found.
 
         Raises:
@@ -263,7 +263,7 @@ class MeshCCD:
         Args:
             faces: Shape (F', 3), the complete new list. Rows that were there before count
                 as unchanged.
-            groups: For the new vertices; ``None`` keeps the present ones.
+            groups: Groups of the new vertices; ``None`` keeps the present ones.
             edges: Isolated edges; ``None`` keeps the present ones.
             points: Isolated vertices; ``None`` keeps the present ones.
 

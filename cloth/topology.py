@@ -31,7 +31,7 @@ class Isolated:
     def of(
         faces: NDArray[np.int32], edges: ArrayLike, points: ArrayLike, groups: Groups | None
     ) -> Isolated:
-        """Check both lists and remove edges that a face has, and vertices that a face or edge has.
+        """Check both lists; remove edges of faces, and vertices of faces or edges.
 
         Raises:
             ValueError: not (L, 2) or (P,) integers from 0, an edge between equal vertices, an edge
@@ -79,7 +79,7 @@ class Topology:
         self._row_of_isolated = np.searchsorted(keys, wanted).astype(np.int32)
 
     def check(self, start: int, end: int) -> None:
-        """Raise a ``ValueError`` for numbers of vertices that do not fit."""
+        """Raise a ``ValueError`` if the numbers of vertices do not fit."""
         if start != end:
             raise ValueError(f"x_t1: {end} vertices, but x_t0 has {start}")
         if self._vertices is not None and start != self._vertices:
@@ -99,7 +99,7 @@ class Topology:
         self._vertices = start
 
     def parts(self, pairs: NDArray[np.int32], impacts: Impacts) -> dict[str, Any]:
-        """Separate vertex-face pairs with isolated parts, which follow the faces, into fields."""
+        """Split pairs into vertex-face pairs and those with isolated vertices or edges."""
         number = pairs[:, 1] - len(self.faces)
         edges = len(self.isolated.edges)
         of_face, of_point = number < 0, number >= edges

@@ -1,4 +1,4 @@
-"""For comparison only: methods that the studies measure and no query of the package uses.
+"""For comparison only: methods that the studies measure; no query of the package uses them.
 
 Textbook separating axes (Ericson 2005, 5.2.1) in plain arithmetic, whose answers rounding can
 make wrong; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and single bounding
@@ -16,14 +16,14 @@ from tauguard.rigid.mesh import MeshTree
 from tauguard.rigid.queries import native, native_overlap, refuse_hulls, rows
 from tauguard.rigid.shapes import Bodies
 
-#: Runs of triangles with one bounding volume each, by its name.
+#: Classes of single bounding volumes over runs of triangles, by name.
 VOLUMES: dict[str, Any] = {
     "sphere": _rigid_mesh.BallVolumes,
     "aabb": _rigid_mesh.AabbVolumes,
     "obb": _rigid_mesh.ObbVolumes,
     "k_dop": _rigid_mesh.KDopVolumes,
 }
-#: Number of the textbook's separating axes in the native module.
+#: Native number of the textbook method of separating axes.
 _TEXTBOOK = 3
 
 

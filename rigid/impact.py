@@ -33,16 +33,16 @@ def time_of_impact(
     motion_b: Motion,
     threads: int = 1,
 ) -> Impacts:
-    """When do moving bodies first touch, t in [0, 1]?
+    """The first contact of moving bodies, t in [0, 1].
 
-    The bodies' numbers are coordinates of their own frame, which the motion moves. The answer is
+    The coordinates of a body are relative to its own frame, which the motion moves. The answer is
     conservative, also under rounding: at every time before ``time_of_impact`` the bodies are apart.
-    Advancement along separating directions (after Mirtich 1996 and Zhang, Lee and Kim 2006) with a
-    bound on the second derivative: it converges quadratically, from below.
+    The method is advancement along separating directions (Mirtich 1996; Zhang, Lee and Kim 2006)
+    with a bound on the second derivative: it converges quadratically, from below.
 
     Args:
-        a: N convex bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not
-            its inside).
+        a: N convex bodies of one kind, rounded or not, or one; or a mesh, of which only the surface
+            is tested (not its inside).
         b: The same for the other side; two meshes may have different bounding volumes.
         motion_a: N motions, or one.
         motion_b: N motions, or one.
@@ -50,7 +50,7 @@ def time_of_impact(
 
     Returns:
         ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b), with
-        meshes also the ``faces``. Where two bodies overlap at t = 0, the time is 0, the normal NaN
+        meshes also the ``faces``. If two bodies overlap at t = 0, the time is 0, the normal NaN
         and the point common to both.
 
     Raises:

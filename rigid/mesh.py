@@ -1,4 +1,4 @@
-"""Rigid triangle meshes: which triangles of two meshes meet, and where."""
+"""Rigid triangle meshes: pairs of triangles that intersect, and their contacts."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Volume = Literal["obb", "aabb"]
 
 @dataclass(frozen=True, eq=False)
 class MeshOverlap:
-    """First hit of two meshes, one row a pose.
+    """First hit of two meshes, one row per pose.
 
     Attributes:
-        hit: True where the surfaces share a point (touching counts). Shape (N,).
+        hit: True if the surfaces share a point (touching is a hit). Shape (N,).
         faces: A pair of faces that meet, (face of this mesh, face of the other); -1 where there is
             none, and for convex bodies. Shape (N, 2).
     """
@@ -32,15 +32,15 @@ class MeshOverlap:
 
 @dataclass(frozen=True, eq=False)
 class MeshContacts:
-    """Every pair of faces that meet, in the order of pose, face, other face.
+    """Every pair of faces that intersect, in the order of pose, face, other face.
 
     Attributes:
         pose: The row of the pose. Shape (M,).
         faces: Face of this mesh and face of the other. Shape (M, 2).
-        point: The middle of what the two triangles share, in this mesh's frame. Shape (M, 3).
+        point: The middle of the triangles' intersection, in this mesh's frame. Shape (M, 3).
         normal: Unit, from this mesh to the other: the direction of the shortest path on which the
-            other's triangle leaves this one. Shape (M, 3).
-        penetration: That path's length, 0 where they just touch. Shape (M,), m.
+            other's triangle separates from this one. Shape (M, 3).
+        penetration: Length of that path, 0 if they just touch. Shape (M,), m.
     """
 
     pose: NDArray[np.int32]
@@ -58,14 +58,14 @@ class MeshTree:
 
     Nodes have eight children, split by the surface-area heuristic. ``obb``, the default, gives
     every child an oriented box along the principal axes of its surface (Gottschalk, Lin and Manocha
-    1996), kept in single precision and tested eight at a time; it was fastest on every mesh that
-    was measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's own
+    1996), kept in single precision and tested eight at a time; it was fastest on all measured
+    meshes (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's own
     frame. They are tested in the same way against the other mesh's boxes, which the pose turns. It
     builds in two thirds of the time, so it is the better choice for at most a few thousand poses.
     The volume never changes an answer.
 
-    What is exact: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
-    double precision and rounded; whether two triangles of the resulting corners share a point is
+    Exactness: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
+    double precision and rounded. Whether two triangles of the resulting corners share a point is
     then decided without error, degenerate triangles included.
 
     Args:
@@ -81,7 +81,7 @@ class MeshTree:
     volumes: tuple[str, ...] = get_args(Volume)
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, volume: str = "obb") -> None:
-        """Build the tree; the class says what is expected."""
+        """Build the tree; see the class for the arguments."""
         points = frozen_finite("vertices", vertices, (None, 3))
         triangles = frozen_indices("faces", faces, (None, 3), len(points))
         if len(triangles) == 0:
@@ -130,12 +130,12 @@ class MeshTree:
             )
 
     def overlap(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshOverlap:
-        """Do the surfaces meet, with the other mesh posed in this one's frame?
+        """Whether the surfaces intersect, with the other mesh posed in this one's frame.
 
-        The search stops at a first pair.
+        The search stops at the first pair.
 
         Args:
-            other: Built with the same volume.
+            other: A mesh that was built with the same volume.
             pose: Shape (N, 4, 4), or (4, 4) for a batch of one.
             threads: 0 means all processors; the answer does not depend on it.
 
@@ -151,7 +151,7 @@ class MeshTree:
     def contacts(
         self, other: MeshTree, pose: ArrayLike, threads: int = 1, limit: int = 10_000_000
     ) -> MeshContacts:
-        """All pairs of triangles that meet: points, normals, penetrations; see :meth:`overlap`.
+        """All intersecting pairs of triangles: points, normals, penetrations; see :meth:`overlap`.
 
         With the meshes exchanged (and the inverse pose) the contacts are the same and the
         normals opposite. If both meshes are moved together, the contacts move with them, except
@@ -173,7 +173,7 @@ class MeshTree:
         )
 
     def time_of_impact(self, other: MeshTree, motion: Motion, threads: int = 1) -> MeshImpacts:
-        """When does the other mesh, under ``motion`` in this one's frame, first touch this one?
+        """The first contact with the other mesh, which has ``motion`` in this one's frame.
 
         See :func:`tauguard.rigid.time_of_impact`; this mesh is at rest.
         """
@@ -184,12 +184,12 @@ class MeshTree:
     def sweep(
         self, other: MeshTree, pose: ArrayLike, displacement: ArrayLike, threads: int = 1
     ) -> MeshImpacts:
-        """When does the other mesh, moving straight from ``pose``, first touch this one?
+        """The first contact with the other mesh, which moves straight from ``pose``.
 
         Args:
             other: Any mesh.
-            pose: At t = 0. Shape (N, 4, 4) or (4, 4).
-            displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,), m.
+            pose: Pose at t = 0. Shape (N, 4, 4) or (4, 4).
+            displacement: Displacement over the step t in [0, 1]. Shape (N, 3) or (3,), m.
             threads: 0 means all processors; the answer does not depend on it.
 
         Raises:

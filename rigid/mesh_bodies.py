@@ -12,7 +12,7 @@ from tauguard.rigid.queries import native
 from tauguard.rigid.results import MeshDistances, MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
 
-#: Coordinates and radii beyond this are refused with a mesh; it is the limit of meshes, too.
+#: Largest coordinate and radius beside a mesh; meshes have the same limit.
 MOST_COORDINATE = 1e30
 
 
@@ -20,7 +20,7 @@ def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Sol
     """The mesh, the bodies, and whether the mesh is ``b``; ``None`` if there is no mesh.
 
     Raises:
-        ValueError: both are.
+        ValueError: both are meshes.
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ValueError(
@@ -35,13 +35,13 @@ Native = tuple[int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 
 
 def bodies_of(name: str, solid: Solid) -> Native:
-    """A batch as the native module takes it: kind, packed rows, offsets, radii."""
+    """The native form of a batch: kind, packed rows, offsets, radii."""
     core, radius = solid_parts(name, solid, MOST_COORDINATE)
     return *native(core), radius
 
 
 def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOverlap:
-    """Which bodies the surface meets, and a triangle of each."""
+    """Bodies that the surface intersects, and such a triangle for each."""
     bodies = bodies_of(_other(swapped), solid)
     face = np.empty(len(solid), dtype=np.int32)
     mesh._mesh.meets(*bodies, face, thread_count(threads))
@@ -49,7 +49,7 @@ def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOv
 
 
 def distance(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshDistances:
-    """How far the surface is from each body."""
+    """Distance of the surface from each body."""
     bodies = bodies_of(_other(swapped), solid)
     out, face = np.empty((len(solid), 10)), np.empty(len(solid), dtype=np.int32)
     mesh._mesh.distances(*bodies, out, face, thread_count(threads))
@@ -67,7 +67,7 @@ def first_contact(
     motion_b: Motion,
     threads: int,
 ) -> MeshImpacts:
-    """When the surface first touches each body; the mesh is ``b`` if ``swapped``."""
+    """First contact of the surface with each body; the mesh is ``b`` if ``swapped``."""
     motion_mesh, motion_solid = (motion_b, motion_a) if swapped else (motion_a, motion_b)
     bodies = bodies_of(_other(swapped), solid)
     lengths = {"bodies": len(solid), "motion_a": len(motion_a), "motion_b": len(motion_b)}

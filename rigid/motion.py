@@ -1,4 +1,4 @@
-"""Rigid poses and motions, checked."""
+"""Checked rigid poses and motions."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
 
-#: Rotation over a step beyond which a motion is refused [rad]: every radian of it costs time, and
+#: Largest rotation of a motion over a step [rad]: every radian costs time, and
 #: the rounding of the angle grows with it.
 MOST_TURN = 1e4
 
@@ -80,7 +80,7 @@ class Motion(Rebuilt):
 
     @property
     def packed(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """The three arrays, as the native kernels read them."""
+        """The three arrays in the form that native kernels read."""
         return self.pose_t0, self.linear, self.angular
 
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
@@ -103,7 +103,7 @@ def bounded(name: str, motion: Motion) -> None:
 
 
 def common_length(lengths: dict[str, int]) -> int:
-    """The common length of several batches by name, each being that or 1.
+    """The common length of several named batches; each has this length or 1.
 
     Raises:
         ValueError: lengths that do not match.

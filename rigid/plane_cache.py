@@ -1,4 +1,4 @@
-"""Overlap of coherent frames: the separating planes of the last frame are tried first."""
+"""Overlap in coherent frames: test the separating planes of the last frame first."""
 
 from threading import Lock
 
@@ -32,11 +32,11 @@ class PlaneCache:
             raise ValueError(f"count: {count!r:.40}, expected an integer of 0 or more")
         self._lock = Lock()
         self._normals: NDArray[np.float64] = np.zeros((count, 3))
-        #: How many rows of the last frame their cached plane answered.
+        #: Number of rows of the last frame that their cached plane decided.
         self.answered = 0
 
     def overlap(self, a: Bodies, b: Bodies, threads: int = 1) -> Overlap:
-        """Answers one frame and keeps its separating planes; arguments as for ``overlap``.
+        """Answer one frame and keep its separating planes; arguments as for ``overlap``.
 
         Raises:
             ValueError: another number of pairs than the cache was made for, and what ``overlap``

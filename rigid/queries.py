@@ -3,7 +3,7 @@
 ``abfme`` eliminates the unknowns of a separating plane (Fourier-Motzkin elimination with facet
 functions scaled by determinants, redundant combinations left out); ``sat`` tests separating axes
 (Gottschalk et al. 1996; Ericson 2005, 5.2). Both run in floating point with derived error
-bounds. What they cannot decide goes to exact arithmetic.
+bounds. Exact arithmetic decides the remaining rows.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
 def native_overlap(
     a: Bodies, b: Bodies, method: str, threads: int = 1
 ) -> tuple[NDArray[np.bool_], int]:
-    """``hit`` of shape (N,), and how many rows the filter left to exact arithmetic."""
+    """``hit`` of shape (N,), and the number of rows that exact arithmetic decided."""
     if method == "sat":
         refuse_hulls(a, b)
     hit = np.empty(rows(a, b), dtype=np.uint8)
@@ -53,7 +53,7 @@ def refuse_hulls(a: Bodies, b: Bodies) -> None:
 
 
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
-    """The batch path of boxes into ``hit``: how many rows needed exact arithmetic."""
+    """Overlap of batched boxes, written to ``hit``; returns the number of exact rows."""
     skew = max(a.skew, b.skew)
     return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, threads, hit)
 
@@ -65,14 +65,14 @@ def sweep(
     method: SweepMethod = "auto",
     threads: int = 1,
 ) -> Impacts:
-    """When does ``b[i]``, moving straight by ``t * displacement[i]``, first touch ``a[i]``?
+    """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 
     Args:
         a: N bodies of one kind at rest, or one.
         b: N bodies, or one.
-        displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,).
+        displacement: Displacement over the step t in [0, 1]. Shape (N, 3) or (3,).
         method: ``abfme`` eliminates the separating plane with t as a further unknown, and casts
-            separating axes only for the time of hits. ``sat`` always casts separating axes.
+            separating axes only for the times of hits. ``sat`` always casts separating axes.
             ``auto`` is the faster of both. ``hit`` is exact for each, ``time_of_impact`` never
             late.
         threads: 0 means all processors; the answer does not depend on it.
@@ -118,7 +118,7 @@ def native_sweep(
 
 @contextmanager
 def portable() -> Iterator[None]:
-    """Switch vector instructions off inside the block, in all threads, for studies and tests."""
+    """Context that disables vector instructions in all threads, for studies and tests."""
     _rigid.allow_vectors(False)
     try:
         yield
@@ -134,7 +134,7 @@ def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1)
 
 
 def native(bodies: Bodies) -> tuple[int, NDArray[np.float64], NDArray[np.int64]]:
-    """A batch as the native module takes it: kind, packed rows, offsets."""
+    """The native form of a batch: kind, packed rows, offsets."""
     offsets = bodies.offsets if isinstance(bodies, Hulls | Polygons) else _NO_OFFSETS
     return _KINDS[type(bodies)], bodies.packed, offsets
 

@@ -1,4 +1,4 @@
-"""Answers of the queries, row by row: frozen values of arrays."""
+"""Results of the queries, row by row, as frozen dataclasses of arrays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """Why a pair overlaps or not, except for rounding; rows of the other case are NaN.
+    """The evidence for overlap or separation, to rounding; rows of the other case are NaN.
 
     Attributes:
-        point: A common point where the pair overlaps. Shape (N, 3).
-        normal: Unit normal of a separating plane, from a to b, elsewhere. Shape (N, 3).
+        point: A common point of a pair that overlaps. Shape (N, 3).
+        normal: Unit normal of a separating plane of another pair, from a to b. Shape (N, 3).
         offset: The plane is ``normal @ x = offset``: a lies below it, b above. Shape (N,).
     """
 
@@ -28,7 +28,7 @@ class Overlap:
     """Answer of an overlap query.
 
     Attributes:
-        hit: True where the two sets share a point (touching counts). Shape (N,).
+        hit: True if the two sets share a point (touching is a hit). Shape (N,).
     """
 
     hit: NDArray[np.bool_]
@@ -45,9 +45,9 @@ class Impacts:
     """First contact of two moving bodies, row by row.
 
     Attributes:
-        hit: True where they touch within the step. Shape (N,).
-        time_of_impact: In [0, 1] of the step; inf where there is no hit. Shape (N,).
-        point: A common point at that time, world frame; NaN where there is no hit. Shape (N, 3).
+        hit: True if they touch within the step. Shape (N,).
+        time_of_impact: Fraction of the step in [0, 1]; inf without a hit. Shape (N,).
+        point: A common point at that time, world frame; NaN without a hit. Shape (N, 3).
         normal: Unit contact normal from a to b at that time; NaN where there is none, or where the
             bodies overlap from the start and no normal is defined. Shape (N, 3).
     """
@@ -80,9 +80,9 @@ class Distances:
             them. Shape (N,).
         point_a: The point of a nearest to b; if they overlap, a's deepest point along the normal.
             Shape (N, 3).
-        point_b: Likewise of b. Shape (N, 3).
-        normal: Unit, from a to b: the direction in which b leaves a. If bodies without thickness
-            touch, any normal of the plane or line that they span. Shape (N, 3).
+        point_b: The same point of b. Shape (N, 3).
+        normal: Unit vector from a to b: the direction in which b separates from a. If bodies
+            without thickness touch, any normal of the plane or line that they span. Shape (N, 3).
     """
 
     distance: NDArray[np.float64]
@@ -91,7 +91,7 @@ class Distances:
     normal: NDArray[np.float64]
 
     def within(self, min_distance: float) -> NDArray[np.bool_]:
-        """Which pairs are no further apart than ``min_distance``. Shape (N,)."""
+        """Whether each pair is no further apart than ``min_distance``. Shape (N,)."""
         return self.distance <= min_distance
 
 
@@ -99,8 +99,8 @@ class Distances:
 class MeshDistances(Distances):
     """Signed distance of a mesh and convex bodies, row by row.
 
-    A negative distance is that of the triangle deepest in the body: how far the body must move to
-    leave that triangle, not the whole mesh.
+    A negative distance belongs to the triangle deepest in the body: the distance that the body must
+    move to leave that triangle, not the whole mesh.
 
     Attributes:
         face: The triangle nearest to the body, or deepest in it. Shape (N,).

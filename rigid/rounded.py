@@ -16,7 +16,7 @@ from tauguard.rigid.shapes import (
     Tetrahedra,
 )
 
-#: Coordinates and radii beyond this are refused: their products would overflow.
+#: Largest coordinate and radius; products of larger ones would overflow.
 MOST_COORDINATE = 1e100
 
 
@@ -60,7 +60,7 @@ class Rounded(Rebuilt):
 
 @dataclass(frozen=True, eq=False)
 class Spheres(Rebuilt):
-    """Balls.
+    """Batches of balls.
 
     Args:
         center: Shape (N, 3).
@@ -92,7 +92,7 @@ class Capsules(Rebuilt):
 
     Args:
         start: One end of the segment. Shape (N, 3).
-        end: The other. Shape (N, 3).
+        end: The other end. Shape (N, 3).
         radius: Zero or more. Shape (N,), or one number for all.
 
     Raises:

@@ -3,7 +3,7 @@
 A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
 thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
 
-A batch keeps its own copy of its arrays, which nobody can change, so the kernels read what was
+A batch keeps an immutable copy of its arrays, so the kernels read the values that were
 checked.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tauguard.geometry import Rebuilt, frozen, frozen_finite, sealed
 from tauguard.rigid import _rigid
 
-#: How far an entry of R^T R may be from the identity; beyond it R is refused as not a rotation.
+#: Largest deviation of an entry of R^T R from the identity; beyond it R is refused.
 ORTHONORMAL_TOLERANCE = 1e-6
 
 
@@ -41,7 +41,7 @@ class Tetrahedra(Rebuilt):
 
     @cached_property
     def packed(self) -> NDArray[np.float64]:
-        """The numbers of a body in one row, as the native kernels read them. Shape (N, 12)."""
+        """The vertices of a body in one row, for native kernels. Shape (N, 12)."""
         return self.vertices.reshape(len(self), 12)
 
 
@@ -101,7 +101,7 @@ class Boxes(Rebuilt):
 
     @cached_property
     def blocks(self) -> NDArray[np.float64]:
-        """Eight boxes a row for the batch path: centres in double, the rest in single precision.
+        """Eight boxes per row for batched queries: centres in double, the rest in single precision.
 
         The last block is filled up with copies of the last box. Shape (ceil(N / 8), 72).
         """
@@ -176,8 +176,8 @@ class Hulls(Rebuilt):
 class Polygons(Rebuilt):
     """Convex polygons in the plane: the hulls of any number of points each, in any order.
 
-    They meet other polygons only. Arguments and errors as for :class:`Hulls`, vertices of shape
-    (M, 2).
+    They are tested against polygons only. Arguments and errors as for :class:`Hulls`, vertices of
+    shape (M, 2).
     """
 
     vertices: NDArray[np.float64]

@@ -11,7 +11,7 @@ from tauguard.rigid.rounded import Solid, solid_parts
 
 
 def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
-    """Signed distances of convex bodies, as the public query gives them."""
+    """Signed distances of convex bodies, for the public query."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     out = np.empty((rows(core_a, core_b), 10))
     _rigid_mesh.distances(
@@ -21,7 +21,7 @@ def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
 
 
 def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
-    """Whether bodies with radii share a point, as exactly as by their distance."""
+    """Whether bodies with radii share a point, as exact as the sign of their distance."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
     _rigid_mesh.meets(

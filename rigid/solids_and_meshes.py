@@ -1,4 +1,4 @@
-"""Overlap and distance of convex bodies, rounded or not, and of a mesh beside them."""
+"""Overlap and distance of convex bodies, rounded or not, and of meshes with them."""
 
 from typing import Literal, cast, get_args, overload
 
@@ -26,7 +26,7 @@ def overlap(
 def overlap(
     a: Solid | MeshTree, b: Solid | MeshTree, method: OverlapMethod = "auto", threads: int = 1
 ) -> Overlap | MeshOverlap:
-    """Do the convex bodies ``a[i]`` and ``b[i]`` share a point? Touching counts as a hit.
+    """Whether the convex bodies ``a[i]`` and ``b[i]`` share a point; touching is a hit.
 
     Args:
         a: N bodies of one kind, rounded or not, or one body that meets every ``b[i]``; or a mesh,

@@ -2,8 +2,8 @@
 
 Each package is one study; :mod:`studies.framework` runs it.
 
-A study's ``__init__.py`` says what is asked: its ``STUDY`` names the parts that a user can ask for.
-The other files of the package say how each part is measured.
+A study's ``__init__.py`` defines ``STUDY``, the list of the parts that a user can run.
+The other files of the package measure the parts.
 """
 
 #: The packages, in the order of ``tauguard bench list``.

@@ -1,7 +1,7 @@
-"""Deforming meshes to test and time with: generators of any size, and a loader of recorded ones.
+"""Deforming meshes for tests and timings: generators of any size, and a loader of recordings.
 
-The generated motions are prescribed, not simulated. They are smooth formulas of time. Their
-surfaces fold, touch and pass through themselves, and collision queries have to find this. Each
+The generated motions are prescribed by smooth formulas of time, not simulated. Their
+surfaces fold, touch and pass through themselves, so that queries find collisions. Each
 builder takes the number of triangles to aim for and a seed; the same arguments give the same
 bytes.
 """

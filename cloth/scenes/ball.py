@@ -1,4 +1,4 @@
-"""A sheet that falls over a ball, which then turns and winds it up."""
+"""A sheet that falls over a ball and is wound up as the ball turns."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def turning_ball(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A square sheet drapes over a ball; its skirt falls in flutes, and the ball's turn winds them.
 
     Winding drags the flutes sideways until their flanks meet, first at the corners. Group 0 is the
-    sheet, group 1 the ball, which does not meet itself.
+    sheet, group 1 the ball, which is not tested against itself.
     """
     rng = np.random.default_rng(seed)
     ripple = rng.uniform(0, 2 * np.pi, 2)

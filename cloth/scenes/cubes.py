@@ -1,4 +1,4 @@
-"""Cubes: pushed together until their faces lie on each other, or dropped on a cloth."""
+"""Cubes that are pushed together until their faces touch, or dropped on a cloth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from tauguard.cloth.groups import Groups
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, grid_size, sheet, smooth_step
 
-SIZE = 0.25  #: of a packed cube [m]: a power of two, so that faces meet without rounding
+SIZE = 0.25  #: side of a packed cube [m]: a power of two, so that faces touch without rounding
 GAP = 0.125
 DROPPED = 4
 
@@ -14,8 +14,8 @@ DROPPED = 4
 def packed_cubes(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A lattice of rigid cubes closes until faces touch exactly; then its layers slide.
 
-    From half of the time on, the faces of neighbours touch and lie in one plane. Every cube is a
-    group, which does not meet itself.
+    From half of the time on, neighbours have coplanar, touching faces. Every cube is a
+    group, which is not tested against itself.
     """
     rng = np.random.default_rng(seed)
     side, fine = _lattice(triangles)
@@ -92,7 +92,7 @@ def cubes_on_cloth(triangles: int = 20_000, seed: int = 0) -> Scene:
 
 
 def _lattice(triangles: int) -> tuple[int, int]:
-    """Cubes along a side, and squares along a side of a face, for about this many triangles."""
+    """Cubes per side, and squares per side of a face, for about this many triangles."""
     sizes = [(side, fine) for side in (2, 3, 4) for fine in range(1, 200)]
     return min(sizes, key=lambda s: abs(12 * s[0] ** 3 * s[1] ** 2 - triangles))
 

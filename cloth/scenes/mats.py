@@ -1,4 +1,4 @@
-"""Mats lying on one another, twisted about their long axis."""
+"""Stacked mats that are twisted about their long axis."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ def twisting_mats(triangles: int = 20_000, seed: int = 0) -> Scene:
     """Four mats, a gap apart, are twisted twice around; the waist draws in and curls them.
 
     The twist alone keeps the gaps; the curl of the waist presses the mats together, and ripples
-    that differ from mat to mat carry them through one another. One cloth, which meets itself.
+    that differ from mat to mat make them pass through each other. All are one cloth.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, (MATS, 2))

@@ -1,7 +1,7 @@
-"""OBJ and PLY files as vertices and triangles, in the file's order; nothing is guessed.
+"""Read OBJ and PLY files as vertices and triangles, in the file's order, without guesses.
 
-A line or a count that does not fit is refused. Leaving it out would renumber all vertices after
-it.
+A line or a count that does not fit is refused, because skipping it would renumber all vertices
+after it.
 """
 
 import itertools
@@ -16,10 +16,10 @@ from tauguard.untrusted_input import reading
 
 Points = NDArray[np.float64]
 Faces = NDArray[np.int32]
-#: Polygons of any length, or triangles as read.
+#: Polygons of any length, or triangles, as read.
 Polygons = list[list[int]] | NDArray[np.int64]
 
-#: Most bytes of a mesh file.
+#: Largest size of a mesh file [bytes].
 MOST_BYTES = 1 << 30
 #: Lines of an OBJ file that do not concern positions and faces.
 OTHER = (b"vn", b"vt", b"vp", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl")
@@ -33,7 +33,7 @@ ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
 def load_mesh(path: str | Path) -> tuple[Points, Faces]:
-    """Vertices, shape (V, 3), and triangles, shape (F, 3); polygons are split into fans.
+    """Vertices, shape (V, 3), and triangles, shape (F, 3); polygons become triangle fans.
 
     Raises:
         ValueError: not such a file, cut off, damaged, or without triangles; one line.

@@ -15,7 +15,7 @@ from tauguard.cloth.scenes.scene import (
 
 LAYERS = 3
 PLEATS = 22
-BODY_SHARE = 0.1  # of the triangles
+BODY_SHARE = 0.1  # fraction of the triangles
 
 
 def pleats(triangles: int = 20_000, seed: int = 0) -> Scene:
@@ -23,7 +23,7 @@ def pleats(triangles: int = 20_000, seed: int = 0) -> Scene:
 
     The pleats deepen until neighbouring folds and neighbouring layers meet; the dress follows the
     body's sway with a lag that grows towards the hem. Group 0 is the dress, group 1 the body, which
-    does not meet itself.
+    is not tested against itself.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, LAYERS)

@@ -1,4 +1,4 @@
-"""Recorded sequences: one mesh file a frame, the layout of the UNC dynamic-scene benchmarks."""
+"""Recorded sequences with one mesh file per frame, as in the UNC dynamic-scene benchmarks."""
 
 import re
 import warnings
@@ -16,11 +16,11 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MeshSequence:
-    """Frames of one mesh; a frame is read when it is used.
+    """The frames of one mesh, each read when it is used.
 
     Attributes:
         faces: Shape (F, 3), the same in every frame.
-        files: One a frame, in order.
+        files: One file per frame, in order.
     """
 
     faces: NDArray[np.int32]
@@ -57,8 +57,8 @@ def load_sequence(folder: str | Path, pattern: str = "*") -> MeshSequence:
     """The PLY or OBJ files of a folder as one sequence, ordered by the last number in their names.
 
     Args:
-        folder: Where the frames are, for example of ``http://gamma.cs.unc.edu/DYNAMICB``.
-        pattern: Which files (a glob) where a folder holds several meshes, ``"cloth*.ply"``.
+        folder: Folder of the frames, for example of ``http://gamma.cs.unc.edu/DYNAMICB``.
+        pattern: Glob of the files, for a folder with several meshes, such as ``"cloth*.ply"``.
 
     Raises:
         ValueError: no file matches, or the first cannot be read as a triangle mesh.

@@ -1,18 +1,19 @@
-"""A soft, bumpy body that is drawn between two rollers."""
+"""A soft, bumpy body that passes between two rollers."""
 
 import numpy as np
 
 from tauguard.cloth.groups import Groups
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, grid_size, sheet, sphere
 
-RADIUS, HALF_GAP = 0.5, 0.12  #: of the rollers, and half of what is between them [m]
+RADIUS, HALF_GAP = 0.5, 0.12  #: radius of the rollers, and half of the gap between them [m]
 BODY, BUMPS = 0.32, 24
 
 
 def rollers(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A bumpy body is pressed flat between turning rollers, and its bumps fold over each other.
 
-    Group 0 is the body, which meets itself; groups 1 and 2 are the rollers, which meet the body.
+    Group 0 is the body, tested against itself; groups 1 and 2 are the rollers, tested against the
+    body.
     """
     rng = np.random.default_rng(seed)
     ball, ball_faces = sphere(int(triangles * 0.6))

@@ -1,4 +1,4 @@
-"""A scene: faces, which bodies meet, and the position of every vertex at any time."""
+"""A scene: faces, groups, and the position of every vertex at any time."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ class Scene:
     """A prescribed motion of a triangle mesh.
 
     Attributes:
-        name: As in ``SCENES``.
+        name: Key in ``SCENES``.
         faces: Shape (F, 3).
-        groups: Which bodies meet; ``None``: one cloth that meets itself.
-        positions: From a time in [0, 1] to positions [m], shape (V, 3).
-        frames: The number of steps that moves a typical vertex by about an edge length a step.
+        groups: Groups of vertices; ``None``: one cloth that is tested against itself.
+        positions: Function from a time in [0, 1] to positions [m], shape (V, 3).
+        frames: Number of steps in which a typical vertex moves by about an edge length per step.
     """
 
     name: str
@@ -86,11 +86,11 @@ def sphere(triangles: int) -> tuple[Points, NDArray[np.int32]]:
 
 
 def smooth_step(x: float | Points, start: float, stop: float) -> Points:
-    """0 before ``start``, 1 after ``stop``, a cubic without a kink in between."""
+    """0 before ``start``, 1 after ``stop``, and a smooth cubic in between."""
     s = np.clip((np.asarray(x) - start) / (stop - start), 0.0, 1.0)
     return np.asarray(s * s * (3 - 2 * s))
 
 
 def frames_for(triangles: int) -> int:
-    """Steps that keep the motion of a step in proportion to the edges: the root of the size."""
+    """Number of steps that keeps motion per step proportional to edge length."""
     return max(12, round(0.6 * float(np.sqrt(triangles))))

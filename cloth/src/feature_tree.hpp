@@ -23,8 +23,8 @@ struct Features {
   const std::int32_t* of(std::size_t i) const { return vertices.data() + arity * i; }
 };
 
-// Which vertices may meet: a group for each vertex and a symmetric table of groups. If empty, all
-// may meet.
+// Vertices to test against each other: a group for each vertex and a symmetric table. If empty, all
+// are tested.
 struct Groups {
   std::vector<std::int32_t> of_vertex;
   std::vector<std::uint8_t> meets;  // count x count

@@ -13,7 +13,7 @@ namespace tauguard::cloth {
 // The collisions of one kind, in the order of their pairs.
 struct Collisions {
   SpareArray<std::int32_t> pairs;                  // (n, 2)
-  SpareArray<double> toi, point, normal, weights;  // shapes shapes (n), (n, 3), (n, 3), (n, 4)
+  SpareArray<double> toi, point, normal, weights;  // shapes (n), (n, 3), (n, 3), (n, 4)
   Stats stats;
   double narrow_s = 0;  // in the narrow phase, summed over threads
   double total_s = 0;   // wall time of candidates, narrow phase and sorting

@@ -21,7 +21,7 @@ struct NodePair {
 
 class Front {
  public:
-  // Forgets the cut; the next update starts near the root.
+  // Discards the cut; the next update starts near the root.
   void reset() { cut_.clear(); }
   // Moves the front to the present volumes and returns the pairs of leaf numbers that overlap. To
   // test a tree against itself, pass it twice; each unordered pair is visited once. Throws TooMany

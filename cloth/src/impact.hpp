@@ -15,7 +15,7 @@ namespace tauguard::cloth {
 // of the face's vertices), or (1 - s, s, 1 - t, t) for two edges. All pointers but `toi` are null
 // if only times are needed.
 struct ImpactArrays {
-  double *toi, *point, *normal, *weights;  // shapes shapes (n), (n, 3), (n, 3), (n, 4)
+  double *toi, *point, *normal, *weights;  // shapes (n), (n, 3), (n, 3), (n, 4)
 };
 
 inline Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }

@@ -6,9 +6,10 @@ neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, 
 ``report``, ``hard_cases``, ``twin``.
 
 ``gymnasium.make("tauguard/Reach-v0")`` makes an environment once tauguard is imported; so do
-``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` has its tables.
+``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
+environment.
 
-``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` look at a recording by hand.
+``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` help to inspect a recording by hand.
 
 tauguard is a research tool, not a certified safety function.
 """

@@ -1,4 +1,4 @@
-"""Types of arrays that every package uses."""
+"""Array types for all packages."""
 
 import dataclasses
 from typing import Any
@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Numbers; docstrings give units and shapes.
+#: Array of doubles; docstrings give units and shapes.
 Array = NDArray[np.float64]
-#: One mark for each element.
+#: Array of bools.
 Bools = NDArray[np.bool_]
 
 #: Largest array, in elements, and largest text, in characters, that a message shows whole.
@@ -16,7 +16,7 @@ FEW, SHORT = 7, 60
 
 
 def in_a_line(value: Any) -> str:
-    """A dataclass's ``__repr__``: its fields, large arrays by shape, long texts by size."""
+    """A dataclass's ``__repr__`` with large arrays as shapes and long texts as sizes."""
     fields = [field for field in dataclasses.fields(value) if field.repr]
     parts = [f"{field.name}={_brief(getattr(value, field.name))}" for field in fields]
     return f"{type(value).__name__}({', '.join(parts)})"

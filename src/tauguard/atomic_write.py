@@ -1,4 +1,4 @@
-"""Atomic writing: a file is complete or absent, whatever interrupts the writer."""
+"""Atomic writing: after any interruption a file is complete or absent."""
 
 import contextlib
 import os
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-#: Ending of a file that is being written; its name begins with a dot.
+#: Extension of a file during writing; its name begins with a dot.
 PART = ".part"
 
 
@@ -15,8 +15,8 @@ PART = ".part"
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """A stream whose bytes become ``path`` when the block ends without an error.
 
-    The bytes go to a file beside ``path`` whose name begins with a dot and ends in ``.part``; it is
-    forced to the disk and renamed. After an error it is removed and ``path`` is unchanged. Only a
+    The bytes go to a file beside ``path`` whose name begins with a dot and ends in ``.part``. It is
+    flushed to the disk and renamed. After an error it is removed and ``path`` is unchanged. Only a
     process that is killed leaves its ``.part`` file (see :func:`remove_parts`).
 
     Raises:
@@ -56,7 +56,7 @@ def _remove(part: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Force a rename to the disk, where the system can."""
+    """Flush a rename to the disk, if the system supports it."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

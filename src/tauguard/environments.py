@@ -1,6 +1,6 @@
-"""Registers the environments with Gymnasium; each is imported when it is made."""
+"""Register the environments with Gymnasium; each is imported when it is made."""
 
-#: Name -> module and class prefix, and how many actions an episode has.
+#: Name -> module and class prefix, and number of actions of an episode.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
     "tauguard/React-v1": ("react", "React", 500),
@@ -10,7 +10,7 @@ ENVIRONMENTS = {
 
 
 def register_environments() -> None:
-    """Put them into Gymnasium's registry, once; without Gymnasium there is none to put them in."""
+    """Register the environments once; do nothing if Gymnasium is not installed."""
     try:
         from gymnasium.envs.registration import register, registry
     except ModuleNotFoundError:

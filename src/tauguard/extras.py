@@ -1,6 +1,6 @@
-"""How to install an extra, for messages."""
+"""Text for messages on how to install an extra."""
 
 
 def extra(name: str) -> str:
-    """The extra and both ways to it: ``the extra `arms` (pip install ...)``."""
+    """The name of the extra and the commands to install it."""
     return f"the extra `{name}` (pip install 'tauguard[{name}]'; here: uv run --extra {name} ...)"

@@ -1,4 +1,4 @@
-"""Names of a package that are imported at their first use."""
+"""Import names of a package at their first use."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def on_demand(package: str) -> Callable[[str], Any]:
-    """A ``__getattr__`` for ``package``: its imports under ``if TYPE_CHECKING:``, one at a time.
+    """A ``__getattr__`` for ``package`` that imports names listed under ``if TYPE_CHECKING:``.
 
     ``dir`` and completion list those names, too, without importing any.
 

@@ -1,4 +1,4 @@
-"""Reading of untrusted files: whatever is wrong with one becomes a ``ValueError`` of one line."""
+"""Read untrusted files: every error in a file becomes a ``ValueError`` of one line."""
 
 import contextlib
 import json
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-#: Most bytes of a text file that is read whole: settings, column maps, robot descriptions.
+#: Largest size of a text file [bytes]: settings, column maps, robot descriptions.
 MOST_TEXT = 1 << 26
 
 
@@ -14,9 +14,9 @@ MOST_TEXT = 1 << 26
 def reading(path: str | Path, expected: str = "") -> Iterator[None]:
     """Turn every error that the content of ``path`` causes in this block into a ``ValueError``.
 
-    A reader cannot foresee every way in which a file can be wrong: nesting too deep, numbers too
+    A reader cannot foresee every kind of error in a file: nesting too deep, numbers too
     large, missing names, wrong types. The message is one line and begins with the path;
-    ``expected`` says what would have worked.
+    ``expected`` describes a valid file.
 
     Raises:
         ValueError: the content cannot be read; the cause is chained.

@@ -1,6 +1,6 @@
-"""Queries near every degeneracy: ab2pf beside exact integers that share no code with it.
+"""Queries near every degeneracy: ab2pf against an oracle in exact integers without common code.
 
-The same queries come again scaled by powers of two, with their vertices in another order, and
+The same queries are repeated scaled by powers of two, with their vertices in another order, and
 backwards in time; no answer may change.
 """
 
@@ -17,7 +17,7 @@ from studies.cloth.shared import run_row
 from studies.framework import Workers, answer, table_rows
 from tauguard.report import Row
 
-#: Queries of a job of one process.
+#: Number of queries in a job.
 CHUNK = 500
 
 NOTES = {
@@ -32,7 +32,7 @@ ERRORS = ("misses", "false_hits", "late", "exact_differs")
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """At least a million queries of either kind (quick: 3,000), evenly over the sets."""
+    """Measure at least a million queries of either kind (quick: 3,000), evenly over the sets."""
     n = -(-(3_000 if quick else 1_000_000) // len(KINDS))
     rows: list[Row] = []
     with Workers() as run:
@@ -73,7 +73,7 @@ def _answer(x: Positions, vertex: bool, method: str = "ab2pf") -> Answer:
 
 
 def _changes(x: Positions, vertex: bool, found: Answer) -> dict[str, int]:
-    """How many hits change where none may."""
+    """Number of hits that change under transformations that must not change them."""
 
     def changed(other: Positions) -> int:
         return int((found.hit != _answer(other, vertex).hit).sum())

@@ -1,6 +1,6 @@
-"""Whole frames: every method beside ipctk, with misses, false hits and late times.
+"""Whole frames: every method and ipctk, with misses, false hits and late times.
 
-Everything runs in one thread. Times are those of the processor, without other programs.
+All methods run in one thread. Times are processor times.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,19 +23,19 @@ from tauguard.cloth.comparators import ComparedMeshCCD as MeshCCD
 from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row
 
-#: Method and volume: each as published, then all on the same candidates.
+#: Pairs of method and volume: first as published, then all on the same candidates.
 ENTRIES = [
     ("ab2pf", "moving_k_dop14"),
     *((method, "k_dop18") for method in ("iccd", "dnf", "scd", "vcd", "naive", "ab2pf")),
     *((method, "moving_k_dop14") for method in ("iccd", "vcd")),
 ]
-#: Mean time of a frame over ab2pf's that is asked of comparators, each on its own volume.
+#: Target of each comparator's mean frame time over ab2pf's, on the comparator's own volume.
 MEANS = {"iccd": 2.3, "vcd": 1.34}
-#: The peer whose frame of cloth-ball is asked to take this many times ab2pf's.
+#: The peer, and the target of its time on a frame of cloth-ball over ab2pf's.
 PEER = ("ipctk LBVH + AdditiveCCD", 10)
-#: A time is late if it is this much later than ab2pf's, which may be this much early [step].
+#: A time is late if it exceeds ab2pf's by this, because ab2pf's may be early by this [step].
 LATE = 1e-9
-RECORDED = "cloth-ball"  #: the frame that a figure is asked of
+RECORDED = "cloth-ball"  #: the recorded scene with a target
 
 NOTES = {
     "frame": "all collisions of one step. volume: of the broad phase; (moving_)k_dopK has K/2 axes "
@@ -61,7 +61,7 @@ class Frame(NamedTuple):
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Generated scenes, and recorded ones in a full run where ``TAUGUARD_DATA`` names them.
+    """Measure generated scenes and, in a full run, the recorded ones in ``TAUGUARD_DATA``.
 
     A quick run has no recorded frames: their 6.9 million candidates take ipctk minutes.
     """
@@ -118,7 +118,7 @@ def _methods(frame: Frame, repeats: int) -> list[Row]:
 
 
 def _means(rows: Sequence[Row]) -> list[Row]:
-    """Mean of the ratios of each method: over the cloths, then over all scenes."""
+    """Mean ratios of each method: over the cloths, then over all scenes."""
     frames = table_rows(rows, "frame")
     cloths = [row for row in frames if row["scene"] in (*CLOTHS, RECORDED)]
     means: list[Row] = []
@@ -193,7 +193,7 @@ def _peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row
 
 
 def _clear(kind: str, candidates: list[Any], found: FrameAnswer, most: int) -> list[Any]:
-    """Up to ``most`` candidates, evenly over the list, without those that are hits."""
+    """Up to ``most`` candidates without contact, evenly over the list."""
 
     def ids(one: Any) -> tuple[int, int]:
         if kind == "fv":
@@ -205,7 +205,7 @@ def _clear(kind: str, candidates: list[Any], found: FrameAnswer, most: int) -> l
 
 
 def _listed(data: Path) -> list[Row]:
-    """Every method beside the listed collisions; "exact" only where it takes seconds."""
+    """Compare every method with the listed collisions; "exact" only if it takes seconds."""
     rows: list[Row] = []
     for name in FRAMES:
         frame = load_frame(data, name)
@@ -230,14 +230,14 @@ def _listed(data: Path) -> list[Row]:
 
 
 def differences(reference: tuple[Any, Any], found: tuple[Any, Any]) -> tuple[int, int]:
-    """How many hits (vf, ee) of the reference are missed, and how many others are added."""
+    """Number of the reference's hits (vf, ee) that are missed, and of additional hits."""
     pairs = [(keys(a), keys(b)) for a, b in zip(reference, found, strict=True)]
     common = sum(len(np.intersect1d(a, b, assume_unique=True)) for a, b in pairs)
     return sum(len(a) for a, _ in pairs) - common, sum(len(b) for _, b in pairs) - common
 
 
 def lateness(reference: FrameAnswer, found: FrameAnswer) -> Row:
-    """How many common hits are late, and the latest by which fraction of the step."""
+    """Number of late common hits, and the largest lateness as a fraction of the step."""
     after = []
     for kind in ("vf", "ee"):
         a, b = (keys(getattr(one, kind)) for one in (reference, found))
@@ -250,7 +250,7 @@ def lateness(reference: FrameAnswer, found: FrameAnswer) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Misses beside the listed collisions, and ratios of times beside what was asked."""
+    """Misses among the listed collisions, and ratios of times beside their targets."""
     quick = shared.is_quick(rows)
     whole = any(row["scene"] == RECORDED for row in table_rows(rows, "frame"))
     out: list[Row] = []

@@ -1,9 +1,9 @@
-"""Single queries: nanoseconds beside misses, false hits and errors in time; ipctk in its own loop.
+"""Single queries: time, misses, false hits and errors in time, also for ipctk.
 
-Times are those of the processor, of one thread and one call for the whole list, with the gathering
+Times are processor times of one thread and one call for the whole list, with the gathering
 of positions. ipctk is timed on candidates without contact, by ``compute_collision_free_stepsize``;
-a hit would shorten the step for the candidates after it. Its answers, and its time for a hit, come
-from single calls out of Python.
+a hit would shorten the step for the candidates after it. Its answers, and its time of a hit, are
+those of single calls from Python.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from tauguard.cloth.comparators import METHODS, solve
 from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row, rate
 
-#: Neighbours in the list of candidates that a peer is asked about in a row, as memory has them.
+#: Number of neighbouring candidates that a peer answers in a row.
 RUN = 100
-#: Asked times of a clear query over ab2pf's.
+#: Targets of a peer's time over ab2pf's for a query without contact.
 ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
-EARLY = 1e-9  #: largest error of a time that is asked [step]
+EARLY = 1e-9  #: target of the largest error of a time [step]
 
 NOTES = {
     "query": "candidates of ipctk's broad phase on one frame (n of so many). ns: a query. misses "
@@ -58,7 +58,7 @@ class Queries(NamedTuple):
 
     @classmethod
     def each(cls, vertex: bool, x: NDArray[np.float64]) -> Queries:
-        """Queries that share no positions, given as (N, 2, 4, 3)."""
+        """Queries without common positions, shape (N, 2, 4, 3)."""
         start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
         return cls(vertex, start, end, np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4))
 
@@ -72,7 +72,7 @@ class Answer(NamedTuple):
 
 
 def solver(queries: Queries, method: str = "ab2pf") -> Callable[[], Answer]:
-    """A call that answers all queries; its arrays are allocated beforehand."""
+    """A function that answers all queries, with arrays allocated beforehand."""
     n = len(queries.rows)
     hit, toi = np.zeros(n, dtype=np.uint8), np.full(n, np.inf)
     point, normal, weights = (np.empty((n, k)) for k in (3, 3, 4))
@@ -85,7 +85,7 @@ def solver(queries: Queries, method: str = "ab2pf") -> Callable[[], Answer]:
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Candidates of one frame, cloth-ball in a full run with data; then the labelled queries."""
+    """Measure candidates of a frame (cloth-ball in a full run with data), then labelled queries."""
     data = shared.recorded()
     rows, size = [shared.run_row(quick, recorded=data is not None)], 2_000 if quick else 40_000
     if data is not None and not quick:
@@ -101,7 +101,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 def _on_frame(
     name: str, faces: NDArray[np.int32], step: Step, seed: int, calls: int, repeats: int
 ) -> list[Row]:
-    """Every method and peer on ipctk's candidates; peers answer ``calls`` of each kind."""
+    """Rows of methods and peers on ipctk's candidates; peers answer ``calls`` per kind."""
     ipctk = shared.load_ipctk()
     if ipctk is None:
         return [{"study": "query", "set": name, "peer": "ipctk is not installed"}]
@@ -181,7 +181,7 @@ def _peers(
         setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", clear)
         call = partial(part.compute_collision_free_stepsize, mesh, *step, 0.0, method)
         ns = 1e9 * time_in_turn({"": call}, 3, process_time)[""]["median"] / len(clear)
-        # What Python adds to a call is what a clear query takes beyond its time in the loop.
+        # Overhead of a call from Python: time of a query without contact less its time in the loop.
         hit_us = np.maximum(call_us[hit] - max(0.0, float(np.median(call_us[~hit])) - ns / 1e3), 0)
         all_ns = float((~hit).mean() * ns + 1e3 * hit_us.sum() / len(asked))
         real = reference.hit[asked]
@@ -206,7 +206,7 @@ def _peers(
 
 
 def _both_kinds(rows: list[Row], counts: dict[str, int]) -> list[Row]:
-    """Times for each query in the mix of kinds that the broad phase leaves."""
+    """Times per query in the broad phase's mix of kinds."""
     found: list[Row] = []
     for peer, own in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():
         mean = {
@@ -232,7 +232,7 @@ def _ask(method: Any, queries: Queries) -> tuple[NDArray[np.bool_], NDArray[np.f
 
 
 def _on_labelled(data: Path, calls: int) -> list[Row]:
-    """Every method, and ``calls`` queries of each peer, beside the public labels."""
+    """Compare every method, and ``calls`` queries of each peer, with public labels."""
     rows: list[Row] = []
     ipctk = shared.load_ipctk()
     peers = narrow_phases(ipctk) if ipctk is not None else {}
@@ -261,7 +261,7 @@ def _wrong(true: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Errors, and ratios of times beside what was asked."""
+    """Errors, and ratios of times beside their targets."""
     out, quick = [], shared.is_quick(rows)
     own = [row for row in table_rows(rows, "query") if row.get("method") == "ab2pf"]
     if own:

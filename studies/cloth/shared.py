@@ -1,4 +1,4 @@
-"""What the parts of the cloth study share: frames, recorded data, ipctk, units of time."""
+"""Helpers of the cloth study: frames, recorded data, ipctk, units of time."""
 
 import os
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ CLOTHS = ("pleats", "turning_ball", "seated_skirt", "twisting_mats", "crumpling"
 
 
 def step_at(scene: Scene, moment: float) -> Step:
-    """Both ends of the scene's step that starts at about ``moment`` in [0, 1)."""
+    """Positions at both ends of the scene's step that starts at about ``moment`` in [0, 1)."""
     first = min(round(moment * scene.frames), scene.frames - 1)
     return scene.positions(first / scene.frames), scene.positions((first + 1) / scene.frames)
 
@@ -38,7 +38,7 @@ def load_ipctk() -> Any:
 
 
 def narrow_phases(ipctk: Any) -> dict[str, Any]:
-    """The methods of ipctk that are compared, by name."""
+    """The compared methods of ipctk, by name."""
     return {
         "AdditiveCCD": ipctk.AdditiveCCD(),
         "TightInclusionCCD": ipctk.TightInclusionCCD(conservative_rescaling=1.0),
@@ -51,7 +51,7 @@ def scaled(times: dict[str, float], factor: float) -> dict[str, float]:
 
 
 def run_row(quick: bool, **settings: object) -> Row:
-    """The row that says how a part was run; times are the processor's, medians [least, most]."""
+    """The row with a part's settings; times are processor times, as median [least, most]."""
     return {"study": "run", "run": "quick" if quick else "full", **settings}
 
 
@@ -61,7 +61,7 @@ def is_quick(rows: Sequence[Row]) -> bool:
 
 
 def recorded() -> Path | None:
-    """The folder of ``TAUGUARD_DATA``; ``None`` where the variable is not set.
+    """The folder in ``TAUGUARD_DATA``; ``None`` if the variable is not set.
 
     Raises:
         ValueError: the folder lacks recorded frames or labelled queries.

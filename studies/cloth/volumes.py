@@ -1,4 +1,4 @@
-"""The broad phase: kinds of bounding volumes, and growth with the mesh up to 10^6 triangles."""
+"""The broad phase: kinds of bounding volumes, and growth of cost up to 10^6 triangles."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -16,7 +16,7 @@ from tauguard.report import Row
 KINDS = [name for name in VOLUMES if "aabb" not in name]
 #: The default of ``MeshCCD``.
 DEFAULT = "moving_k_dop14"
-#: From this many triangles on a time is the median of three repeats at most.
+#: For at least this many triangles a time is the median of at most three repeats.
 LARGE = 300_000
 
 NOTES = {
@@ -27,7 +27,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Volumes at one size, then the default volume at growing sizes."""
+    """Measure all volumes at one size, then the default volume at growing sizes."""
     triangles, repeats = (4_000, 3) if quick else (40_000, 7)
     sizes = [1_000, 10_000] if quick else [1_000, 10_000, 100_000, 1_000_000]
     rows = [run_row(quick, triangles=triangles, repeats=repeats)]
@@ -67,7 +67,7 @@ def _rows(scene: Scene, moment: float, kinds: Sequence[str], repeats: int) -> li
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """The exponents of growth and the memory of a triangle."""
+    """Exponents of growth, and memory per triangle."""
     sizes = table_rows(rows, "size")
     slopes = [row["exponent"] for row in sizes if row["exponent"] is not None]
     low, high = (end(row["triangles"] for row in sizes) for end in (min, max))

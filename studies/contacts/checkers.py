@@ -1,4 +1,4 @@
-"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost.
+"""Contact checkers and MuJoCo's own contacts: recall, lead time and cost.
 
 Table ``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
 ``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its start
@@ -21,7 +21,7 @@ from tauguard.contacts.scenes.impacts import IMPACT_POINTS
 from tauguard.report import Row, rate
 
 CHECKERS = ("mujoco", "cloth", "rigid")
-#: Seconds of long scenes in a quick run.
+#: Duration of long scenes in a quick run [s].
 QUICK_SECONDS = dict(arm_cloth=0.35, sleeve_arm=0.3, garment_chest=0.45) | dict.fromkeys(
     ("arm_boxes", "two_arms"), 1.2
 )
@@ -38,7 +38,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Rows of the three tables; the scenes have no random input, so ``seed`` changes nothing."""
+    """Measure the three tables; the scenes have no random input, so ``seed`` has no effect."""
     timesteps = (5e-3,) if quick else (1e-3, 2e-3, 5e-3)
     rows: list[Row] = []
     for timestep, name in product(timesteps, SCENES):
@@ -81,7 +81,7 @@ def _times(score: Score, report: Report) -> Row:
 
 
 def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
-    """Let the ball fly to each impact point from evenly spread starts."""
+    """Rows of balls that fly to each impact point from evenly spaced starts."""
     starts = np.arange(offsets) / offsets * speed * timestep
     flights = [
         _fly(speed, timestep, mode, impact, float(start))
@@ -128,7 +128,7 @@ def _fly(
 
 
 def _cost(quick: bool) -> list[Row]:
-    """The arm into cloth of 40 x 40 vertices: what a checker adds to MuJoCo's step."""
+    """Added cost of a checker per MuJoCo step, for the arm in a cloth of 40 x 40 vertices."""
     seconds = 0.3 if quick else 0.6
     scene = arm_cloth(count=40)
     report = compare(scene, CHECKERS, timestep=2e-3, seconds=seconds, ground_truth=False)
@@ -147,7 +147,7 @@ def _cost(quick: bool) -> list[Row]:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Recall, errors and cost beside what was asked."""
+    """Recall, errors and cost beside their targets."""
     out: list[Row] = []
     for name, mine in groups(table_rows(rows, "scenes"), lambda row: str(row["checker"])).items():
         for kind in ("recall", "steps_recall", "precision"):

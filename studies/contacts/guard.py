@@ -1,7 +1,7 @@
 """Guarded steps on random scenes, beside plain steps, MuJoCo's own modes and fine fixed steps.
 
-The tunnelling oracle judges every scene, at one time step of 0.5 to 10 ms. The seed alone
-decides which scenes are drawn. Table ``overhead`` holds scenes in which nothing has to be
+The tunnelling oracle checks every scene, at one time step of 0.5 to 10 ms. Only the seed
+determines the scenes. Table ``overhead`` holds scenes in which nothing has to be
 guarded.
 """
 
@@ -24,8 +24,8 @@ from tauguard.contacts.scenes import arm_boxes, arm_cloth
 from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
-#: By name: the function that draws a scene, and the number of scenes in a full and a quick run.
-#: Seeds depend on this order, so a new family goes at the end.
+#: Families by name: the function that draws a scene, and the number of scenes in a full and a quick
+#: run. Seeds depend on this order, so a new family goes at the end.
 FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
     draw.__name__: (draw, full, quick)
     for draw, full, quick in (
@@ -37,9 +37,9 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
         (soft.needles, 60, 2),
     )
 }
-#: Fixed steps with stiff contacts [s]. They take long, so only every fourth scene tries them.
+#: Fixed steps with stiff contacts [s]; only every fourth scene tries them, because they are slow.
 FIXED, FIXED_EVERY = (5e-4, 2e-4, 1e-4, 5e-5), 4
-#: Energy counts as added if it exceeds the first energy by this factor.
+#: Energy is added if it exceeds the initial energy by this factor.
 ADDED = 1.02
 METHODS = ("plain", "speculative", "ipc", "guarded")
 
@@ -65,7 +65,7 @@ class Outcome:
     rolled_back: bool  #: the guard rolled back a step
     energy: float  #: largest energy, as a multiple of the scene's unit
     seconds: float  #: processor time of the steps alone
-    calls: float  #: of ``mj_step`` for each step
+    calls: float  #: calls of ``mj_step`` per step
     added: float = 0.0  #: largest sum of energies that rollbacks added; 0 with actuators
 
 
@@ -73,9 +73,9 @@ class Outcome:
 class Played:
     """One scene with every method."""
 
-    timestep: float  #: of every method except the fixed steps [s]
+    timestep: float  #: time step of every method except the fixed steps [s]
     runs: dict[str, Outcome]  #: by method
-    fixed: dict[float, Outcome]  #: by fixed step [s]; empty if none was tried
+    fixed: dict[float, Outcome]  #: outcomes by fixed step [s]; empty if none was tried
 
     @property
     def first(self) -> float | None:
@@ -84,7 +84,7 @@ class Played:
 
 
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """Every family, then the overhead; scenes that the folder ``keep`` holds are not played."""
+    """Measure every family, then the overhead; ``keep`` is a folder with finished scenes."""
     cache, rows = JobCache.of(keep, "guard", seed, quick), []
     for family, (_, full, few) in FAMILIES.items():
         soft = family in ("cloth", "soft")
@@ -106,7 +106,7 @@ def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
 
 
 def draw_scene(family: str, seed: int, number: int) -> Drawn:
-    """Scene ``number`` of a family for this seed."""
+    """Draw scene ``number`` of a family for this seed."""
     place = list(FAMILIES).index(family)
     return FAMILIES[family][0](np.random.default_rng([seed, place, number]))
 
@@ -119,7 +119,7 @@ def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
 
 
 def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
-    """Stiff fixed steps, from fine to coarse, up to the first that does not hold.
+    """Simulate with stiff fixed steps, from fine to coarse, up to the first that does not hold.
 
     The finest step is tried only if the next one does not hold.
     """
@@ -248,7 +248,7 @@ def _overhead(scene: Any, steps: int) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Judge scenes held (nothing can hold squeeze), silent tunnelling, and time."""
+    """Scenes held (no method can hold `squeeze`), silent tunnelling, and time, beside targets."""
     whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     out: list[Row] = []
     for method in METHODS:

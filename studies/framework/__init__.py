@@ -1,4 +1,4 @@
-"""The frame that every study uses: what a part is, timings, the summary, processes, job cache."""
+"""The framework of all studies: parts, timings, summary, processes, job cache."""
 
 from studies.framework.jobs import Each, JobCache, Workers
 from studies.framework.rows import (

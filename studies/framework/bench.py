@@ -1,4 +1,4 @@
-"""``tauguard bench NAME``: parts of a study, measured, judged, printed and drawn."""
+"""``tauguard bench NAME``: measure parts of a study, judge, print and draw them."""
 
 import importlib
 import io
@@ -185,7 +185,7 @@ def _of_our_own(error: BaseException) -> bool:
 
 
 def printed(module: Any, rows: list[Row]) -> list[Row]:
-    """What is printed of a part's rows."""
+    """The printed text of a part's rows."""
     return list(module.table(rows)) if hasattr(module, "table") else rows
 
 

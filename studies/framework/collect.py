@@ -1,4 +1,4 @@
-"""Run every part in a separate process and write its files into a folder."""
+"""Run every part in a separate process, and write its files into a folder."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The first screen of the report: how fast, how right, how quiet, a sentence and a figure each."""
+"""The report's summary: speed, accuracy and false alarms, each with a sentence and a figure."""
 
 import io
 import math
@@ -12,29 +12,29 @@ from studies.framework.pareto import OURS, PEER
 from studies.framework.rows import Point, groups
 from tauguard.report.page import picture
 
-#: A rate of false alarms is told from at least this much collision-free motion [h].
+#: Least collision-free motion for a rate of false alarms [h].
 HOURS = 1.0
 
 
 @dataclass(frozen=True)
 class Found:
-    """A detector on simulated arms, all speeds together."""
+    """Results of a detector on simulated arms, all speeds together."""
 
     detector: str
-    found: dict[str, float]  #: of the collisions from 16 N m up: value, low, high, n
-    alarms: dict[str, float]  #: false ones an hour: value, low, high
-    hours: float  #: of motion without a collision
-    asked: float  #: false alarms an hour
+    found: dict[str, float]  #: fraction found of the collisions from 16 N m up: value, low, high, n
+    alarms: dict[str, float]  #: false alarms per hour: value, low, high
+    hours: float  #: duration of collision-free motion [h]
+    asked: float  #: target of false alarms per hour
 
 
 def headlines(points: Sequence[Point], found: Sequence[Found]) -> str:
-    """Three sentences with their figures, as HTML; what a run is too short for is left out."""
+    """Three sentences with their figures, as HTML; a short run may lack some."""
     parts = [_fast(points), _right(points), _quiet(found)]
     return f'<div class="figures">{"".join(part for part in parts if part)}</div>'
 
 
 def _pairs(points: Sequence[Point], usable: Callable[[Point], bool]) -> list[tuple[Point, Point]]:
-    """Our point and a peer's of each question that has both."""
+    """The points of tauguard and of a peer, for each question that has both."""
     return [
         (ours, peer)
         for own in groups([p for p in points if usable(p)], lambda p: p.question).values()
@@ -80,7 +80,7 @@ def _round(ratio: float) -> str:
 
 
 def _name(axes: Any, k: float, text: str) -> None:
-    """A name above its bar."""
+    """Draw a name above its bar."""
     place = axes.get_yaxis_transform()
     axes.text(0.0, k + 0.25, f" {text}", transform=place, va="bottom").set_in_layout(False)
 

@@ -1,4 +1,4 @@
-"""Jobs over processes, and a cache of their results, with which a stopped run continues."""
+"""Run jobs in processes, and cache their results, so that a stopped run can continue."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from tauguard.atomic_write import write_atomic
 from tauguard.report import versions
 
-#: Packages whose data classes a kept result may hold.
+#: Packages whose data classes a cached result may contain.
 OURS = ("tauguard", "studies")
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
@@ -28,11 +28,11 @@ class Workers:
     Each process has one thread. Results come in the order of the jobs.
     """
 
-    #: The number of processes; None: one a processor.
+    #: The number of processes; None: one per processor.
     count: int | None = None
 
     def __init__(self) -> None:
-        """Start nothing yet."""
+        """Keep the settings; processes start on entry."""
         self._processes: Any = None
 
     def __enter__(self) -> Each:
@@ -62,7 +62,7 @@ def build(*more: object) -> str:
 
 @dataclass(frozen=True)
 class JobCache:
-    """The results of one part's jobs in a folder; without a folder nothing is kept."""
+    """Results of one part's jobs in a folder; without a folder nothing is cached."""
 
     folder: Path | None
 
@@ -83,7 +83,7 @@ class JobCache:
         return cls(folder)
 
     def over(self, each: Each, name: str) -> Each:
-        """``each`` for jobs of this name, without those whose results are kept."""
+        """Run ``each`` for the jobs of this name that have no cached result."""
         return functools.partial(self._map, each, name)
 
     def _map(
@@ -102,7 +102,7 @@ class JobCache:
 class _InOrder:
     """Results in the order of the jobs; if one raises, iteration can continue with the next."""
 
-    jobs: Iterator[tuple[Path, bool]]  #: and whether its result is kept
+    jobs: Iterator[tuple[Path, bool]]  #: file of each result, and whether it is cached
     fresh: Iterator[Any]
 
     def __iter__(self) -> _InOrder:
@@ -114,19 +114,19 @@ class _InOrder:
 
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
-    """Do a job and keep its result in a file."""
+    """Run a job and write its result to a file."""
     from skops.io import dumps
 
     call, own, path = job
     result = call(own)
-    # skops keeps no keys that are tuples.
+    # skops cannot store keys that are tuples.
     kept = ([*result], [*result.values()]) if isinstance(result, dict) else result
     write_atomic(path, dumps(kept))
     return result
 
 
 def read(path: Path) -> Any:
-    """A result that was kept; ``ValueError`` names a damaged file."""
+    """Read a cached result; ``ValueError`` names a damaged file."""
     from skops.io import get_untrusted_types, loads
 
     try:

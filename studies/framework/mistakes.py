@@ -1,4 +1,4 @@
-"""The part of the report that shows what a detector got wrong, recording by recording."""
+"""The report's section on a detector's errors, with recordings."""
 
 import json
 from html import escape
@@ -10,7 +10,7 @@ from studies.framework.jobs import build
 from tauguard.replay.event_page import OFFLINE
 from tauguard.report import write_json
 
-#: A collision that is found later than this is shown as late [s].
+#: Delay beyond which a collision is shown as late [s].
 LATE = 0.05
 #: Rows of each kind in the report; the folder's own page has all.
 SHOWN = 8
@@ -33,7 +33,7 @@ def mistakes(folder: Path, seed: int) -> str:
 
 
 def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
-    """The existing list, and why it has to be made again (empty if it need not)."""
+    """The existing list, and the reason to make it again (empty: it is valid)."""
     if not path.exists():
         return {}, "none are recorded yet"
     try:
@@ -51,7 +51,7 @@ def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
 
 
 def judged(folder: Path, seed: int) -> dict[str, object]:
-    """Train as `tauguard demo` does and record what goes wrong on its test motions."""
+    """Train as `tauguard demo` does, and record the errors on its test motions."""
     from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import SrqSvr, match_detection, train

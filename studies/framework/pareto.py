@@ -1,4 +1,4 @@
-"""Error against microseconds: a figure for each question; peers have their own marks."""
+"""Figures of error against time, one per question; peers have their own markers."""
 
 import io
 import math
@@ -8,12 +8,12 @@ from typing import Any
 from studies.framework.rows import Point, groups
 from tauguard.report.charts import COLOURS
 
-#: Colours of our points and of the peers'.
+#: Colours of tauguard's points and of the peers' points.
 OURS, PEER = COLOURS[:2]
 
 
 def front(points: Sequence[Point]) -> list[Point]:
-    """The points that no other point beats in both cost and error, by cost."""
+    """The Pareto-optimal points in cost and error, in order of cost."""
     best: list[Point] = []
     for point in sorted(points, key=lambda p: (p.cost, p.error)):
         if not best or point.error < best[-1].error:
@@ -51,7 +51,7 @@ def draw_points(points: Iterable[Point], figure: Any) -> None:
 
 
 def _draw(points: Sequence[Point], figure: Any) -> None:
-    """Points numbered by label; the numbers are explained below the axes."""
+    """Draw points numbered by label; a list below the axes explains the numbers."""
     axes = figure.subplots()
     labels = list(dict.fromkeys(p.method for p in sorted(points, key=lambda p: p.cost)))
     for number, label in enumerate(labels, 1):

@@ -26,7 +26,7 @@ from tauguard.report.page import folded, page, picture, tables
 BESIDE = ("hard-cases.json", "wrong.json")
 #: Units of time and how many microseconds each is.
 UNITS = (("s", 1e6), ("ms", 1e3), ("µs", 1.0), ("ns", 1e-3))
-#: Longest line about something that is missing.
+#: Largest length of a line about a missing part.
 LENGTH = 300
 
 #: Text of the page.
@@ -114,7 +114,7 @@ class Missing:
     """Lines that say what the page cannot show, and why."""
 
     def __init__(self) -> None:
-        """Nothing is missing yet."""
+        """Start with no lines."""
         self.lines: list[str] = []
 
     def add(self, what: str, why: str) -> None:
@@ -248,7 +248,7 @@ class Report:
         return "".join(f"<p>{escape(line)}</p>" for line in lines)
 
     def _gaps(self) -> str:
-        """What the page does not show, as HTML."""
+        """The list of missing parts, as HTML."""
         absent = [
             name + (f" ({self.failed[name]})" if name in self.failed else "")
             for name in self.parts
@@ -267,7 +267,7 @@ def time_text(us: float) -> str:
 
 
 def _beside(points: Sequence[Point]) -> str:
-    """A line a question: times and errors of tauguard and the peer, and the ratio of times."""
+    """A line for each question: times and errors of tauguard and peer, and the ratio of times."""
     lines = [
         {
             "what": ours.question,

@@ -1,4 +1,4 @@
-"""What parts share: timings with their spread, lines of the summary, points of the first page."""
+"""Helpers of all parts: timings with their spread, lines of the summary, points of figures."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +16,7 @@ class Incomplete(RuntimeError):
     """Some measurements of a part failed; ``rows`` holds the others."""
 
     def __init__(self, rows: list[Row], reasons: Mapping[str, BaseException]) -> None:
-        """Keep the rows; ``reasons`` is by measurement."""
+        """Keep the rows, and the reason for each failed measurement."""
         lines = (f"{part}: {type(error).__name__}: {error}" for part, error in reasons.items())
         super().__init__("parts of the study failed, the others are kept; " + "; ".join(lines))
         self.rows = rows
@@ -25,25 +25,25 @@ class Incomplete(RuntimeError):
 
 @dataclass(frozen=True)
 class Point:
-    """Time and error of one method: a mark in a figure and a line of the report's first page."""
+    """Time and error of one method: a point in a figure and a line of the report's first page."""
 
     question: str  #: the figure's title
     method: str
-    cost: float  #: [us], or what ``cost_axis`` says
-    error: float  #: in the unit of ``error_axis``; NaN: in the table alone
+    cost: float  #: time [us], or the quantity of ``cost_axis``
+    error: float  #: in the unit of ``error_axis``; NaN: shown in the table only
     error_text: str = ""  #: for the table
-    role: str = ""  #: "ours": tauguard's in the table; "peer": beside it; "": in the figure alone
+    role: str = ""  #: "ours" or "peer": shown in the table; "": shown in the figure only
     cost_axis: str = "microseconds"
     error_axis: str = "error"
 
 
 def timed(met: bool, quick: bool) -> bool | str:
-    """Whether a timing meets its bound. A quick run has too few repeats to say that it does not."""
+    """Whether a timing meets its bound; a quick run has too few repeats to report a miss."""
     return "full run" if quick and not met else bool(met)
 
 
 def answer(question: str, asked: str, measured: str, met: bool | str | None = None) -> Row:
-    """A line of a summary; ``met`` is ``None`` if no value was asked."""
+    """A line of a summary; ``met`` is ``None`` without a target."""
     return {
         "study": "summary",
         "question": question,
@@ -58,14 +58,14 @@ def time_in_turn(
     repeats: int = 5,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, dict[str, float]]:
-    """Seconds of each call, the calls taken in turn (A B A B ...) after one warm-up each.
+    """Seconds of each call. Calls alternate (A B A B ...) after one warm-up each.
 
     Because the calls take turns, a drift of the machine's speed affects all methods alike.
-    ``time.process_time`` as the clock leaves out the time of other programs, for work in a single
+    The clock ``time.process_time`` excludes the time of other programs, for work in a single
     thread.
 
     Returns:
-        Per name ``{"median", "low", "high"}``: median, minimum and maximum over the repeats [s].
+        ``{"median", "low", "high"}`` by name: median, minimum and maximum over the repeats [s].
     """
     for call in calls.values():
         call()

@@ -1,4 +1,4 @@
-"""What a study is: named parts, and how the command line finds them."""
+"""Studies with named parts, and their look-up for the command line."""
 
 import difflib
 import importlib
@@ -14,19 +14,19 @@ class Part:
     """One question of a study, answered by the functions of a module.
 
     The module has ``measure(quick, seed, **options)``, which returns rows (flat dictionaries, each
-    with its table's name under ``study``), and ``NOTES``: what the columns of each table mean.
-    Where it needs them it also has ``judge(rows)``, which returns the rows of the summary,
-    ``table(rows)``, which returns what is printed instead of all rows, and ``draw(rows, figure)``
+    with its table's name under ``study``), and ``NOTES``, the meaning of each table's columns.
+    It may also have ``judge(rows)``, which returns the rows of the summary,
+    ``table(rows)``, which returns the rows to print instead of all, and ``draw(rows, figure)``
     with a figure of matplotlib. Without ``draw`` the figure shows the study's ``points``.
     """
 
-    module: str  #: within ``studies``
+    module: str  #: name of the module within ``studies``
     line: str  #: the question, for ``tauguard bench list``
-    options: tuple[str, ...] = ()  #: of the command line, passed on to ``measure``
+    options: tuple[str, ...] = ()  #: command-line options that are passed to ``measure``
     alias: str = ""  #: another name of the part that ``tauguard bench`` takes
 
     def load(self) -> ModuleType:
-        """The module."""
+        """Import the module."""
         return importlib.import_module(f"studies.{self.module}")
 
 

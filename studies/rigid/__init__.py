@@ -87,7 +87,7 @@ def _count(rates: Sequence[Any]) -> tuple[int, int]:
 
 
 def _mesh(rows: Sequence[Row], method: str, time: str, role: str) -> Point:
-    """One volume's mean over all poses."""
+    """Mean time of one volume over all poses."""
     poses = sum(row["poses"] for row in rows)
     cost = sum((number(row[time]) or 0.0) * row["poses"] for row in rows) / poses
     differ, of = _count([rows[0]["disagree"]])

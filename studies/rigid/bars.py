@@ -1,4 +1,4 @@
-"""Lines of the summary: the worst of several values, beside the value that is asked."""
+"""Lines of the summary: the worst of several values, beside its target."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,19 +7,19 @@ from tauguard.report import Row
 
 
 def faster(question: str, ratio: float, ratios: Sequence[float], quick: bool) -> Row:
-    """Ask that the smallest ratio of times reaches ``ratio``."""
+    """Require the smallest ratio of times to reach ``ratio``."""
     least = min(ratios)
     return answer(question, f"at least {ratio:g}", f"{least:.3g}", timed(least >= ratio, quick))
 
 
 def within(question: str, bound: float, times: Sequence[float], quick: bool) -> Row:
-    """Ask that the longest time is at most ``bound``."""
+    """Require the longest time to be at most ``bound``."""
     most = max(times)
     return answer(question, f"at most {bound:g}", f"{most:.3g}", timed(most <= bound, quick))
 
 
 def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
-    """Ask that the largest error, or number of errors, is at most ``bound``."""
+    """Require the largest error, or number of errors, to be at most ``bound``."""
     known = [value for value in values if value is not None]
     most = max(known, default=None)
     if most is None:
@@ -28,7 +28,7 @@ def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
 
 
 def count(rate: Row) -> float:
-    """The number of cases that a rate counts."""
+    """The number of cases of a rate."""
     return 0.0 if rate["value"] is None else float(round(rate["value"] * rate["n"]))
 
 

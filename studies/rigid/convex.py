@@ -125,7 +125,7 @@ def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_p
 def dynamic_rows(
     rng: np.random.Generator, pair: tuple[str, str], per_cell: int, exact_sample: int
 ) -> list[Row]:
-    """Answer and time of swept bodies: elimination with time against axes cast along the motion."""
+    """Answers and times of swept bodies: elimination against axes cast along the motion."""
     a, b = KINDS[pair[0]](rng, 2 * per_cell), KINDS[pair[1]](rng, 2 * per_cell)
     d = rng.uniform(-1, 1, (2 * per_cell, 3))
     hit, out, _ = native_sweep(a, b, d, "abfme", points=False)
@@ -169,7 +169,7 @@ def batch_row(rng: np.random.Generator, n: int) -> Row:
     hit = np.empty(n, dtype=np.uint8)
     one = partial(overlap_boxes_native, a, b, 1, hit)
     times = time_in_turn({"vectors": one}, clock=process_time)
-    with portable():  # as a machine without AVX2 runs it
+    with portable():  # the code for machines without AVX2
         times |= time_in_turn({"portable": one}, clock=process_time)
     times |= time_in_turn({"two_threads": partial(overlap_boxes_native, a, b, 2, hit)})
     ns = {name: per(t, n) for name, t in times.items()}
@@ -185,7 +185,7 @@ def batch_row(rng: np.random.Generator, n: int) -> Row:
 
 
 def coherent_row(rng: np.random.Generator, kind: str, n: int, frames: int) -> Row:
-    """Cached planes on slowly moving bodies; about one pair in eight is in contact."""
+    """Cached planes on slowly moving bodies, of which about one pair in eight is in contact."""
     a, b = KINDS[kind](rng, n), KINDS[kind](rng, n)
     velocity, offset = rng.normal(0, 0.01, (n, 3)), rng.uniform(-2, 2, (n, 3))
     cache = PlaneCache(n)

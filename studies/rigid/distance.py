@@ -1,4 +1,4 @@
-"""Signed distances of convex bodies and of bodies with radii: time and error beside coal's.
+"""Signed distances of convex bodies, with and without radii: time and error, also of coal.
 
 The truth is rational arithmetic. coal's own tolerance is 1e-6 of the pair's size.
 """
@@ -37,7 +37,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Random pairs that are apart or overlap, hard cases of tetrahedra, bodies with radii."""
+    """Measure random pairs (apart, overlapping), hard cases of tetrahedra, bodies with radii."""
     rng = np.random.default_rng(seed)
     # The exact distance of two boxes takes half a minute.
     n, exact, of_boxes = (1_000, 10, 0) if quick else (20_000, 300, 2)
@@ -61,7 +61,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Signs, errors and the time beside coal's."""
+    """Wrong signs, errors, and time over coal's."""
     found = table_rows(rows, "distance")
     ratios = [
         row["coal_ns"] / row["distance_ns"]["median"]
@@ -77,7 +77,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 
 def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row:
-    """Time of a pair, and the error of the first ``exact`` rows relative to their size."""
+    """Time per pair, and the error of the first ``exact`` rows relative to their size."""
     got, hit = distance(a, b).distance, overlap(a, b).hit
     calls: dict[str, Callable[[], object]] = {
         "distance": partial(distance, a, b),

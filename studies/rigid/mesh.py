@@ -1,4 +1,4 @@
-"""Meshes: build, first hit (Table 2.2 static), motion (dynamic), and beside convex bodies.
+"""Meshes: build, first hit (Table 2.2 static), motion (dynamic), and queries with convex bodies.
 
 The environment variable ``TAUGUARD_MESH`` names the mesh (any file that trimesh reads). Without
 it the mesh is the Stanford bunny in ``TAUGUARD_DATA/meshes`` or, if that is missing, a generated
@@ -88,7 +88,7 @@ def load(quick: bool) -> Mesh:
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Build, first hit, motion, and the mesh beside convex bodies."""
+    """Measure build, first hit, motion, and the mesh with convex bodies."""
     rng = np.random.default_rng(seed)
     mesh = load(quick)
     poses = poses_near(mesh.vertices, rng, 400 if quick else 2_000)
@@ -142,7 +142,7 @@ def build_rows(mesh: Mesh, coal_ms: float, repeats: int) -> list[Row]:
 
 
 def static_rows(mesh: Mesh, model: Any, poses: Array, repeats: int) -> list[Row]:
-    """First hit of each volume: the mean of a batch, beside coal's.
+    """Mean time of a first hit in a batch, for each volume and coal.
 
     The overhead of coal's call is that of two one-triangle models far apart.
     """
@@ -181,7 +181,7 @@ def static_rows(mesh: Mesh, model: Any, poses: Array, repeats: int) -> list[Row]
 def dynamic_rows(
     mesh: Mesh, model: Any, poses: Array, rng: np.random.Generator, n: int
 ) -> list[Row]:
-    """A straight motion and one that also turns, from poses that do not overlap."""
+    """Times of a straight motion and of one with rotation, from poses without overlap."""
     tree = MeshTree(mesh.vertices, mesh.faces)
     start = poses[~tree.overlap(tree, poses).hit][:n]
     away = mesh.center - (start[:, :3, :3] @ mesh.center + start[:, :3, 3])

@@ -1,4 +1,4 @@
-"""Time of impact of convex bodies that move and turn, beside advancement over coal's distance.
+"""Time of impact of convex bodies that move and turn, against advancement with coal's distance.
 
 For boxes and tetrahedra the truth is a bracket around the first contact, from code that shares
 nothing with the code under test (`oracles.convex_impact`). For bodies with radii, coal's
@@ -35,7 +35,7 @@ LEAST = 500
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Two rows for each kind of body, ours and the peer's; one for each pair with radii."""
+    """Measure two rows (ours, peer) for each kind of body, and one for each pair with radii."""
     rng = np.random.default_rng(seed)
     rows: list[Row] = []
     for kind in ("boxes", "tetrahedra"):

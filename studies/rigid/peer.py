@@ -1,4 +1,4 @@
-"""coal as the peer: its overlap without the time of the call, and advancement over its distance."""
+"""coal as the peer: its overlap without call overhead, and advancement with its distance."""
 
 import time
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from tauguard.rigid.shapes import Bodies
 
 
 def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], float]:
-    """coal's answers, its nanoseconds for each pair, and the median of these without loop and call.
+    """coal's answers, nanoseconds per pair, and their median without loop and call.
 
     Loop and call are timed on two spheres far apart, the fastest query there is.
     """
@@ -68,8 +68,8 @@ def motion_columns(
     """Time of impact judged by coal's distance, before the time found and at it.
 
     Args:
-        call: gives our times of impact of the chosen rows.
-        distance: coal's, of the same pairs.
+        call: function that gives our times of impact of the chosen rows.
+        distance: coal's distance function of the same pairs.
         lever: sum of both bodies' largest distances from the origins of their frames [m].
         most: advance only this many pairs of each outcome (default: all).
         least: pairs of a call whose time is measured.

@@ -1,4 +1,4 @@
-"""Bounding volumes compared: build, update, overlap test and tightness (figure 1.1).
+"""Comparison of bounding volumes: build, update, overlap test and tightness (figure 1.1).
 
 The bodies are pieces of a mesh, of about 64 triangles each, in random poses near the origin. For
 a new pose a ball and an oriented box are moved. An axis-aligned box and an 18-DOP are computed
@@ -80,7 +80,7 @@ def columns(name: str, calls: Any, bodies: int, pairs: int, repeats: int) -> Row
 
 
 def errors(found: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
-    """Pairs whose volumes overlap though their hulls do not, and pairs that the volumes miss."""
+    """Number of false overlaps of volumes whose hulls are apart, and of missed pairs."""
     return {
         "false_hits": rate(int((found & ~hit).sum()), int((~hit).sum())),
         "missed": rate(int((~found & hit).sum()), int(hit.sum())),

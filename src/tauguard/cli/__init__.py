@@ -1,8 +1,8 @@
-"""The command line: one file a command, heavy imports inside the command.
+"""The command line: one file per command; heavy imports are inside the command.
 
 A command is a module ``tauguard.cli.<name>`` with a function ``command`` whose signature tyro
 turns into flags. It raises ``ValueError`` or ``OSError`` with one helpful line for bad input (exit
-code 2) and ``SystemExit`` with its own code where a script needs to tell outcomes apart.
+code 2), and ``SystemExit`` with another code if a script needs to distinguish outcomes.
 """
 
 import difflib
@@ -36,7 +36,7 @@ COMMANDS = {
     "bench": "run one study of speed against error: a table, a figure, --json",
 }
 
-#: ``module:Class`` of a user; the module may be in the working folder.
+#: A user's ``module:Class``; the module may be in the working folder.
 OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 EPILOG = """\
@@ -85,7 +85,7 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
     module = importlib.import_module(path)
     for flag, kind in module.command.__annotations__.items():
         given = f"--{flag.replace('_', '-')}"
-        if "tuple[" in str(kind) and args.count(given) > 1:  # the last would win
+        if "tuple[" in str(kind) and args.count(given) > 1:  # the parser would use only the last
             fail(f"{name}: {given} is given twice; several values follow one flag: {given} A B")
 
     import tyro
@@ -106,7 +106,7 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
         if isinstance(error, ValueError | OSError):
             fail(f"{name}: {said(error)}")
         kind, wanted = type(error).__name__, os.environ.get("MUJOCO_GL")
-        if wanted and "mujoco" not in sys.modules:  # its import ends where its OpenGL is not there
+        if wanted and "mujoco" not in sys.modules:  # its import fails without that OpenGL
             fail(
                 f"{name}: MUJOCO_GL={wanted}: MuJoCo finds no such OpenGL; install libegl1 for egl "
                 "or libosmesa6 for osmesa, or unset it"
@@ -115,14 +115,14 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
 
 
 def said(error: Exception) -> str:
-    """The message of an error; a system error names its file, not its number."""
+    """The message of an error; for a system error the file, without the error number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)
 
 
 def fail(message: str, code: int = 2) -> None:
-    """One line on the standard error stream, and an exit code."""
+    """Print one line to standard error and return the exit code."""
     line = " ".join(message.split())
     print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
     raise SystemExit(code)

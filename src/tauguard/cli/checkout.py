@@ -1,4 +1,4 @@
-"""``tauguard bench`` and ``tauguard report`` run ``studies``, which only a checkout has."""
+"""``tauguard bench`` and ``tauguard report``: they run ``studies``, which only a checkout has."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ STUDY_COMMANDS = ("bench", "report")
 
 
 def run_studies(name: str, args: Sequence[str]) -> int:
-    """Run a command of ``studies`` in a process of its own and return its exit code.
+    """Run a command of ``studies`` in a separate process and return its exit code.
 
     Raises:
         ValueError: there is no checkout: tauguard is installed without its sources.
@@ -24,7 +24,7 @@ def run_studies(name: str, args: Sequence[str]) -> int:
             "the studies are in the source distribution, not in an installed package: "
             "unpack `pip download --no-binary tauguard --no-deps tauguard` and run this there"
         )
-    # The checkout's generic folder names may hide packages, but -m needs it on the path.
+    # The checkout must be on the path for -m, although its folder names may hide packages.
     path = os.pathsep.join(
         [str(root), str(root / "tests"), *filter(None, [os.environ.get("PYTHONPATH")])]
     )

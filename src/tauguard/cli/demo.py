@@ -1,4 +1,4 @@
-"""``tauguard demo``: the whole way from the arm to the replay."""
+"""``tauguard demo``: all steps from the arm to the replay."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
-#: False alarms per hour that the threshold is set for on the training motions. An alarm stops a
-#: robot: somebody who works beside it accepts one an hour, hardly ten.
+#: False alarms per hour on the training motions for which the threshold is set. An alarm stops a
+#: robot; a person who works beside it may accept one an hour, but hardly ten.
 FALSE_ALARMS_PER_HOUR = 1.0
 
 
@@ -54,7 +54,7 @@ def command(
     from tauguard.report import write_json
 
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
-    load_arm(robot)  # an unknown one is named before anything is simulated
+    load_arm(robot)  # an unknown arm is an error before anything is simulated
     plan = demo_plan(seed, robot)
     print(
         f"simulates {plan.seconds / 60:.0f} minutes of motion, trains a detector and judges it: "
@@ -96,7 +96,7 @@ def command(
 def judged_figures(
     detector: CollisionAlarm, judged: list[Trace], matchings: list[Matching]
 ) -> dict[str, Any]:
-    """What was judged, and how well the detector did on it."""
+    """Extent of the test motion, and the detector's metrics on it."""
     from tauguard.detectors import detection_metrics
 
     return {
@@ -110,7 +110,7 @@ def judged_figures(
 
 
 def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
-    """The rate of false alarms that was asked for, and what the training motion allows [1/h]."""
+    """The requested rate of false alarms, and the interval from training motion [1/h]."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 
     expected = ExpectedRate.of(scores)
@@ -119,7 +119,7 @@ def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, f
 
 
 def asked_and_found(summary: dict[str, Any]) -> str:
-    """The rate of false alarms that was asked for, beside the one that was found."""
+    """The requested rate of false alarms beside the measured one, as text."""
     from tauguard.report import two_digits
 
     wanted, found = summary["asked"], summary["false_alarms_per_hour"]
@@ -135,7 +135,7 @@ def asked_and_found(summary: dict[str, Any]) -> str:
 
 
 def closing(out: Path, summary: dict[str, Any]) -> None:
-    """How well it did, and what lies where."""
+    """The results and the files in the folder, as text."""
     from tauguard.detectors.evaluation.metrics_page import text
 
     print(text(summary))
@@ -147,7 +147,7 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
 
 
 def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
-    """Write the recording, what the viewer shows of it, and the detector into the folder."""
+    """Write the recording, its replay and the detector into the folder."""
     from tauguard.detectors import diagnose, save_model
     from tauguard.replay import write_rrd
     from tauguard.traces import write_mcap
@@ -160,7 +160,7 @@ def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
 
 
 def count(traces: list[Trace], key: Any) -> dict[str, int]:
-    """How many judged collisions there are of each kind (or link)."""
+    """Number of test collisions of each kind (or link)."""
     found = [key(c) for trace in traces if trace.truth for c in trace.truth.collisions]
     return {name: found.count(name) for name in sorted(set(found))}
 
@@ -177,7 +177,7 @@ def simulation_timing(episode: Episode) -> float:
 def detector_timing(
     detector: CollisionAlarm, traces: list[Trace], seconds: float
 ) -> dict[str, float]:
-    """Microseconds per sample of the momentum observer alone and of all the rest of a detection."""
+    """Microseconds per sample of the momentum observer, and of the rest of a detection."""
     from tauguard.detectors import observe
 
     arm = detector.detector.arm

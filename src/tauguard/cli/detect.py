@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
-#: Seconds that a detector without a model learns from [s].
+#: Default length of the beginning that a detector without a model learns from [s].
 QUIET = 20.0
 
 
@@ -127,7 +127,7 @@ def refuse_touched(log: Path, read: Log, quiet: float) -> None:
 def trained(
     model: Path, trace: Trace, payload: str | None, robot: Path
 ) -> tuple[Trace, CollisionAlarm]:
-    """The log in the joints of a trained detector, and the detector."""
+    """The log in the joint order of a trained detector, and the detector."""
     from tauguard.datasets.arm_logs import matched, parse_load
     from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
@@ -153,7 +153,7 @@ def learned(
     gains: tuple[float, ...],
     payload: str | None,
 ) -> tuple[Trace, CollisionAlarm]:
-    """The log in the robot's joints, and a detector that learned from its beginning."""
+    """The log in the robot's joint order, and a detector trained on the log's beginning."""
     import numpy as np
 
     from tauguard.cli.free_logs import free_arm, free_detector
@@ -194,7 +194,7 @@ def explained(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """What each alarm was; its torques alone where the robot's file gives no chain of links."""
+    """The diagnosis of each alarm; only torques if the robot's file gives no chain of links."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
@@ -223,7 +223,7 @@ def explained(
 
 
 def torques(contact_torque: ContactTorque) -> dict[str, Any]:
-    """What a contact did at the joints, ready for JSON."""
+    """The joint torques of a contact, as JSON values."""
     return {
         "contact_s": contact_torque.seconds,
         "contact_goes_on": contact_torque.goes_on,
@@ -233,7 +233,7 @@ def torques(contact_torque: ContactTorque) -> dict[str, Any]:
 
 
 def cause(one: Diagnosis) -> dict[str, Any]:
-    """A diagnosis, ready for JSON."""
+    """A diagnosis, as JSON values."""
 
     def interval(value: Interval90) -> dict[str, Any]:
         return {**dataclasses.asdict(value), "identifiable": value.identifiable}
@@ -257,7 +257,7 @@ def cause(one: Diagnosis) -> dict[str, Any]:
 def summary(
     log: Path, trace: Trace, found: LogDetection, causes: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
-    """The figures of a run, ready for JSON."""
+    """The results of a run, as JSON values."""
 
     from tauguard.detectors import poisson_rate
     from tauguard.detectors.alarms.log_detection import loudest_joint
@@ -291,7 +291,7 @@ def summary(
 
 
 def report(result: dict[str, Any]) -> None:
-    """The figures as text."""
+    """Print the results as text."""
     from tauguard.detectors.evaluation.card_page import printed_from, rate_text
     from tauguard.detectors.evaluation.labelled_log import labels_text
 

@@ -113,7 +113,7 @@ def _evaluate_alarms(
 def evaluated(
     alarm: CollisionAlarm, recordings: Iterable[Trace], wrong: EventFolder | None
 ) -> tuple[list[Matching], dict[str, Any]]:
-    """Match alarms with the truth and compute all metrics; ``wrong`` records the mistakes."""
+    """Match alarms with the truth and compute all metrics; ``wrong`` records the errors."""
     from tauguard.detectors import detection_metrics, diagnosis_metrics
 
     matchings, said = [], []
@@ -128,7 +128,7 @@ def evaluated(
 def _judged(
     alarm: CollisionAlarm, recordings: Iterable[Trace]
 ) -> Iterator[tuple[str, JudgedRecording]]:
-    """Recordings with their names; an error names the recording."""
+    """Recordings with their names; an error message contains the name."""
     from tauguard.detectors.evaluation.recordings import judged_recordings
 
     names: list[str] = []

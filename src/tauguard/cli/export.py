@@ -22,8 +22,8 @@ def command(
         out: for LeRobot a new folder; for Minari a dataset id such as tauguard/collisions-v0, which
             goes where Minari keeps its datasets.
         to: "lerobot" (LeRobotDataset v3.0) or "minari" (extra `export`).
-        splits: which ones (default: all).
-        arm: only this arm's episodes.
+        splits: names of the splits to write (default: all).
+        arm: write only this arm's episodes.
     """
     from tauguard.datasets.dataset_folder import configuration_in
     from tauguard.datasets.reader import arms_of, read

@@ -1,4 +1,4 @@
-"""Collision-free logs as `tauguard calibrate` and `tauguard twin` take them."""
+"""Read collision-free logs for `tauguard calibrate` and `tauguard twin`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FreeLogs:
-    """Logs in which some joint moves, and the arm that an identification begins with."""
+    """Logs in which some joint moves, and the initial arm of an identification."""
 
-    numbers: RobotNumbers  #: of the robot file
-    all_traces: dict[str, Trace]  #: those in which no joint moves, too
+    numbers: RobotNumbers  #: numbers of the robot file
+    all_traces: dict[str, Trace]  #: by file name, with those in which no joint moves
     logs: dict[str, Recording]  #: by file name, with their loads
     arm: ArmModel
-    source: str  #: what fixes the scale of the torques, in words for the user
+    source: str  #: what fixes the scale of the torques, as text for the user
     scale: str  #: the same as :func:`tauguard.detectors.calibration.identification.identify` has it
 
 
@@ -37,10 +37,10 @@ def free_logs(
     scale: str = "auto",
     reading: Reading | None = None,
 ) -> FreeLogs:
-    """Read, check and note; the arguments are the commands'.
+    """Read and check logs and print notes; the arguments are those of the commands.
 
     Raises:
-        ValueError: what does not fit, as each part says it.
+        ValueError: as raised by the called functions.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import moving, read_logs, with_loads
@@ -62,7 +62,7 @@ def free_logs(
     return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
 
 
-#: Checks that ``--accept`` may pass over.
+#: Checks that ``--accept`` can disable.
 ACCEPTABLE = ("alarms", "error", "gravity")
 
 
@@ -119,12 +119,12 @@ def free_detector(
 
 
 def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
-    """Run a check that the user may pass over by ``--accept NAME``; a note then says what is wrong.
+    """Run a check that ``--accept NAME`` turns into a printed note.
 
     None for ``accept``: the command has no such flag.
 
     Raises:
-        ValueError: what the check raises, and the flag.
+        ValueError: the message of the check, with the flag.
     """
     from tauguard.cli.help_text import print_notes
 

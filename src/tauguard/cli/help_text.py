@@ -1,4 +1,4 @@
-"""Text that all commands share: arguments of ``--help``, notes."""
+"""Text helpers of all commands: arguments in ``--help``, and notes."""
 
 import inspect
 import re
@@ -14,7 +14,7 @@ ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 def tidy(command: Callable[..., Any]) -> None:
     """Join the lines of an argument's text, and name its default once.
 
-    The terminal breaks the lines. tyro's own note of the default is left out if the default is
+    The terminal breaks the lines. tyro's note of the default is omitted if the default is
     nothing or the text names it.
     """
     hints = get_type_hints(command, include_extras=True)
@@ -30,6 +30,6 @@ def tidy(command: Callable[..., Any]) -> None:
 
 
 def print_notes(notes: Iterable[str]) -> None:
-    """One line for each note."""
+    """Print one line per note."""
     for note in notes:
         print(f"note: {note}")

@@ -103,7 +103,7 @@ def classes(name: str, one: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(report: Mapping[str, Any]) -> list[str]:
-    """Print what is missing, damaged, or shared between splits."""
+    """Print missing and damaged files, and what splits share."""
     lines = []
     gone, damaged = report["missing"], report["damaged"]
     if gone:
@@ -125,7 +125,7 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
 
 
 def again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> None:
-    """Simulate one episode again and compare it with what is stored."""
+    """Simulate one episode again and compare it with the stored one."""
     from tauguard.datasets.inspection import line_of, same_again
     from tauguard.traces import write_mcap
 

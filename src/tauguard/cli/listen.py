@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tauguard.live import RobotStream, Sample
     from tauguard.live.session import Session
 
-#: Frames a second in rerun.
+#: Frame rate in rerun [Hz].
 FRAMES = 30
 DISCLAIMER = "tauguard listens only: it stops nothing and certifies nothing"
 
@@ -115,7 +115,7 @@ def command(
 def with_load(
     alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
 ) -> CollisionAlarm:
-    """The alarm of an arm with this load, if it was trained on such signals."""
+    """The detector for an arm with this load; refuses a detector of other signals."""
     from tauguard.datasets.arm_logs import parse_load
     from tauguard.detectors.alarms.training import carrying
 
@@ -148,7 +148,7 @@ def opened(
     reconnect: float,
     alarm: CollisionAlarm,
 ) -> Any:
-    """The source that was asked for, connected."""
+    """The connected source that the flags name."""
     from tauguard.datasets.logs import read_log
     from tauguard.live import LineStream, PlayedStream, UrStream
 
@@ -169,16 +169,16 @@ def opened(
 
 
 class Terminal:
-    """The state in the terminal: a line where it changes, and the score where it is a terminal."""
+    """Prints a line at each change of state and, to a terminal, the score."""
 
     def __init__(self, threshold: float = 1.0, every: float = 0.1) -> None:
-        """Show the score, whose threshold is this, every so many seconds."""
+        """Keep the threshold of the score and the interval of its display [s]."""
         self._threshold, self._every, self._next = threshold, every, 0.0
         self._state, self._said = "", set[str]()
         self._live = sys.stdout.isatty()
 
     def show(self, sample: Sample, answer: Answer) -> None:
-        """One answer: a line where the state changes, and one for each further kind of reason."""
+        """Show an answer: a line at a change of state, and one for each new kind of reason."""
         now = time.monotonic()
         kind = answer.reason.removeprefix("settling again after ").partition(":")[0]
         changed = answer.state != self._state
@@ -194,12 +194,12 @@ class Terminal:
 
 
 def _at(t: float) -> str:
-    """The robot's time, if it is known."""
+    """The robot's time as text, if it is known."""
     return f"{t:10.3f} s" if t == t else f"{'-':>10}  "
 
 
 def why_text(answer: Answer, threshold: float) -> str:
-    """Why a sample is a fault or a collision; nothing for a free one."""
+    """The reason for a fault or a collision; empty for a free sample."""
     above = f"score {answer.score:.2f} above {threshold:.2f}"
     held = "its alarm was up before"
     parts = [above if answer.score > threshold else held] if answer.alarm else []
@@ -210,7 +210,7 @@ def why_text(answer: Answer, threshold: float) -> str:
 def charts(
     robot: Path, save: Path | None, alarm: CollisionAlarm
 ) -> Callable[[Sample, Answer], None]:
-    """The arm, its currents and the score in rerun: in its viewer, or in a file."""
+    """Show the arm, its currents and the score in rerun's viewer, or write them to a file."""
     import mujoco
     import numpy as np
 
@@ -229,7 +229,7 @@ def charts(
         if soon or not np.isfinite(sample.t):
             return
         due[0] = sample.t
-        if np.isfinite(sample.q).all():  # during silence the arm stays where it was
+        if np.isfinite(sample.q).all():  # during silence the arm keeps its pose
             data.qpos[rows] = sample.q
             mujoco.mj_kinematics(model, data)
         view.show(data, sample.t, [])
@@ -240,7 +240,7 @@ def charts(
 
 
 def summary(session: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
-    """The figures of a run, ready for JSON; events as `tauguard detect` writes them."""
+    """The results of a run, as JSON values; events have the form of `tauguard detect`."""
     collisions = session.spans.of("collision")
     return {
         "name": "listen",
@@ -260,7 +260,7 @@ def summary(session: Session, events: list[str], alarm: CollisionAlarm) -> dict[
 
 
 def report(result: dict[str, Any]) -> None:
-    """The figures for a reader."""
+    """Print the results as text."""
     for event in result["events"]:
         line = (
             f"collision {event['start']:.3f} s to {event['end']:.3f} s: score {event['score']:.2f}"
@@ -284,7 +284,7 @@ def report(result: dict[str, Any]) -> None:
 
 
 def _us(value: float | None) -> str:
-    """Microseconds; None: more than are told apart."""
+    """Microseconds as text; None: beyond the histogram."""
     return "100,000 or more" if value is None else f"{value:,.0f}"
 
 

@@ -1,4 +1,4 @@
-"""``tauguard play-ur LOG``: a robot to test against, on this machine."""
+"""``tauguard play-ur LOG``: a simulated UR controller on this machine, for tests."""
 
 from pathlib import Path
 from typing import Annotated

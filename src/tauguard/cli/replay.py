@@ -1,4 +1,4 @@
-"""``tauguard replay PATH``: recordings for rerun, in its own window or in a browser."""
+"""``tauguard replay PATH``: show recordings in rerun's window or in a browser."""
 
 import signal
 import subprocess
@@ -52,7 +52,7 @@ def command(
 
 
 def newest(path: Path) -> Path:
-    """The newest MCAP recording in a folder that has no page to show; else ``path``."""
+    """The newest MCAP recording in a folder without a page; otherwise ``path``."""
     if not path.is_dir() or (path / "index.html").exists():
         return path
     found = sorted(path.rglob("*.mcap"), key=lambda file: file.stat().st_mtime)
@@ -64,13 +64,13 @@ def newest(path: Path) -> Path:
 
 
 def _fits(recording: Path, file: Path) -> bool:
-    """Whether both are there and the recording is not older."""
+    """Whether both files exist and the recording is not older."""
     both = recording.exists() and file.exists()
     return both and recording.stat().st_mtime >= file.stat().st_mtime
 
 
 def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> Path:
-    """The MCAP file as an .rrd file."""
+    """Convert the MCAP file to an .rrd file."""
     from tauguard.replay import write_rrd
     from tauguard.traces import read_mcap
 

@@ -1,4 +1,4 @@
-"""``tauguard robot``: what is known about an arm, what is derived, and the source of each."""
+"""``tauguard robot``: known and derived numbers of an arm, and the source of each."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def command(
 
 
 def largest_force(scene: Scene) -> float:
-    """What the arm alone can exert on a skull, the stiffest body region [N]."""
+    """The largest force of the arm alone on a skull, the stiffest body region [N]."""
     from tauguard.models import BODY_REGIONS, derive
 
     facts = scene.facts
@@ -81,11 +81,11 @@ def largest_force(scene: Scene) -> float:
 
 
 def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> None:
-    """Print a line an environment.
+    """Run the trial and print a line for each environment.
 
     Raises:
-        ValueError: ``pictures``, and nothing to draw with; nothing has run then.
-        SystemExit: something is wrong.
+        ValueError: ``pictures`` are asked for without OpenGL; raised before the trial.
+        SystemExit: the trial found an error.
     """
     from tauguard.envs.gym.trial import picture, try_arm
     from tauguard.models.picture import check_opengl
@@ -123,7 +123,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
 
 
 def names() -> str:
-    """The arms that have a name, and where their models come from."""
+    """The named arms, and the sources of their models."""
     from tauguard.models import ROBOTS
     from tauguard.models.arm import NAMED
 
@@ -147,7 +147,7 @@ def names() -> str:
 
 
 def table(facts: Facts, gains: object) -> list[dict[str, object]]:
-    """A row a joint, in plain numbers."""
+    """A row for each joint, as plain numbers."""
     from tauguard.envs.plant import Gains
 
     assert isinstance(gains, Gains)
@@ -170,7 +170,7 @@ def table(facts: Facts, gains: object) -> list[dict[str, object]]:
 
 
 def text(facts: Facts, rows: list[dict[str, object]], bound: float) -> str:
-    """The table and where its columns come from."""
+    """The table and the sources of its columns, as text."""
     heads = list(rows[0])
     cells = [[_cell(row[head]) for head in heads] for row in rows]
     widths = [max(len(h), *(len(row[k]) for row in cells)) for k, h in enumerate(heads)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from tauguard.envs import Episode
 
-#: Loads of the CURA6-like arm that are gone through by default [g].
+#: Default payloads of the CURA6-like arm, taken in turn [g].
 LOADS = (0.0, 1016.0, 4039.0)
 
 
@@ -71,7 +71,7 @@ def command(
     if payloads_g is None:
         scale = torque_scale(robot)
         payloads_g = tuple(scale * load for load in LOADS)
-    first = 10_000  # smaller seeds are the demo's, whose model may be judged on these episodes
+    first = 10_000  # smaller seeds are the demo's, whose model may be evaluated on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (
         struck_episodes(first + seed, episodes, collisions, speeds, payloads_g, arm, robot)
@@ -90,7 +90,7 @@ def command(
 
 
 def described(path: Path, episode: Episode) -> dict[str, object]:
-    """What one recording holds, printed as a line and given for JSON."""
+    """Print the content of one recording as a line, and return it as JSON values."""
     from tauguard.traces import read_mcap
 
     trace = read_mcap(path)

@@ -1,4 +1,4 @@
-"""``tauguard video RECORDING``: a recording as a picture that moves, without a viewer."""
+"""``tauguard video RECORDING``: render a recording to a video file, without a viewer."""
 
 from pathlib import Path
 from typing import Annotated

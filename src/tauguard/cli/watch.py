@@ -1,4 +1,4 @@
-"""``tauguard watch ENVIRONMENT``: an environment live in the rerun viewer."""
+"""``tauguard watch ENVIRONMENT``: show an environment live in the rerun viewer."""
 
 import ast
 import time
@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-#: Keywords that may name several things, parted by commas.
+#: Keywords that may have several values, separated by commas.
 LISTS = ("obstacles", "checkers")
 
 
@@ -60,7 +60,7 @@ def command(
 
 
 def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
-    """NAME=VALUE pairs; a value that is no Python literal is text."""
+    """Parse NAME=VALUE pairs; a value that is no Python literal is text."""
     found: dict[str, Any] = {}
     for item in settings:
         name, sign, text = item.partition("=")
@@ -75,7 +75,7 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, port: int) -> None:
-    """Episodes until the time is over, in real time unless they go into a file."""
+    """Run episodes until the time is over, in real time unless they go into a file."""
     from tauguard.replay.live import LiveView
 
     inner = env.unwrapped
@@ -117,7 +117,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
 
 
 def chosen(env: Any, inner: Any, policy: str) -> Any:
-    """The policy's action."""
+    """The action of the chosen policy."""
     import numpy as np
 
     if policy == "random":
@@ -136,7 +136,7 @@ def chosen(env: Any, inner: Any, policy: str) -> Any:
 
 
 def send(view: Any, inner: Any, info: dict[str, Any], now: float) -> None:
-    """One instant: the scene and the charts."""
+    """Send the scene and the charts of one instant."""
     import numpy as np
 
     batch, names = inner.batch, list(inner.compiled.scene.joint_names)

@@ -26,7 +26,7 @@ struct Bodies {
   Kind kind;
   const double* data;
   const std::int64_t* offsets;  // hulls and polygons only
-  std::size_t count;            // 1 broadcasts against the other side
+  std::size_t count;            // a count of 1 broadcasts against the other side
 
   static constexpr std::size_t strides[] = {12, 15, 12, 3, 2};
 

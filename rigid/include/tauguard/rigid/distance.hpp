@@ -6,7 +6,7 @@
 
 namespace tauguard::rigid {
 
-// Points whose convex hull is meant.
+// The points of a convex hull.
 using PointList = std::vector<Vec3>;
 
 // The nearest points of two hulls, or a common point if they meet. `corner` holds the vertices

@@ -95,7 +95,7 @@ class MovingBody {
     return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
   }
   Vec3 angular() const { return motion_.speed * motion_.axis; }
-  const Vec3& axis() const { return motion_.axis; }  // unit, zero where nothing turns
+  const Vec3& axis() const { return motion_.axis; }  // unit, zero without rotation
   double angular_speed() const { return motion_.speed; }
   // Largest magnitude that enters a position. The angle is part of it, because its rounding rotates
   // the body.
