@@ -51,7 +51,7 @@ def load_model(source: Any) -> Any:
     A URDF whose meshes are missing is drawn as sticks between its joints.
 
     Raises:
-        ValueError: the file or text is no such model, or compiling it takes too much (see
+        ValueError: the file or text is no valid model, or needs too much time or memory (see
             :func:`tauguard.models.robot_check.checked_robot`); one line.
         OSError: the file is missing.
     """

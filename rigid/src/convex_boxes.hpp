@@ -13,8 +13,8 @@
 // by the angle between them removes its facet and moves the body by at most tau h. So a margin of
 // that size at all other axes is enough (a ball of that radius about the offset is inside the
 // tilted body). Edges count as parallel if 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 -
-// C^2. At most three pairs can be parallel, with each edge in one of them, so they move the body by
-// less than 2 tau min(sum h_A, sum h_B).
+// C^2. At most three pairs can be parallel, with each edge in one of them. So tilting moves the
+// body by less than 2 tau min(sum h_A, sum h_B).
 #pragma once
 
 #include "convex_abfme.hpp"
