@@ -109,7 +109,7 @@ def check_length(recordings: Sequence[Recording]) -> None:
     if (seconds := motion_length(recordings)) < LEAST:
         still = "" if seconds else "no joint moves: "
         raise ValueError(
-            f"{still}{seconds:.0f} s of motion, from each log's first to its last, in all: "
+            f"{still}{int(10 * seconds) / 10:g} s of motion, from each log's first to its last, in all: "
             f"{LEAST:g} s are the least, two minutes are good"
         )
 

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tauguard.arrays import Bools
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
@@ -50,8 +49,6 @@ from tauguard.detectors.features.motion_regimes import Unseen, unseen
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_joints
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Confirmation of an alarm [s]: none, since scores pass 1 only once they are confirmed.
 CONFIRMATION = 0.0
