@@ -109,8 +109,8 @@ def check_length(recordings: Sequence[Recording]) -> None:
     if (seconds := motion_length(recordings)) < LEAST:
         still = "" if seconds else "no joint moves: "
         raise ValueError(
-            f"{still}{int(10 * seconds) / 10:g} s of motion, from each log's first to its last, in all: "
-            f"{LEAST:g} s are the least, two minutes are good"
+            f"{still}{int(10 * seconds) / 10:g} s of motion, from each log's first to its last, in "
+            f"all: {LEAST:g} s are the least, two minutes are good"
         )
 
 
