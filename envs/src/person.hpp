@@ -299,21 +299,28 @@ class Person {
     if (body_.seated) lean -= lean_back * back;
     const double before = std::exchange(
         lean_, lean_ + std::min(std::max(lean - lean_, -lean_rate * dt), lean_rate * dt));
-    trunk_and_head();
-    if (barriers_ && lean_ > before &&
-        nearest({skull, neck, chest, abdomen}).distance < clearance) {
-      lean_ = before;
+    const auto body = [&] {
       trunk_and_head();
+      const Vec3 up = trunk_axis(), neck_base = axes_.hip + body_.trunk * up;
+      double least = 0;
+      if (lean_ > before) least = nearest({skull, neck, chest, abdomen}).distance - clearance;
+      for (int side = 0; side < 2; ++side) {
+        const double sign = side == 0 ? 1.0 : -1.0;
+        const Vec3 shoulder =
+            neck_base + sign * body_.shoulder * axes_.left - 0.04 * body_.trunk * up;
+        arm(side, shoulder, goals[side], sign);
+        if (!barriers_ || dt == 0) continue;
+        keep_clear(side, shoulder, goals[side], sign, last[side], dt);
+        least = std::min(least, nearest_to_arm(side).distance);
+      }
+      return least;
+    };
+    // A trunk that leans into something, or takes an upper arm there, stays as it was.
+    if (body() < 0 && lean_ != before) {
+      lean_ = before;
+      body();
     }
-    const Vec3 up = trunk_axis(), neck_base = axes_.hip + body_.trunk * up;
-    for (int side = 0; side < 2; ++side) {
-      const double sign = side == 0 ? 1.0 : -1.0;
-      const Vec3 shoulder =
-          neck_base + sign * body_.shoulder * axes_.left - 0.04 * body_.trunk * up;
-      arm(side, shoulder, goals[side], sign);
-      if (barriers_ && dt > 0) keep_clear(side, shoulder, goals[side], sign, last[side], dt);
-      leg(side, sign);
-    }
+    for (int side = 0; side < 2; ++side) leg(side, side == 0 ? 1.0 : -1.0);
   }
 
   Vec3 trunk_axis() const {
@@ -323,6 +330,7 @@ class Person {
   // The nearest barrier to some of the capsules, within their clearance.
   Gap nearest(std::initializer_list<int> segments) const {
     Gap out;
+    if (!barriers_) return out;
     for (const int k : segments) {
       const Gap gap = barriers_->nearest(geoms_[k], centre[k], quat_wxyz[k], clearance);
       if (gap.distance < out.distance) out = gap;

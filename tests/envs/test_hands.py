@@ -36,10 +36,10 @@ THINGS = {
 }  # fmt: skip
 
 
-def make(*objects):
+def make(*objects, person=SOMEONE):
     """An environment in which one person works beside the objects."""
     return gym.make(
-        REACH, obstacles=(SOMEONE,), objects=objects, max_episode_steps=10**6, checkers=()
+        REACH, obstacles=(person,), objects=objects, max_episode_steps=10**6, checkers=()
     ).unwrapped
 
 
@@ -98,6 +98,18 @@ def test_arms_of_people_pass_through_nothing(name):
     assert unimpeded < -0.01  # else this shows nothing
     assert nearest > 0
     assert fastest < 6.0  # a walk, a turn of the body and a startled hand at once
+
+
+def test_a_trunk_takes_no_upper_arm_into_a_thing():
+    """Who sits leans to reach; the box before them is at the height of the elbows."""
+    thing = SceneObject("thing", (Shape("box", (0.05, 0.3, 0.1)),), position=(3.3, 0.0, -0.1))
+    env, nearest = make(thing, person=Person(position=(4.0, 0.0), posture="seated")), np.inf
+    for seed in range(2):
+        env.reset(seed=seed)
+        for _ in range(250):
+            env.step(np.zeros(6))
+            nearest = min(nearest, *(distance(env, row, thing) for row in env.batch.region[0]))
+    assert nearest > 0
 
 
 def test_a_hand_that_is_sent_into_a_thing_stops_at_it_and_comes_back():
