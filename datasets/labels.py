@@ -28,7 +28,7 @@ def labelled(
 
     Returns:
         Times of the first and last sample of each contact; None without a column in LABELS, or
-        or if it holds values other than 0 and 1, or false and true.
+        if it holds values other than 0 and 1, or false and true.
     """
     columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
     cells = dict(rows) if columns else {}

@@ -120,7 +120,7 @@ def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Arr
 
 
 def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> Array:
-    """Default rotor inertia at the joint [kg m^2], shape (n,); 0 for slides."""
+    """The file's rotor inertia at the joint [kg m^2], or a default (0 for slides), shape (n,)."""
     at = joint_ids(model, joints)
     given = model.dof_armature[model.jnt_dofadr[at]]
     hinge = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_HINGE

@@ -130,7 +130,7 @@ class LeftOver:
 
     @cached_property
     def _trees(self) -> list[tuple[_Tree, _Tree]]:
-        """Per joint, search trees of all stretches and of those in which it then stands."""
+        """Per joint, search trees of all stretches and of those that begin with it at rest."""
         later = self._starts + round(HELD * self.rate)
         later = np.minimum(later, self._starts + self.remaining[self._starts])
         found = []

@@ -273,7 +273,7 @@ def region_names(spec: SceneSpec) -> tuple[str, ...]:
 
 
 def label_region(whole: mujoco.MjSpec, spec: SceneSpec, name: str, arm: str = "") -> None:
-    """Add a contact sensor to a region; on an object it sees only links from ``first`` on."""
+    """Add a contact sensor to a region; on an object, of contacts with ``arm`` and below."""
     own = any(obj.name == name for obj in spec.objects)
     _add_label(whole, name, f"contact_{name}", subtree=own, against=arm if own else "")
 

@@ -75,7 +75,7 @@ def _spread(axes: Any, detection: Detection) -> None:
 
 
 def _drawn(values: Array) -> Array:
-    """Values with gaps for the time in which the detector settles."""
+    """Values with NaN for infinite scores, which mean that the detector has not settled."""
     import numpy as np
 
     return np.where(np.isfinite(values), values, np.nan)

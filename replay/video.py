@@ -121,7 +121,7 @@ def _look(camera: Any, links: Array, people: Array, view: tuple[float, float, fl
 
 
 def _targets(trace: Trace, t: float) -> Any:
-    """Positions of the targets at a time [m], shape (arms, 3); None without targets."""
+    """Positions of the targets at a time [m], shape (arms, 3); empty without targets."""
     rows = json.loads(trace.attachments.get(TARGETS, "[]"))
     return next((places for begin, places in reversed(rows) if begin <= t), np.zeros((0, 3)))
 

@@ -131,7 +131,7 @@ def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
 
     Args:
         model: MjModel.
-        physics: names of options, all of which must be finite.
+        physics: address and size in bytes of the options, all of which must be finite.
     """
     out = [(*region, _FINITE) for region in physics]
     for name, rule in _rules().items():

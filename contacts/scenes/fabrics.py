@@ -98,7 +98,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
 def _moving(
     name: str, scene: Scene, model: mujoco.MjModel, seconds: float, reference: Reference
 ) -> ContactScene:
-    """The contact scene of ``scene`` (or of its new ``model``), whose arm follows ``reference``."""
+    """The contact scene of ``model``, in which the arm of ``scene`` follows ``reference``."""
     joints = [model.joint(joint) for joint in scene.joint_names]
     places = np.array([joint.qposadr[0] for joint in joints])
     dofs = np.array([joint.dofadr[0] for joint in joints])

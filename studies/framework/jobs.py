@@ -83,7 +83,7 @@ class JobCache:
         return cls(folder)
 
     def over(self, each: Each, name: str) -> Each:
-        """Run ``each`` for the jobs of this name that have no cached result."""
+        """A map like ``each`` that reads the cached results of jobs of this name."""
         return functools.partial(self._map, each, name)
 
     def _map(
