@@ -160,7 +160,7 @@ def _added(packets: Packets, rows: Rows, name: str, joint: int, amount: float) -
 
 
 def _saturated(packets: Packets, rows: Rows) -> Packets:
-    """All currents are clipped at half of the largest one."""
+    """Each current is clipped at half of its largest value."""
     current = packets.current.copy()
     most = np.abs(packets.current).max(axis=0) / 2
     current[rows] = np.clip(current[rows], -most, most)

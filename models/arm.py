@@ -102,7 +102,7 @@ class Arm:
         return self.facts.drive.torque_limit
 
     def shapes(self) -> list[mujoco.MjsGeom]:
-        """Names of the links' collision geoms."""
+        """The links' collision geoms; geoms without a name get one."""
         found = []
         for link in self.links:
             colliding = [g for g in self.spec.body(link).geoms if g.contype or g.conaffinity]

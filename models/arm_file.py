@@ -20,7 +20,8 @@ ARM_BITS, OBSTACLE_BITS = 1, 2
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
 #: Its colour, and the group of collision shapes if visual shapes exist.
 STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
-#: A branch below a chain of at least this many joints is a gripper if it has fewer joints.
+#: Branches below a chain of at least the first number of joints are a gripper if each has at most
+#: the second number of joints, and no more than the chain.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
 #: A last joint with such a name belongs to a gripper, too.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)

@@ -43,7 +43,7 @@ def choose_jacobian(spec: Any) -> None:
 
 
 def warn_of_sparse_newton(model: Any) -> None:
-    """Raise a ``UserWarning`` with the remedy if :func:`hit_by_sparse_newton` is true."""
+    """Issue a ``UserWarning`` with the remedy if :func:`hit_by_sparse_newton` is true."""
     if hit_by_sparse_newton(model):
         warnings.warn(
             f"MuJoCo {mujoco.__version__}: its Newton solver can give wrong accelerations with a "
