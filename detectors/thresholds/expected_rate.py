@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.detectors.thresholds.tail_model import BEYOND_CHANCE, Tail, shape_error
+from tauguard.detectors.thresholds.tail_model import (
+    BEYOND_CHANCE,
+    Tail,
+    shape_error,
+    tail_fraction,
+)
 
-#: Fraction of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
-TAIL = 0.05
 #: Bounds of the tail's shape if the peaks do not show that it ends, and the lowest shape if they
 #: do.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
@@ -57,7 +60,8 @@ class ExpectedRate:
         hours = np.array([one.seconds for one in scores]) / 3600
         draws = _draws(len(scores))
         own = draws @ hours
-        return cls(blocks, draws, Tails.of(blocks, draws, own), own, highest, float(hours.sum()))
+        tails = Tails.of(blocks, draws, own, tail_fraction(max(one.interval for one in scores)))
+        return cls(blocks, draws, tails, own, highest, float(hours.sum()))
 
     def rates(self, threshold: float) -> Array:
         """The rate of every draw, counted or along its tail [1/h], shape (D,)."""
@@ -135,17 +139,19 @@ class Tails:
     per_hour: Array  #: peaks above the base
 
     @classmethod
-    def of(cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array) -> Tails:
-        """Of each draw's blocks; ``hours`` of each draw."""
+    def of(
+        cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array, fraction: float
+    ) -> Tails:
+        """Of this fraction of each draw's blocks; ``hours`` of each draw."""
         together = np.concatenate(blocks)
         order = np.argsort(together)
         together = together[order]
         episode = np.repeat(np.arange(len(blocks)), [len(b) for b in blocks])[order]
-        shapes = _shapes(together[::-1])
+        shapes = _shapes(together[::-1], fraction)
         rows = []
         for counts, own in zip(draws, hours, strict=True):
             peaks = np.repeat(together, counts[episode])
-            tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))), shapes)
+            tail = Tail.of(peaks[::-1], max(2, round(fraction * len(peaks))), shapes)
             rows.append((tail.base, tail.scale, tail.shape, tail.count / own))
         return cls(*np.array(rows).T)
 
@@ -166,8 +172,8 @@ def _draws(episodes: int) -> NDArray[np.int64]:
     return np.stack([np.bincount(one, minlength=episodes) for one in again])
 
 
-def _shapes(peaks: Array) -> tuple[float, float]:
+def _shapes(peaks: Array, fraction: float) -> tuple[float, float]:
     """Bounds of the shape of every draw's tail, from the peaks of all, in descending order."""
-    whole = Tail.of(peaks, max(2, round(TAIL * len(peaks))), (LOWEST, SHAPES[1]))
+    whole = Tail.of(peaks, max(2, round(fraction * len(peaks))), (LOWEST, SHAPES[1]))
     margin = BEYOND_CHANCE * shape_error(whole.count)
     return max(LOWEST, min(SHAPES[0], whole.shape + margin)), SHAPES[1]

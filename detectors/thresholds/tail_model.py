@@ -120,6 +120,11 @@ SLOW_TAIL, SLOW = 0.1, 0.015
 HEAVIER = 0.02
 
 
+def tail_fraction(interval: float) -> float:
+    """Fraction of the blocks in the tail of logs with so long between two samples [s]."""
+    return SLOW_TAIL if interval > SLOW else TAIL
+
+
 def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
 
@@ -139,7 +144,7 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     hours = sum(one.seconds for one in scores) / 3600
     interval = max(one.interval for one in scores)
     usual = min(USUAL_SHAPE * max(interval / HEAVIER, 1.0), SHAPES[1])
-    count = max(2, round((SLOW_TAIL if interval > SLOW else TAIL) * len(peaks)))
+    count = max(2, round(tail_fraction(interval) * len(peaks)))
     return tail_level(peaks, per_hour * hours, count, usual)
 
 
