@@ -48,7 +48,7 @@ def judged_alarms(
 ) -> Iterator[tuple[str, list[Matching]]]:
     """Match the alarms of a file with the true collisions of each split's episodes.
 
-    The first 3 s of an episode are not counted: no collision is planned in them, and detectors
+    The first 3 s of an episode do not count: no collision is planned there, and detectors settle.
 
     Args:
         folder: a dataset.

@@ -20,7 +20,7 @@ def on_cluster(
     """The results of ``work`` in the order in which they are ready.
 
     A task whose node or process is lost is repeated on another. All nodes must see the folder that
-    the tasks write under the same path, and must have the same version of tauguard.
+    the tasks write, under the same path, and must have the same version of tauguard.
 
     Args:
         work: function of one task.

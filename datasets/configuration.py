@@ -51,9 +51,7 @@ class Split:
     picks: float  #: fraction of collision-free episodes with a payload picked up
     unseen: tuple[str, ...]  #: properties ("arm", ...) that share no value with the first split
     clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: drawn duration [s]
-    paired: bool = (
-        False  #: episodes 2k and 2k + 1 have the same motion, without and with collisions
-    )
+    paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
     """Context in which ``folder`` holds this dataset and this process is its only writer.
 
-    If the folder is empty, the head file, the arms and the subfolders are written first.
+    The head file, the arms and the subfolders are written first where they are missing.
 
     Raises:
         ValueError: the folder holds something else.

@@ -36,7 +36,7 @@ def generate_dataset(
     workers: int | None = None,
     ray: str | None = None,
 ) -> Built:
-    """Write the dataset, or the shards that are missing.
+    """Write the dataset, or the shards of it that are missing or damaged.
 
     The bytes are the same for any number of workers and for a cluster.
 

@@ -18,7 +18,7 @@ COLOURS = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
 
 
 def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
-    """Draw planned and achieved counts by class, severity by kind, and one collision."""
+    """Draw counts by class, severity by kind, hours by speed and payload, and one collision."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -14,7 +14,7 @@ from tauguard.traces.trace import Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
-#: No joint turns by more than two turns [rad]; positions in degrees exceed this.
+#: No joint position is beyond two turns [rad]; positions in degrees exceed this.
 FURTHEST = 4 * np.pi
 #: Velocities are integrated over this time and compared with the change of position [s].
 SPAN = 0.1

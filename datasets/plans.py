@@ -71,8 +71,8 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
 def torque_scale(robot: str) -> float:
     """Factor on severities and loads for this robot, at most 1.
 
-    Multiplied by it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA`
-    equals the robot's largest torque limit.
+    Multiplied by it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA` is at
+    most the robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -143,7 +143,7 @@ def free_episodes(
     picks: bool = False,
     robot: str = "cura6",
 ) -> list[Episode]:
-    """Collision-free episodes; with ``picks`` the arm picks up a payload half-way through each."""
+    """Collision-free episodes; with ``picks`` the arm takes its payload up half-way through."""
     children = np.random.SeedSequence([seed, 2]).spawn(count)
     episodes = []
     for i, child in enumerate(children):

@@ -68,7 +68,7 @@ def is_torque(trace: Trace) -> bool:
 def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
     """Refuse a robot file that cannot be read, or that is not of the arm of a trained model.
 
-    Joint names and joint positions must agree; masses may differ, because calibration changes
+    Names and placements of the joints must agree; masses may differ, because calibration changes
     them.
 
     Raises:
@@ -174,7 +174,7 @@ def known_arm(
     """The initial arm for the method free-motion, and a text that says where its gains come from.
 
     The gains are the given ones, else those of a calibrated robot file, else those of
-    them.
+    :func:`initial_arm`.
 
     Raises:
         ValueError: as for :func:`initial_arm`, or torque logs with an arm calibrated on currents.

@@ -116,7 +116,7 @@ def _fraction(fraction: float) -> tuple[bool, ...]:
 def _collisions(
     split: Split, seed: list[int], draw: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
-    """The collisions of an episode; dealing continues from the previous such episode."""
+    """The collisions of an episode; dealing continues from the episode with collisions before."""
     before = (
         draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
     )

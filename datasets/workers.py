@@ -106,7 +106,7 @@ def in_processes(
 
 
 def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Connection:
-    """Start a worker and append it to ``crew``; a stop signal is handled after both are done."""
+    """Start a worker and enter it in ``crew``; a stop signal is handled after both are done."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)

@@ -7,7 +7,7 @@ from tauguard.traces.trace import Trace
 
 
 class PlayedStream(Closing):
-    """A trace that is replayed in real time.
+    """A trace that is replayed, by default in real time.
 
     Args:
         trace: the trace to replay.

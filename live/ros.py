@@ -50,7 +50,7 @@ class RosStream(Closing):
     def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
         """Subscribe."""
         try:
-            # rclpy is part of a ROS 2 installation and on no package index, so it is no dependency.
+            # rclpy comes with a ROS 2 installation, not from a package index: it is no dependency.
             rclpy: Any = import_module("rclpy")
             executors: Any = import_module("rclpy.executors")
             qos: Any = import_module("rclpy.qos")

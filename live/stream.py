@@ -18,7 +18,7 @@ class StreamClosed(Exception):
     """
 
     def __init__(self, why: str, lost: bool = False) -> None:
-        """Keep the reason ``why`` in one line."""
+        """Take the reason ``why``, one line."""
         super().__init__(why)
         self.lost = lost
 

@@ -40,11 +40,11 @@ class UrServer(Closing):
     Args:
         packets: the packets to send, of six joints.
         port: the port to serve; 0: any free port (see :attr:`port`).
-        version: accepted protocol versions.
+        version: the only protocol version that is accepted.
         controller: major version of the controller; 5 and up sends up to 500 samples a second.
 
     Raises:
-        ValueError: the number of joints is not six, or the port is in use.
+        ValueError: the number of joints is not six, or the port cannot be opened.
     """
 
     def __init__(

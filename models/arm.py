@@ -53,7 +53,7 @@ class Facts:
     max_speed: Array  #: [rad/s]
     max_acceleration: Array  #: [rad/s^2]
     spread: Array  #: largest distance of drawn poses from home [rad]
-    servo_inertia: Array | None  #: assumed by the servo [kg m^2]; None: at home
+    servo_inertia: Array | None  #: [kg m^2]; None: that of the home pose
     bandwidth: Array  #: bandwidth of the servo [rad/s]
     compensation: float  #: fraction of the known friction that the servo compensates
     tool: str | None  #: site, or None: the last link's origin
@@ -93,7 +93,7 @@ class Arm:
 
     @property
     def home(self) -> Array:
-        """Initial joint positions [rad], shape (n,)."""
+        """The home pose [rad], shape (n,)."""
         return self.facts.home
 
     @property

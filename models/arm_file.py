@@ -23,7 +23,7 @@ STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
 #: Branches below a chain of at least the first number of joints are a gripper if each has at most
 #: the second number of joints, and no more than the chain.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
-#: A last joint with such a name belongs to a gripper, too.
+#: Below such a chain, a joint with such a name and all joints below it are a gripper, too.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)
 #: Usual names of a tool frame, the likeliest first.
 TOOL_FRAMES = (
@@ -47,7 +47,7 @@ class ArmFile:
     model: mujoco.MjModel  #: ``spec`` compiled without its shapes
     mended: tuple[str, ...]  #: links of a URDF whose impossible inertia was corrected
     sticks: tuple[str, ...]  #: links without any shape, which were given a capsule
-    replaced: dict[str, str]  #: links with a substitute shape, and its description
+    replaced: dict[str, str]  #: links whose shape differs from the file's, and how
 
 
 def read_arm(
@@ -146,7 +146,7 @@ def _name_joints(spec: mujoco.MjSpec) -> None:
 
 
 def _weld(spec: mujoco.MjSpec, names: list[str]) -> None:
-    """Remove joints and the constraints on them."""
+    """Remove joints, and with them every equality constraint and tendon of the file."""
     if not names:
         return
     for element in (*spec.equalities, *spec.tendons):
@@ -295,7 +295,7 @@ def _let_collide(
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Set the arm's collision bits on all colliding geoms, and give every link such a geom.
 
-    Returns the links without any shape, and the links with a substitute shape.
+    Returns the links without any shape, and all whose shape differs from the file's, and how.
     """
     sticks, replaced = [], {}
     for geom in spec.geoms:

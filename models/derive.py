@@ -46,7 +46,7 @@ def joint_ids(model: mujoco.MjModel, joints: tuple[str, ...]) -> NDArray[np.int6
 
 
 def ranges(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array]:
-    """Joint ranges [rad], shapes (n,); +-pi for joints without a range."""
+    """Joint ranges [rad or m], shapes (n,); without a range +-pi, or +-0.5 m for a slide."""
     at = joint_ids(model, joints)
     limited = model.jnt_limited[at].astype(bool)
     slides = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_SLIDE
@@ -133,7 +133,7 @@ def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) 
 def largest_energy(
     model: mujoco.MjModel, joints: tuple[str, ...], speed: Array, limit: Array
 ) -> tuple[float, float]:
-    """Energy that an arm can put into a contact [J]: kinetic energy plus the work of its drives.
+    """Energies that an arm can put into a contact [J]: kinetic energy, and work of its drives.
 
     The kinetic energy 1/2 v^T |M| v takes the largest joint speeds with the worst signs, over the
     random poses. The work is that of all drives at their limits over :data:`PRESSING`.
@@ -144,7 +144,7 @@ def largest_energy(
 
 
 def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) -> Array:
-    """Torque limits [N m], shape (n,); a missing one is chosen to hold and move the arm."""
+    """Torque limits [N m], shape (n,); hinges without one get one that holds and moves the arm."""
     if np.isfinite(stated).all():
         return stated
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
@@ -195,8 +195,9 @@ def stiffest_mode(
 def home_pose(model: mujoco.MjModel, joints: tuple[str, ...], tip: int) -> Array:
     """A home pose [rad], shape (n,): in front of the base, away from singular poses and limits.
 
-    Among fixed random poses it has the largest manipulability, weighted by the distance of the
-    joints from their limits and of the tool from the middle of its reach.
+    Among fixed random poses that keep off the joint limits it has the largest manipulability,
+    weighted by the distance of the tool from the middle of its reach. An arm of fewer than four
+    joints gets the pose nearest to zero that keeps off the limits.
     """
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]

@@ -33,7 +33,7 @@ def drive_of(text: str) -> Drive:
     """The drive that :func:`drive_text` wrote.
 
     Raises:
-        ValueError: the text is not of a drive, or is of a newer version.
+        ValueError: the text is not of a drive, or is of another version (its number is named).
     """
     try:
         values: dict[str, Any] = json.loads(text)

@@ -42,7 +42,7 @@ def xml_text(spec: mujoco.MjSpec) -> str:
 
 
 class SpecText:
-    """The text of a spec at this moment, written when it is first needed.
+    """The text of a spec as it was given, written when it is first needed.
 
     Writing an arm with detailed meshes takes seconds, and few callers read the text.
     """
@@ -60,7 +60,7 @@ class SpecText:
         return self._text
 
     def dynamics(self) -> mujoco.MjModel:
-        """The compiled model without shapes, which keeps the inertia of the shapes."""
+        """The compiled model, without shapes if the spec states every body's inertia."""
         spec = self._spec.copy()
         if not all(body.explicitinertial for body in spec.bodies if body.name != "world"):
             return mujoco.MjModel.from_xml_string(str(self))

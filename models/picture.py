@@ -1,4 +1,4 @@
-"""Sky, floor, lamp and markers for pictures of a scene, and a check of OpenGL."""
+"""Sky, floor, lamp and markers for pictures of a scene, and the choice and check of OpenGL."""
 
 from __future__ import annotations
 

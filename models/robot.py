@@ -68,7 +68,7 @@ class RobotSensors:
 class RobotDrive:
     """Drives from a data sheet or an identification; a single number holds for every joint.
 
-    State either ``gain``, or ``gear`` and ``torque_constant``. ``rotor_inertia`` is the
+    The gain is ``gain``, or ``gear`` times ``torque_constant``. ``rotor_inertia`` is the
     motor's own (the joint feels gear^2 times it). Friction is that at the joint, in the terms of
     :class:`tauguard.models.Friction`.
     """

@@ -101,10 +101,10 @@ class Scene:
     link_bodies: NDArray[np.int64]  #: body ids of link 1..n
     qpos_adr: NDArray[np.int64]  #: addresses of the arm's joints in qpos
     dof_adr: NDArray[np.int64]  #: addresses of the arm's joints in qvel
-    obstacle_names: tuple[str, ...]  #: bodies that move without the arm
+    obstacle_names: tuple[str, ...]  #: obstacles and moving objects
     payload_body: int  #: id of the payload body, -1 if there is none
     drive: Drive  #: the simulated drives
-    home: Array  #: initial joint positions [rad], shape (n,)
+    home: Array  #: home pose [rad], shape (n,)
     facts: Facts  #: known and assumed numbers of the arm (of the first, if there are two)
 
     @property
@@ -193,7 +193,7 @@ def _nominal_text(arm: Arm, spec: SceneSpec, whole: mujoco.MjSpec) -> SpecText:
 def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile ``whole`` without the shapes that touch nothing; bodies and joints keep their ids.
 
-    A shape from which MuJoCo computes a body's mass stays. ``whole`` is changed.
+    All shapes stay if MuJoCo computes a body's mass from one of them. ``whole`` is changed.
     """
     stated = all(body.explicitinertial for body in whole.bodies if body.name != "world")
     full = None if stated else whole.compile()
@@ -266,7 +266,7 @@ def people_parts(spec: SceneSpec) -> Iterator[PersonPart]:
 
 
 def region_names(spec: SceneSpec) -> tuple[str, ...]:
-    """Names of bodies with force limits: the proxies, body parts of people, then the objects."""
+    """Names of the regions: the proxies, the body parts of people, then touchable objects."""
     people = (part.name for part in people_parts(spec))
     objects = (obj.name for obj in spec.objects if obj.touchable)
     return (*(proxy.region for proxy in spec.proxies), *people, *objects)

@@ -25,7 +25,8 @@ Quat = tuple[float, float, float, float]
 SHAPES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "mesh": 0}
 #: An object is fixed, held by the tool, or free; a fixed object with a path follows it.
 MOTIONS = ("fixed", "held", "free")
-#: Collision bit of objects and table; the arm collides with them through contact pairs.
+#: Collision bit of objects among themselves; ``Table`` and floor do not have it. The arm collides
+#: with objects through contact pairs.
 OBJECT_BIT = 4
 _COLOUR = (0.55, 0.6, 0.65, 1.0)
 #: Mass of a conveyor's belt [kg], large enough that parts on it do not slow it down.

@@ -125,7 +125,7 @@ def _without_meshes(root: ElementTree.Element) -> ElementTree.Element:
 
 
 def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
-    """The mesh of a shape; a visual mesh is simplified and keeps its file's colour.
+    """The mesh of a shape; a visual one is simplified, and without a material has its own colour.
 
     Raises:
         ValueError: the file cannot be used; the message leaves out its name.

@@ -51,7 +51,7 @@ def mend_inertias(root: ElementTree.Element) -> tuple[str, ...]:
 
 
 def possible_inertia(tensor: Array, mass: float) -> Array:
-    """The physically possible inertia near ``tensor`` [kg m^2], shape (3, 3)."""
+    """A physically possible inertia near ``tensor`` [kg m^2], shape (3, 3)."""
     moments, axes = np.linalg.eigh(tensor)
     if moments[2] <= 0:
         # MuJoCo names the link of a mass below 0.

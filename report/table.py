@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-#: Default length of a line [characters].
+#: Largest length of a line, by default [characters].
 WIDTH = 140
 #: A column's heading is broken at its underscores into lines of about this length.
 HEADING = 9

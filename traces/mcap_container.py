@@ -210,7 +210,7 @@ def rows_of(data: bytes) -> list[tuple[int, NDArray[np.uint32], Bytes]]:
 
 
 def singles(data: bytes) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
-    """The messages of a chunk without repetition, one at a time."""
+    """The messages of any chunk, one at a time."""
     at = 0
     while at < len(data):
         opcode, length = struct.unpack_from("<BQ", data, at)

@@ -43,7 +43,7 @@ class Truth:
     contact_link: NDArray[np.int64]  #: link of the largest contact force, 0 for none, shape (T,)
     contact_point: Array  #: its point, world frame [m], NaN where there is none, shape (T, 3)
     contact_vector: Array  #: its force on the arm, world frame [N], 0 for none, shape (T, 3)
-    obstacle_names: tuple[str, ...] = ()  #: bodies of the scene that move without the arm
+    obstacle_names: tuple[str, ...] = ()  #: obstacles and moving objects of the scene
     obstacle_poses: Array = field(default_factory=lambda: np.empty((0, 0, 4, 4)))
     """World poses of the obstacles, homogeneous, shape (T, len(obstacle_names), 4, 4)."""
 
@@ -111,7 +111,7 @@ class Trace:
             raise ValueError(f"t: not increasing at row {back[0] + 1}")
 
     def __repr__(self) -> str:
-        """One line: the arm, the duration, and which fields are known."""
+        """In a line: arm, samples, duration, and the number of collisions if it is known."""
         arm = self.meta.get("arm", "") or self.meta.get("environment", "")
         known = "no truth" if self.truth is None else f"{len(self.truth.collisions)} collisions"
         long = self.t[-1] - self.t[0] if len(self.t) else 0.0
