@@ -2,8 +2,8 @@
 
 The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), refitted every frame, and the
 front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). Three choices are
-our own. Vertices, edges and faces have separate trees with 16 features per leaf, so that every
-elementary pair is tested exactly once. Volumes may *move*: instead of one interval that covers
+our own. Vertices, edges and faces have separate trees with 16 features per leaf, so that no
+elementary pair is tested twice. Volumes may *move*: instead of one interval that covers
 the step they have an interval at each of its ends. This gives fewer candidates and no misses (see
 ``k_dop.hpp``). Features can be added and removed without a rebuild (``update_topology``).
 """
@@ -263,7 +263,7 @@ class MeshCCD:
         Args:
             faces: Shape (F', 3), the complete new list. Rows that were there before count
                 as unchanged.
-            groups: Groups of the new vertices; ``None`` keeps the present ones.
+            groups: Groups of all vertices; ``None`` keeps the present ones.
             edges: Isolated edges; ``None`` keeps the present ones.
             points: Isolated vertices; ``None`` keeps the present ones.
 

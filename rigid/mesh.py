@@ -132,7 +132,7 @@ class MeshTree:
     def overlap(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshOverlap:
         """Whether the surfaces intersect, with the other mesh posed in this one's frame.
 
-        The search stops at the first pair.
+        The search stops as soon as it finds a pair.
 
         Args:
             other: A mesh that was built with the same volume.

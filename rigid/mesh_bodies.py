@@ -41,7 +41,7 @@ def bodies_of(name: str, solid: Solid) -> Native:
 
 
 def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOverlap:
-    """Bodies that the surface intersects, and such a triangle for each."""
+    """Whether the surface intersects each body, and one triangle that does."""
     bodies = bodies_of(_other(swapped), solid)
     face = np.empty(len(solid), dtype=np.int32)
     mesh._mesh.meets(*bodies, face, thread_count(threads))

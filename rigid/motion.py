@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
 
-#: Largest rotation of a motion over a step [rad]: every radian costs time, and
-#: the rounding of the angle grows with it.
+#: Largest component of the rotation vector of a step [rad]: every radian costs time, and the
+#: rounding of the angle grows with it.
 MOST_TURN = 1e4
 
 

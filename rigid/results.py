@@ -14,7 +14,7 @@ class Witness:
 
     Attributes:
         point: A common point of a pair that overlaps. Shape (N, 3).
-        normal: Unit normal of a separating plane of another pair, from a to b. Shape (N, 3).
+        normal: Unit normal, from a to b, of a plane that separates the pair. Shape (N, 3).
         offset: The plane is ``normal @ x = offset``: a lies below it, b above. Shape (N,).
     """
 
@@ -80,7 +80,8 @@ class Distances:
             them. Shape (N,).
         point_a: The point of a nearest to b; if they overlap, a's deepest point along the normal.
             Shape (N, 3).
-        point_b: The same point of b. Shape (N, 3).
+        point_b: The point of b nearest to a; if they overlap, b's deepest point along the normal.
+            Shape (N, 3).
         normal: Unit vector from a to b: the direction in which b separates from a. If bodies
             without thickness touch, any normal of the plane or line that they span. Shape (N, 3).
     """

@@ -60,7 +60,7 @@ class Rounded(Rebuilt):
 
 @dataclass(frozen=True, eq=False)
 class Spheres(Rebuilt):
-    """Batches of balls.
+    """A batch of balls.
 
     Args:
         center: Shape (N, 3).

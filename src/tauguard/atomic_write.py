@@ -1,4 +1,4 @@
-"""Atomic writing: after any interruption a file is complete or absent."""
+"""Atomic writing: after any interruption a file is complete, or as it was before."""
 
 import contextlib
 import os

@@ -58,7 +58,7 @@ class Queries(NamedTuple):
 
     @classmethod
     def each(cls, vertex: bool, x: NDArray[np.float64]) -> Queries:
-        """Queries without common positions, shape (N, 2, 4, 3)."""
+        """Queries without common positions, from ``x`` of shape (N, 2, 4, 3)."""
         start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
         return cls(vertex, start, end, np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4))
 

@@ -81,7 +81,7 @@ def _times(score: Score, report: Report) -> Row:
 
 
 def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
-    """Rows of balls that fly to each impact point from evenly spaced starts."""
+    """A row on balls that fly to each impact point from evenly spaced starts."""
     starts = np.arange(offsets) / offsets * speed * timestep
     flights = [
         _fly(speed, timestep, mode, impact, float(start))

@@ -84,7 +84,7 @@ class Played:
 
 
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """Measure every family, then the overhead; ``keep`` is a folder with finished scenes."""
+    """Measure every family, then the overhead; ``keep`` is the folder of the job cache."""
     cache, rows = JobCache.of(keep, "guard", seed, quick), []
     for family, (_, full, few) in FAMILIES.items():
         soft = family in ("cloth", "soft")

@@ -185,7 +185,7 @@ def _of_our_own(error: BaseException) -> bool:
 
 
 def printed(module: Any, rows: list[Row]) -> list[Row]:
-    """The printed text of a part's rows."""
+    """The rows of a part that are printed: those of its ``table``, or all."""
     return list(module.table(rows)) if hasattr(module, "table") else rows
 
 

@@ -1,4 +1,4 @@
-"""The report's summary: speed, accuracy and false alarms, each with a sentence and a figure."""
+"""The report's first screen: speed, accuracy and detection, each a sentence and a figure."""
 
 import io
 import math

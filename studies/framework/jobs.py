@@ -32,7 +32,7 @@ class Workers:
     count: int | None = None
 
     def __init__(self) -> None:
-        """Keep the settings; processes start on entry."""
+        """Start no process yet; they start on entry."""
         self._processes: Any = None
 
     def __enter__(self) -> Each:

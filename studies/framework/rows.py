@@ -16,7 +16,7 @@ class Incomplete(RuntimeError):
     """Some measurements of a part failed; ``rows`` holds the others."""
 
     def __init__(self, rows: list[Row], reasons: Mapping[str, BaseException]) -> None:
-        """Keep the rows, and the reason for each failed measurement."""
+        """Keep the rows; ``reasons`` has the exception of each failed measurement by its name."""
         lines = (f"{part}: {type(error).__name__}: {error}" for part, error in reasons.items())
         super().__init__("parts of the study failed, the others are kept; " + "; ".join(lines))
         self.rows = rows

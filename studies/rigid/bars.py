@@ -28,7 +28,7 @@ def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
 
 
 def count(rate: Row) -> float:
-    """The number of cases of a rate."""
+    """The number of cases that a rate counts: its value times ``n``."""
     return 0.0 if rate["value"] is None else float(round(rate["value"] * rate["n"]))
 
 

@@ -61,7 +61,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Wrong signs, errors, and time over coal's."""
+    """Wrong signs, errors, and coal's time over ours."""
     found = table_rows(rows, "distance")
     ratios = [
         row["coal_ns"] / row["distance_ns"]["median"]

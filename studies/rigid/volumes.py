@@ -80,7 +80,7 @@ def columns(name: str, calls: Any, bodies: int, pairs: int, repeats: int) -> Row
 
 
 def errors(found: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
-    """Number of false overlaps of volumes whose hulls are apart, and of missed pairs."""
+    """Rates of overlapping volumes among pairs of hulls apart, and of missed pairs of hulls."""
     return {
         "false_hits": rate(int((found & ~hit).sum()), int((~hit).sum())),
         "missed": rate(int((~found & hit).sum()), int(hit.sum())),

@@ -115,14 +115,14 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
 
 
 def said(error: Exception) -> str:
-    """The message of an error; for a system error the file, without the error number."""
+    """The message of an error; for a system error file and cause, without the error number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)
 
 
 def fail(message: str, code: int = 2) -> None:
-    """Print one line to standard error and return the exit code."""
+    """Print one line to standard error and exit with ``code`` (``SystemExit``)."""
     line = " ".join(message.split())
     print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
     raise SystemExit(code)

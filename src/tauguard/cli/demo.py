@@ -96,7 +96,7 @@ def command(
 def judged_figures(
     detector: CollisionAlarm, judged: list[Trace], matchings: list[Matching]
 ) -> dict[str, Any]:
-    """Extent of the test motion, and the detector's metrics on it."""
+    """Duration and collisions of the test motion, and the detector's metrics on it."""
     from tauguard.detectors import detection_metrics
 
     return {
@@ -110,7 +110,7 @@ def judged_figures(
 
 
 def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
-    """The requested rate of false alarms, and the interval from training motion [1/h]."""
+    """Requested rate of false alarms, and the rates that the training motion allows [1/h]."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 
     expected = ExpectedRate.of(scores)
@@ -135,7 +135,7 @@ def asked_and_found(summary: dict[str, Any]) -> str:
 
 
 def closing(out: Path, summary: dict[str, Any]) -> None:
-    """The results and the files in the folder, as text."""
+    """Print the results, the files in the folder, and how to open the recording."""
     from tauguard.detectors.evaluation.metrics_page import text
 
     print(text(summary))

@@ -223,7 +223,7 @@ def explained(
 
 
 def torques(contact_torque: ContactTorque) -> dict[str, Any]:
-    """The joint torques of a contact, as JSON values."""
+    """Duration, peak torques and impulses of a contact at the joints, as JSON values."""
     return {
         "contact_s": contact_torque.seconds,
         "contact_goes_on": contact_torque.goes_on,

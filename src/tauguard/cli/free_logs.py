@@ -1,4 +1,4 @@
-"""Read collision-free logs for `tauguard calibrate` and `tauguard twin`."""
+"""Read collision-free logs for commands, and train the detector of free motion on them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def free_logs(
     return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
 
 
-#: Checks that ``--accept`` can disable.
+#: Checks whose errors ``--accept`` turns into notes.
 ACCEPTABLE = ("alarms", "error", "gravity")
 
 
@@ -119,7 +119,7 @@ def free_detector(
 
 
 def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
-    """Run a check that ``--accept NAME`` turns into a printed note.
+    """Run a check; ``--accept NAME`` turns its error into a printed note.
 
     None for ``accept``: the command has no such flag.
 

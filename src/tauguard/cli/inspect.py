@@ -103,7 +103,7 @@ def classes(name: str, one: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(report: Mapping[str, Any]) -> list[str]:
-    """Print missing and damaged files, and what splits share."""
+    """Lines of text on missing and damaged files, and on what splits share."""
     lines = []
     gone, damaged = report["missing"], report["damaged"]
     if gone:

@@ -115,7 +115,7 @@ def command(
 def with_load(
     alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
 ) -> CollisionAlarm:
-    """The detector for an arm with this load; refuses a detector of other signals."""
+    """The detector for an arm with this load; refuses ``torque`` if it was trained on currents."""
     from tauguard.datasets.arm_logs import parse_load
     from tauguard.detectors.alarms.training import carrying
 
@@ -210,7 +210,7 @@ def why_text(answer: Answer, threshold: float) -> str:
 def charts(
     robot: Path, save: Path | None, alarm: CollisionAlarm
 ) -> Callable[[Sample, Answer], None]:
-    """Show the arm, its currents and the score in rerun's viewer, or write them to a file."""
+    """A function that shows arm, score and state in rerun's viewer, or records them in a file."""
     import mujoco
     import numpy as np
 
@@ -240,7 +240,7 @@ def charts(
 
 
 def summary(session: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
-    """The results of a run, as JSON values; events have the form of `tauguard detect`."""
+    """The results of a run, as JSON values."""
     collisions = session.spans.of("collision")
     return {
         "name": "listen",

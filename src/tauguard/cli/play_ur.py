@@ -1,4 +1,4 @@
-"""``tauguard play-ur LOG``: a simulated UR controller on this machine, for tests."""
+"""``tauguard play-ur LOG``: send a log as a UR controller would, to test against."""
 
 from pathlib import Path
 from typing import Annotated

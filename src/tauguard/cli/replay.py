@@ -1,4 +1,4 @@
-"""``tauguard replay PATH``: show recordings in rerun's window or in a browser."""
+"""``tauguard replay PATH``: convert recordings for rerun, show them there or in a browser."""
 
 import signal
 import subprocess
@@ -52,7 +52,7 @@ def command(
 
 
 def newest(path: Path) -> Path:
-    """The newest MCAP recording in a folder without a page; otherwise ``path``."""
+    """The newest recording (MCAP, or else .rrd) in a folder without a page; otherwise ``path``."""
     if not path.is_dir() or (path / "index.html").exists():
         return path
     found = sorted(path.rglob("*.mcap"), key=lambda file: file.stat().st_mtime)

@@ -85,7 +85,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
 
     Raises:
         ValueError: ``pictures`` are asked for without OpenGL; raised before the trial.
-        SystemExit: the trial found an error.
+        SystemExit: an environment does not pass.
     """
     from tauguard.envs.gym.trial import picture, try_arm
     from tauguard.models.picture import check_opengl

@@ -6,7 +6,7 @@
 
 namespace tauguard::rigid {
 
-// The points of a convex hull.
+// Points that stand for their convex hull.
 using PointList = std::vector<Vec3>;
 
 // The nearest points of two hulls, or a common point if they meet. `corner` holds the vertices
