@@ -43,7 +43,7 @@ def check_states(
 
 
 def _checked(model: Any, name: str, contacts: Contacts, times: Array) -> CheckedContacts:
-    """Convert rows to times [s] and to names of bodies and flexes."""
+    """Sort contacts by their times [s], and name their partners: bodies and flexes."""
     order = np.argsort(times, kind="stable")
     contacts, times = contacts.where(order), times[order]
     body = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)

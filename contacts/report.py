@@ -39,7 +39,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Score:
-    """The score of one checker. ``None``: there was no event to count, or no ground truth.
+    """The score of one checker. ``None``: there was nothing to count, or no ground truth.
 
     Attributes:
         checker: Name of the checker.
@@ -117,8 +117,9 @@ class Report:
         outcomes: MuJoCo's handling of every event, in order of onset.
         disagreements: Differences of all checkers from the ground truth.
         first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
-        step_us: Median time of ``mj_step`` [us].
-        state_us: Median time of copying a state with its kinematics, which all checkers share [us].
+        step_us: Median processor time of ``mj_step`` [us].
+        state_us: Median processor time of copying a state with its kinematics, which all checkers
+            share [us].
         run: States and contacts, if they were kept.
     """
 

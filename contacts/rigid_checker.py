@@ -19,7 +19,7 @@ class Work:
 
     Attributes:
         moved: Bodies whose motion changed since the previous call.
-        reused: Pairs answered from the previous call, because neither body's motion changed.
+        reused: Pairs answered from the previous call, because neither body has moved since.
         candidates: Pairs whose swept boxes overlap.
     """
 

@@ -23,9 +23,9 @@ class Run:
         times: Times of the states [s].
         contacts: One :class:`Contacts` per step, by checker.
         touches: The true contacts, one item per step; empty without ground truth.
-        seconds: Duration of each call [s], by checker.
-        step_seconds: Duration of each ``mj_step`` [s].
-        state_seconds: Duration of copying each state [s].
+        seconds: Processor time of each call [s], by checker.
+        step_seconds: Processor time of each ``mj_step`` [s].
+        state_seconds: Processor time of copying each state [s].
         states: All states if they were kept, otherwise the first.
     """
 

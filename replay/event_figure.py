@@ -1,4 +1,4 @@
-"""A figure of ten seconds: the score with its threshold, and the arm's speed."""
+"""A figure of ten seconds: the score with its threshold, and the speed of the fastest joint."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         trace: the part, with its truth.
         detection: detection of that part.
         held: the score that was reached during the whole confirmation time, shape (T,) of that
-            stretch. It is an alarm if it exceeds the threshold.
+            part. It is an alarm if it exceeds the threshold.
         title: title of the picture.
 
     Raises:

@@ -55,7 +55,7 @@ class Event:
 
 
 def events_of(matching: Matching, late: float) -> Iterator[Event]:
-    """Missed collisions, those found later than ``late`` [s], and false alarms, in order."""
+    """Missed collisions, those found later than ``late`` [s], and false alarms, in this order."""
     from tauguard.detectors.events import detection_window
 
     pairs = list(zip(matching.collisions, matching.delays, strict=True))
@@ -74,7 +74,7 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
 
 
 def _before(alarm: Alarm, collision: Collision) -> str:
-    """The alarm's start [s] as text, with enough digits to be before the contact."""
+    """The alarm's start [s] as text, with enough digits that it reads earlier than the contact."""
     text = f"{alarm.start:.2f}"
     return text if text != f"{collision.onset:.2f}" else f"{alarm.start:.3f}"
 

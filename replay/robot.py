@@ -86,7 +86,7 @@ def load_model(source: Any) -> Any:
 
 
 def bodies(model: Any) -> list[Body]:
-    """All bodies of the model with shapes, the world first."""
+    """All bodies of the model, the world first; some have no shapes."""
     found = []
     for index in range(model.nbody):
         body = model.body(index)

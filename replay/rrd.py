@@ -24,9 +24,7 @@ FRAME_RATE = 60.0  # [Hz] rate of body poses
 SERIES_RATE = 200.0  # [Hz] rate of charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
-SCORE_TOP = (
-    8.0  # upper end of the score's chart in multiples of the threshold, so that both are visible
-)
+SCORE_TOP = 8.0  # upper end of the score's chart in thresholds, so that both are visible
 NORMAL = 0.06  # [m], length of a checked contact's normal
 COLOURS = np.array(
     [

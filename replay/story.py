@@ -105,7 +105,7 @@ def page(
 def collision_table(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()
 ) -> list[str]:
-    """Markdown rows of the collisions and their detection times."""
+    """Markdown rows of the collisions, with the time from onset to detection."""
     assert trace.truth is not None
     found = detection.alarms if detection is not None else ()
     rows = sorted(trace.truth.collisions, key=lambda c: c.onset)

@@ -19,7 +19,7 @@ from tauguard.traces import TARGETS, Trace
 PILLOW = (".gif", ".webp", ".png")
 #: Where the camera stands: azimuth and elevation [deg], distance in units of the arm's size.
 VIEW = (140.0, -18.0, 2.0)
-#: Its distance from people and arms, in units of the diagonal of their bounding box.
+#: Its least distance from people and arms, in units of the diagonal of their bounding box.
 AROUND = 1.6
 
 
@@ -81,7 +81,7 @@ def frames(
 
 
 def _stage(trace: Trace, row: int) -> Any:
-    """The recording's scene on a floor below all its bodies."""
+    """The recording's scene on a floor below everything that it shows."""
     import mujoco
 
     from tauguard.models.picture import FLOOR_HEIGHT, staged
@@ -109,7 +109,7 @@ def _people(model: Any, data: Any) -> Array:
 
 
 def _look(camera: Any, links: Array, people: Array, view: tuple[float, float, float]) -> None:
-    """A camera that looks at the middle of the links, and is far enough away to show all people."""
+    """Point the camera at the middle of links and people, from far enough to show them all."""
     spread = float(np.linalg.norm(np.ptp(links, axis=0)))
     camera.lookat[:] = links.mean(axis=0)
     camera.azimuth, camera.elevation, distance = view
@@ -127,7 +127,7 @@ def _targets(trace: Trace, t: float) -> Any:
 
 
 def _contact(trace: Trace, last: int, row: int) -> Iterator[tuple[Array, Array]]:
-    """Point [m] and force [N] of the strongest contact between two rows."""
+    """Point [m] and force [N] of the strongest contact after row ``last``, up to ``row``."""
     if trace.truth is None:
         return
     some = slice(min(last + 1, row), row + 1)

@@ -38,7 +38,7 @@ def search(
         distance: function that gives the distances of pairs at given times.
         bound: bound L of each pair [m], shape (N,).
         tolerance: depth above which a pair counts [m]; the search stops looking for more.
-        resolution: smaller distances count as touching [m].
+        resolution: smaller distances may count as touching [m].
     """
     n = len(bound)
     rows = np.arange(n)

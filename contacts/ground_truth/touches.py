@@ -142,7 +142,7 @@ class GroundTruth:
         return out
 
     def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
-        """The row of a flex and a geom: time of an element's first touch, and largest depth."""
+        """The row of a flex and a geom: first touch of any element, and largest depth."""
         model = self.model
         begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
         elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)

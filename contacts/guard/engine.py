@@ -95,7 +95,7 @@ _TYPES = {
 
 
 def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
-    """Addresses of all fields and functions that the native guard uses, by name.
+    """Addresses, sizes and constants of MuJoCo that the native guard uses, by name.
 
     Args:
         model: MjModel.

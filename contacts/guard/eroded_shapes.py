@@ -30,7 +30,7 @@ class ErodedShapes:
         self._added: dict[tuple[int, float], int] = {}
 
     def radius(self, geom: int) -> float:
-        """Half the smallest thickness of a geom [m]; 0 for a plane."""
+        """Radius of the largest ball inside a geom [m]; 0 for a plane."""
         size, kind = self._model.geom_size[geom], self._kinds[geom]
         if kind in ("sphere", "capsule"):
             return float(size[0])

@@ -1,7 +1,8 @@
 """The model's fields that a guard compares between two steps, and values that it refuses.
 
-If a field that the guard has copied has changed, the guard starts anew. Other numbers only have to
-be valid. The native part compares contact parameters that the guard writes itself.
+If a field that the guard has copied from has changed, the guard reads pairs and shapes anew. Other
+numbers only have to be valid. The native part follows the contact parameters that the guard itself
+writes.
 """
 
 import functools
@@ -29,7 +30,7 @@ _SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
     *("flex_radius", "flex_elem"),
 )
-#: Stiffness of elastic flexes, and fields on rotation and on mocap bodies.
+#: Stiffness and rest lengths of elastic flexes, and the objects that equalities connect.
 _MOTION = (
     *("flex_stiffness", "flexedge_length0", "eq_type", "eq_objtype", "eq_obj1id", "eq_obj2id"),
 )
@@ -39,7 +40,7 @@ _STRUCTURE = re.compile(
     "|(jnt|wrap)_type$"
 )
 _NOT_STRUCTURE = re.compile("geom_dataid|.*matid")
-#: Allowed numbers of contact dimensions.
+#: Fields with the number of contact dimensions, and its allowed values.
 _DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
 _CONDIM = (1, 3, 4, 6)
 #: Objects whose numbers must be valid, by the rules of followed_fields.hpp: limits may be infinite.

@@ -1,4 +1,4 @@
-"""The velocity of bodies attached to mocap bodies, for impact zones."""
+"""Bodies attached to mocap bodies: their velocity, for impact zones, and their equalities."""
 
 from typing import Any
 

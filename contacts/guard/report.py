@@ -42,14 +42,14 @@ class StepReport:
     contacts: int  #: largest number of contacts that MuJoCo listed in an accepted sub-step
     cuts: tuple[Cut, ...] = ()
     restored: tuple[Pair, ...] = ()  #: pairs whose original contact parameters were restored
-    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: ``most`` was reached
+    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through
     impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
-    energy_added: float = 0.0  #: by constraint forces in sub-steps, without losses [J]
+    energy_added: float = 0.0  #: gains by constraint forces in sub-steps, losses left out [J]
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property
     def exhausted(self) -> bool:
-        """Whether ``most`` was reached: the pairs in :attr:`passed` may have passed through."""
+        """Whether a pair may have passed through (:attr:`passed` names it)."""
         return bool(self.passed)
 
     @cached_property

@@ -33,7 +33,7 @@ from tauguard.models.mujoco_defects import warn_of_sparse_newton
 SETTINGS = {
     "beyond": 1e-5,  # how far beyond the touch a cut sub-step goes, so that MuJoCo finds it [m]
     "room": 1.25,  # margins over what the pair travelled in the attempt that failed
-    "smallest": 1 / 64,  # length of the shortest sub-step, as a fraction of the step
+    "smallest": 1 / 64,  # sub-steps up to this fraction of the step are not cut further
     "push": 0.2,  # fraction of a depth that is pushed out in each step
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
     "look": 16,  # number of steps after which separation of pairs is checked at the latest

@@ -1,4 +1,4 @@
-"""Small scenes whose contacts are hard to find."""
+"""Scenes whose contacts are hard to find, each with only what it needs."""
 
 from collections.abc import Callable
 

@@ -8,7 +8,7 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import SceneSpec, Table, compose, load_arm
 from tauguard.models.scene import INTEGRATORS
 
-#: Distance between the pedestals of both arms [m].
+#: Distance between the pedestals of both arms along x [m].
 DISTANCE = 1.0
 #: Amplitudes of their first three joints [rad].
 REACH = (0.15, 0.25, 0.1)

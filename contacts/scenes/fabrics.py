@@ -12,7 +12,7 @@ from tauguard.models.cloth import add_sheet
 
 #: Young's modulus of the fabrics: 400 N/m over their width, a soft knit [Pa].
 FABRIC_YOUNG = 2e5
-#: The geom inside the sleeve: the capsule of the forearm's link.
+#: The forearm's link; the sleeve lies around its capsule.
 SLEEVED_LINK = "link3"
 
 
@@ -89,7 +89,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
     scene = compose(SceneSpec(labels=False, proxies=(chest,), cloth=cloth, integrator="discrete"))
     spec = mujoco.MjSpec.from_string(scene.xml)
     worn = spec.geom("chest")
-    worn.contype, worn.conaffinity = 4, 6  # collides with the cloth; the arm has contact pairs
+    worn.contype, worn.conaffinity = 4, 6  # meets the cloth; the arm meets it by contact pairs
     for flex in spec.flexes:
         flex.contype, flex.conaffinity = 6, 5
     return _moving("garment_chest", scene, spec.compile(), 0.7, turn(scene.home, 0, speed, 0.6))

@@ -1,4 +1,4 @@
-"""Fast spheres against thin objects; discrete steps miss such contacts."""
+"""Fast spheres against thin objects, which they can pass within one step."""
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ PLATE_HALF_THICKNESS = 0.001  #: [m]
 BALL_MASS = 0.020  #: [kg]
 #: Young's modulus of the cloth: 20 kN/m over its width, a woven fabric [Pa].
 CLOTH_YOUNG = 1e7
-#: Initial distance of the ball's surface from the cloth's, without ``offset`` [m].
+#: Initial distance of the ball's surface from the cloth's or plate's, without ``offset`` [m].
 BALL_GAP = 0.005
 #: Contact parameters stiff enough that a fast ball does not sink through: solref, solimp.
 STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))

@@ -13,8 +13,8 @@ from tauguard.models.obstacles import add_table
 from tauguard.models.scene import INTEGRATORS
 from tauguard.untrusted_input import reading
 
-SIZE = 0.15  #: longest side of the mesh [m]
-HEIGHT = 0.05  #: initial height of its lowest point above the table [m]
+SIZE = 0.15  #: longest side of the mesh's bounding box [m]
+HEIGHT = 0.05  #: its lowest point starts this and SIZE / 4 above the table [m]
 
 
 def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactScene:

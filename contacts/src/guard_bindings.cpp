@@ -181,8 +181,8 @@ class Guard {
     pulled_.clear();
   }
 
-  // Call this after all pairs were added. `sheets`: whether flexes are covered against flexes,
-  // which the owner's `_tunnelling_events` finds.
+  // Call this after everything was added. `sheets`: whether flexes are covered against flexes,
+  // whose crossings the owner's `_tunnelling_events` finds.
   void start(bool sheets) {
     if (stepper_)
       stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),

@@ -47,7 +47,7 @@ struct Settings {
   int most;           // calls of mj_step that one step may cost
   double beyond;      // how far beyond the touch a sub-step goes [m]
   double room;        // margins over what the pair travelled in the attempt that failed
-  double smallest;    // shortest sub-step, as a fraction of the step
+  double smallest;    // sub-steps up to this fraction of the step are not cut further
   double push;        // fraction of a depth that is pushed out in each step
   int watched, look;  // steps after a rollback in which energy is counted; steps between looks for
                       // parted pairs
@@ -57,7 +57,7 @@ struct Settings {
 
 class Stepper {
  public:
-  // Finds the crossings of two flexes in a step.
+  // Finds the crossings of flexes with flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
   // Joins the partners of each pair that passed in the last sub-step in an impact zone, from `qpos`
   // on.

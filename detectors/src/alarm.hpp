@@ -83,7 +83,7 @@ struct Levels {
 
 struct AlarmSettings {
   double dt = 0;             // sample interval where a sample has none of its own [s]
-  double settle = 0;         // time before the first alarm [s]
+  double settle = 0;         // least time before an alarm [s]
   double threshold = 0;      // of the normalised score
   std::int64_t samples = 1;  // in a row above the threshold
   std::int64_t memory = 1;   // window of the largest speed, in samples

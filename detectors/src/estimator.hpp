@@ -30,9 +30,9 @@
 // * in a slow log, half the change of torque since the last sample.
 //
 // A torque acts until the next sample. With `sampled` (a slow log) torques are instants instead,
-// and the mean of two samples acts between them, as for gravity. Without it the lag of half a
-// sample is as large as a collision while an arm accelerates. The mean is wrong by up to half the
-// difference of the two samples, because a brake acts at an unknown time between them.
+// and the mean of two samples acts between them, as for gravity. Without it the error by a lag of
+// half a sample is, while an arm accelerates, as large as a collision. The mean is wrong by up to
+// half the difference of the two samples, because a brake acts at an unknown time between them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 #pragma once
@@ -65,7 +65,7 @@ struct EstimatorSettings {
   double clip = 3.0;
   double every = 0.01;         // time between two corrections [s]
   double inflation = 1.0;      // number of corrections over which an error of the model lasts
-  double transition = 0.0;     // relative error of friction just after a change
+  double transition = 0.0;     // error just after a change of friction, as a fraction of it
   double started = 0.0;        // motion of a joint before its first correction [s]
   bool weighted = false;       // see above
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
@@ -187,7 +187,8 @@ class Estimator {
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
-  // Drive torques minus friction, and their derivatives by each joint's own unknowns.
+  // Drive torques minus friction, and what a unit of each of a joint's own unknowns takes from
+  // them.
   void drive(const double* q, const double* qd, const double* current) {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {
@@ -202,7 +203,7 @@ class Estimator {
       tau_[j] = tau - (viscous + coulomb + other);
       plain_tau_[j] = tau_[j];
       if (basis_.modelled && load != 0.0) {
-        double grows = 0.0;  // load-dependent friction without the payload
+        double grows = 0.0;  // load-dependent friction; the plain one has no payload
         for (std::size_t c = basis_.loaded_at(); c < smooth; ++c) grows += w[c] * column_[c];
         plain_tau_[j] += grows * (1.0 - std::fabs(beta_[j] / load));
       }

@@ -158,7 +158,7 @@ class FaultCheck {
       unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
       if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);
     }
-    // Rounding accumulates in running sums, so they start again once per window.
+    // Rounding accumulates in running sums, so they are added up anew once per window.
     if (++filled_ % usual_.window == 0) sum_anew();
     return found;
   }

@@ -62,7 +62,7 @@ class FreeMotion {
     std::copy(sum_.begin(), sum_.end(), mean.values.begin());
     mean.dt = time_;
     for (double& x : mean.values) x /= count_;
-    if (!filled_) last_[0] = last_[1] = mean;  // same size: nothing is allocated later
+    if (!filled_) last_[0] = last_[1] = mean;  // same size: nothing is allocated
     filled_ = true;
     count_ = 0;
     time_ = 0.0;

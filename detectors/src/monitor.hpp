@@ -1,5 +1,6 @@
 // Free, collision or fault: a detector together with the checks of its samples. A sample allocates
-// nothing, and its work is bounded: at most `span` seconds of samples are interpolated.
+// nothing, and its work is bounded: samples are interpolated for at most `span` seconds, or
+// `bridged` in number if that is more.
 #pragma once
 
 #include <cmath>
@@ -25,9 +26,9 @@ struct Thought {
 struct MonitorSettings {
   double dt = 0;       // of the samples [s]
   double settle = 0;   // of the detector [s]
-  double span = 0;     // an alarm within this time before a fault is caused by it [s]
+  double span = 0;     // an alarm that began within this time before a fault is caused by it [s]
   double window = 0;   // time after a bridged fault in which nothing is judged [s]
-  double bridged = 0;  // largest number of successive samples that are interpolated
+  double bridged = 0;  // number of successive samples that may always be interpolated
 };
 
 class Monitor {

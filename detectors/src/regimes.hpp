@@ -39,7 +39,7 @@ namespace tauguard::detectors {
 struct RegimeBounds {
   static constexpr std::size_t terms = 5;  // of the bound in motion
   std::vector<double> rest;       // bound of a joint that has been at rest for long [N m], n
-  std::vector<double> stop;       // added while any joint moves [N m], n
+  std::vector<double> stop;       // added by motion of any joint, also recent [N m], n
   std::vector<double> least;      // least bound in motion [N m], n
   std::vector<double> moving;     // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
   std::vector<double> start;      // added at a start [N m], n
@@ -250,7 +250,7 @@ class Regimes {
   bool touched_ = false;                // a contact with joints at rest lasts
   std::size_t lead_ = 0;                // the joint of its largest ratio ...
   double peak_ = 0.0, still_ = 0.0;     // ... and that ratio; unchanged for so long [s]
-  double stirred_ = 1.0, usual_ = 1.0;  // sample interval without gaps [s]
+  double stirred_ = 1.0, usual_ = 1.0;  // recent motion in [0, 1]; sample interval without gaps [s]
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]
   bool elsewhere_ = false;              // a joint stands where no log shows it

@@ -46,7 +46,7 @@ class TorqueCheck {
     for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) std::fill(v->begin(), v->end(), 1.0);
   }
 
-  // The smallest fast, smallest slow and largest slow ratio so far, n each; 1 where there was none.
+  // The smallest fast, smallest slow and largest slow ratio, among those so far and 1; n each.
   std::vector<double> extremes() const {
     std::vector<double> all(fast_least_);
     all.insert(all.end(), slow_least_.begin(), slow_least_.end());
