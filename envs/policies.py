@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,9 @@ class MlpPolicy:
     deviation: Array  #: shape (size,)
     weights: tuple[Array, ...]  #: of each layer, shape (outputs, inputs)
     biases: tuple[Array, ...]  #: shape (outputs,)
+    #: Where it was trained, as ``gymnasium.make(**policy.environment)`` takes it: ``id`` and
+    #: keywords; empty where that is not known.
+    environment: Mapping[str, Any] = field(default_factory=dict)
 
     def __call__(self, observation: ArrayLike) -> Array:
         """The action, within [-1, 1].
@@ -41,7 +46,7 @@ class MlpPolicy:
         if seen.shape[-1] != len(self.mean):
             raise ValueError(
                 f"observation of {seen.shape[-1]} numbers: the policy expects {len(self.mean)}, of "
-                "the environment and keywords that it was trained with"
+                f"the environment and keywords that it was trained with {dict(self.environment)}"
             )
         x = np.clip((seen - self.mean) / self.deviation, -CLIP, CLIP)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
@@ -56,12 +61,16 @@ class MlpPolicy:
         return f"MlpPolicy({' -> '.join(map(str, sizes))})"
 
     def save(self, path: str | Path) -> None:
-        """Write it as a NumPy archive of single precision."""
+        """Write it as a NumPy archive of single precision.
+
+        Raises:
+            TypeError: a value in ``environment`` that is not text, a number or a list of them.
+        """
         layers = {f"weight{k}": w for k, w in enumerate(self.weights)}
         layers |= {f"bias{k}": b for k, b in enumerate(self.biases)}
         arrays = {"mean": self.mean, "deviation": self.deviation, **layers}
         single: dict[str, Any] = {name: value.astype("f4") for name, value in arrays.items()}
-        np.savez_compressed(path, **single)
+        np.savez_compressed(path, environment=json.dumps(dict(self.environment)), **single)
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:
@@ -73,7 +82,11 @@ class MlpPolicy:
         """
         with reading(Path(path), "expected a policy that MlpPolicy.save wrote"):
             with np.load(path, allow_pickle=False) as file:
-                arrays = {name: np.asarray(file[name], dtype=float) for name in file.files}
+                names = set(file.files) - {"environment"}
+                arrays = {name: np.asarray(file[name], dtype=float) for name in names}
+                environment = json.loads(str(file.get("environment", "{}")))
+            if not isinstance(environment, dict):
+                raise ValueError("an environment that is no table of keywords")
             count = sum(name.startswith("weight") for name in arrays)
             weights = tuple(arrays[f"weight{k}"] for k in range(count))
             biases = tuple(arrays[f"bias{k}"] for k in range(count))
@@ -81,7 +94,7 @@ class MlpPolicy:
             shapes = [(b, a) for a, b in itertools.pairwise(widths)]
             if not count or [w.shape for w in weights] != shapes:
                 raise ValueError("layers that do not fit one another")
-            return cls(arrays["mean"], arrays["deviation"], weights, biases)
+            return cls(arrays["mean"], arrays["deviation"], weights, biases, environment)
 
     def to_sb3(self, model: Any, normalize: Any) -> None:
         """Give a Stable-Baselines3 actor-critic this mean action, to go on learning from.

@@ -1,7 +1,10 @@
 """Train a policy by PPO, or by PPO with a budget of contact: the learned baselines.
 
-    uv run --extra learn python examples/learn.py Reach-v0 --budget 0.02 --out policy.npz
+    uv run --extra learn python examples/learn.py Reach-v0 --out policy.npz
+    uv run tauguard watch Reach-v0 --policy policy.npz
     uv run python examples/baselines.py 20 1000 Reach-v0 policy.npz    # beside the baselines
+
+`--set NAME=VALUE` gives keywords of the environment, as in `--set objects=cell.toml`.
 
 With a budget it is PPO-Lagrangian (Ray, Achiam & Amodei, "Benchmarking safe exploration in deep
 reinforcement learning", 2019): each step's reward is reduced by lambda times its cost over the
@@ -13,6 +16,7 @@ without PyTorch.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,16 +25,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
+from tauguard.cli.watch import parsed
 from tauguard.envs.policies import MlpPolicy
 from tauguard.envs.stable_baselines import NativeVecEnv
 
-#: Of every baseline: tool velocities, 20 actions a second, episodes of 5 s; a coarse time step.
-KEYWORDS = {
-    "control": "cartesian",
-    "control_rate": 20.0,
-    "timestep": 2e-3,
-    "max_episode_steps": 100,
-}
+#: Of every baseline: tool velocities, 20 actions a second, episodes of 5 s.
+KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 100}
+#: Learning takes a coarser time step [s] than what the policy is then judged by.
+COARSE = 2e-3
 #: Lessons of a task: a share of the steps, the steps of a copy between two updates, and keywords. A
 #: sheet of cloth makes a step ten times as slow, so reaching is learned without it.
 LESSONS = {"ClothReach-v1": ((0.8, 256, {"cloth": None}), (0.2, 64, {}))}
@@ -86,8 +88,11 @@ def train(task, budget=None, steps=200_000, seed=0, copies=16, start=None, **key
     """The trained policy, its lambda, and the last episodes' mean cost [N s]."""
     torch.set_num_threads(1)
     policy = MlpPolicy.load(start) if start is not None else None
+    keywords = KEYWORDS | keywords
     for share, rollout, about in LESSONS.get(task, USUAL):
-        native = NativeVecEnv(f"tauguard/{task}", copies, **KEYWORDS, **keywords, **about)
+        native = NativeVecEnv(
+            f"tauguard/{task}", copies, **{"timestep": COARSE, **keywords, **about}
+        )
         native.seed(seed)
         priced = Priced(native, budget)
         envs = VecNormalize(priced, gamma=0.98)
@@ -103,8 +108,27 @@ def train(task, budget=None, steps=200_000, seed=0, copies=16, start=None, **key
         spent = Budget(priced)
         model.learn(round(share * steps), callback=spent)
         print()
-        policy = MlpPolicy.from_sb3(model, envs)
+        policy = replace(
+            MlpPolicy.from_sb3(model, envs),
+            environment={"id": f"tauguard:tauguard/{task}", **keywords},
+        )
     return policy, priced.price, spent.found
+
+
+def judge(policy, episodes=96, seed=1_000_000):
+    """Of the policy itself, without exploration: success, and mean cost of an episode [N s]."""
+    keywords = dict(policy.environment)
+    envs = NativeVecEnv(keywords.pop("id").removeprefix("tauguard:"), 16, **keywords)
+    envs.seed(seed)
+    seen, won, costs, wins = envs.reset(), np.zeros(16, dtype=bool), [], []
+    while len(costs) < episodes:
+        seen, _, over, infos = envs.step(policy(seen))
+        won |= [info["success"] for info in infos]
+        for i in np.flatnonzero(over):
+            costs.append(infos[i]["cost_sum"])
+            wins.append(won[i])
+        won[over] = False
+    return np.mean(wins), np.mean(costs)
 
 
 def main():
@@ -115,21 +139,33 @@ def main():
         "--budget", type=float, help="mean cost of an episode of 5 s [N s] (default: none)"
     )
     parser.add_argument("--start", type=Path, help="policy file to go on from (default: none)")
-    parser.add_argument("--robot", default="cura6", help="arm: a name, or a file")
-    parser.add_argument("--steps", type=int, default=200_000, help="actions to learn from")
-    parser.add_argument("--seed", type=int, default=0, help="of everything drawn")
-    parser.add_argument("--out", type=Path, default=Path("policy.npz"), help="file to write")
+    parser.add_argument("--robot", default="cura6", help="arm: a name, or a file (%(default)s)")
+    parser.add_argument(
+        "--set", nargs="+", default=[], metavar="NAME=VALUE", help="keywords of the environment"
+    )
+    parser.add_argument(
+        "--steps", type=int, default=200_000, help="actions to learn from (%(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of everything drawn (%(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("policy.npz"), help="file to write (%(default)s)"
+    )
     options = parser.parse_args()
     if options.budget is not None and options.task == "ClothReach-v1":
         parser.error("--budget: nobody stands in ClothReach-v1, so nothing has a cost there")
     if options.budget is not None and not options.budget > 0:
         parser.error(f"--budget {options.budget:g}: expected more than 0 N s")
-    policy, price, cost = train(
+    policy, price, _ = train(
         options.task, options.budget, options.steps, options.seed,
-        start=options.start, robot=options.robot,
+        start=options.start, robot=options.robot, **parsed(options.set),
     )  # fmt: skip
     policy.save(options.out)
-    print(f"{options.out}: {policy}, lambda {price:.2f}, cost {cost:.3f} N s an episode")
+    success, cost = judge(policy)
+    print(
+        f"{options.out}: {policy}, lambda {price:.2f}; {success:.2f} of 96 fresh episodes reach "
+        f"the goal, cost {cost:.3f} N s each"
+    )
+    print(f"see it move: tauguard watch {options.task} --policy {options.out}")
     if options.budget is not None and cost > options.budget:
         print(f"the budget of {options.budget:g} N s is not met: more --steps, or a larger budget")
 

@@ -3,14 +3,20 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from tauguard.cli import main
 from tauguard.cli.watch import parsed
+from tauguard.envs.policies import MlpPolicy
 from tauguard.replay import live
+from tauguard.traces import read_mcap
+
+POLICIES = Path(__file__).parents[2] / "examples" / "policies"
 
 
 def entities(path):
@@ -57,6 +63,9 @@ def test_a_file_holds_a_row_an_action(arguments, shown, tmp_path, capsys):
         (["Reach-v0", "--set", "wings=2"], "expected one of"),
         (["Reach-v0", "--seconds", "0"], "above 0"),
         (["React-v1", "--reaction", "panic"], "stop0"),
+        (["React-v1", "--policy", "stil"], "target, random, still"),
+        (["React-v1", "--policy", str(POLICIES / "Reach-v0.npz")], "tauguard/Reach-v0"),
+        (["Reach-v0", "--policy", str(POLICIES / "Reach-v0.npz"), "--set", "obstacles=()"], "114"),
     ],
 )
 def test_bad_input_is_one_line(arguments, words, capsys, tmp_path):
@@ -66,6 +75,20 @@ def test_bad_input_is_one_line(arguments, words, capsys, tmp_path):
     error = capsys.readouterr().err
     assert words in error
     assert error.count("\n") == 1
+
+
+def test_a_trained_policy_is_shown_where_it_was_trained(tmp_path, capsys):
+    file, folder = POLICIES / "Reach-v0.npz", tmp_path / "episodes"
+    arguments = ["Reach-v0", "--policy", str(file), "--seconds", "0.48", "--seed", "7"]
+    main(["watch", *arguments, "--save", str(folder)])
+    assert f"tauguard video {folder}" in capsys.readouterr().out
+    policy = MlpPolicy.load(file)
+    env = gymnasium.make(**policy.environment)
+    observation, _ = env.reset(seed=7)
+    for _ in range(10):
+        observation, *_ = env.step(policy(observation))
+    shown = read_mcap(folder / "episode_00000.mcap")
+    assert np.array_equal(shown.q[-1], env.unwrapped.batch.q[0][-1])
 
 
 def test_values_are_literals_or_text():
@@ -93,8 +116,6 @@ def test_the_viewer_is_bound_to_this_machine(monkeypatch):
 
 
 def test_a_zero_force_takes_the_arrow_away(tmp_path):
-    import gymnasium
-
     env = gymnasium.make("tauguard/Reach-v0").unwrapped
     env.reset(seed=0)
     view = live.LiveView(env.compiled.scene.model, tmp_path / "a.rrd")

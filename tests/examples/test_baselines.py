@@ -1,6 +1,7 @@
 """Standing still is never a success, hurry is punished, care is rewarded, policies load."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,14 +55,20 @@ def test_a_policy_is_what_was_saved_and_refuses_other_observations(tmp_path):
     layers = [rng.normal(size=shape) for shape in ((8, 5), (3, 8))]
     biases = [rng.normal(size=n) for n in (8, 3)]
     policy = MlpPolicy(rng.normal(size=5), np.full(5, 2.0), tuple(layers), tuple(biases))
+    policy = replace(policy, environment={"id": "tauguard:tauguard/Reach-v0", "control_rate": 20.0})
     policy.save(tmp_path / "p.npz")
     again, seen = MlpPolicy.load(tmp_path / "p.npz"), rng.normal(size=(4, 5))
     hidden = np.tanh((seen - policy.mean) / 2 @ layers[0].T + biases[0])
     wanted = np.clip(hidden @ layers[1].T + biases[1], -1, 1)
     assert again(seen) == pytest.approx(wanted, abs=1e-5)
     assert repr(again) == "MlpPolicy(5 -> 8 -> 3)"
+    assert again.environment == policy.environment
     with pytest.raises(ValueError, match="expects 5"):
         again(np.zeros(6))
+    for text in ("[]", "{", "1"):
+        np.savez(tmp_path / "bad.npz", mean=np.zeros(5), environment=text)
+        with pytest.raises(ValueError, match="expected a policy"):
+            MlpPolicy.load(tmp_path / "bad.npz")
     np.savez(tmp_path / "bad.npz", mean=np.zeros(5), weight0=np.zeros((3, 4)), bias0=np.zeros(3))
     with pytest.raises(ValueError, match="do not fit"):
         MlpPolicy.load(tmp_path / "bad.npz")

@@ -30,9 +30,11 @@ def test_the_cross_entropy_method_reaches_targets(tmp_path):
 def test_ppo_learns_and_its_policy_is_the_one_that_was_trained(tmp_path):
     pytest.importorskip("stable_baselines3", reason="the extra `learn` is not installed")
     example = runpy.run_path(str(SOURCE.with_name("learn.py")))
-    policy, price, _ = example["train"]("React-v1", steps=4096, copies=4)
+    policy, price, _ = example["train"]("React-v1", steps=4096, copies=4, payload_g=100)
     assert price == 0
     assert policy(np.zeros(30)).shape == (6,)
+    assert policy.environment["id"] == "tauguard:tauguard/React-v1"
+    assert policy.environment["payload_g"] == 100
     policy.save(tmp_path / "policy.npz")
     again, _, _ = example["train"]("React-v1", steps=64, copies=1, start=tmp_path / "policy.npz")
     seen = np.random.default_rng(0).normal(size=30)

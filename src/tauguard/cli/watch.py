@@ -3,18 +3,20 @@
 import ast
 import time
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
 #: Keywords that may have several values, separated by commas.
 LISTS = ("obstacles", "checkers")
+#: Policies that need no file.
+WORDS = ("target", "random", "still")
 
 
 def command(
     environment: Annotated[str, tyro.conf.Positional],
     /,
-    policy: Literal["target", "random", "still"] = "target",
+    policy: str = "target",
     seconds: float = 30.0,
     seed: int = 0,
     set: tuple[str, ...] = (),
@@ -26,13 +28,15 @@ def command(
 
     Args:
         environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
-        policy: go straight to the target (Cartesian control), random actions, or none.
+        policy: target (straight there, Cartesian control), random, still, or a file of
+            examples/learn.py, which brings the keywords that it was trained with.
         seconds: how long, in simulated time; episodes follow one another.
         seed: seed of the first episode.
         set: keywords of the environment, each NAME=VALUE, as in --set detector=observer.
         reaction: what to do at an alarm or, without a detector, at a touch: stop0, stop1, stop2,
             retract, admittance.
-        save: write an .rrd file instead of opening the viewer.
+        save: instead of opening the viewer, write an .rrd file or, into a folder, an MCAP
+            recording of each whole episode for `tauguard video`.
         port: port of the viewer, which listens on 127.0.0.1 only.
     """
     import gymnasium
@@ -45,7 +49,16 @@ def command(
         raise ValueError(f"environment {environment!r}: expected one of {known}")
     if not seconds > 0:
         raise ValueError(f"seconds {seconds}: expected above 0")
-    keywords = parsed(set)
+    keywords, learned = parsed(set), None
+    if policy not in WORDS:
+        from tauguard.envs.policies import MlpPolicy
+
+        if not Path(policy).is_file():
+            raise ValueError(f"policy {policy}: no such file; expected one, or {', '.join(WORDS)}")
+        learned = MlpPolicy.load(policy)
+        keywords = {"id": name, **learned.environment, **keywords}
+        if (trained := keywords.pop("id").removeprefix("tauguard:")) != name:
+            raise ValueError(f"policy {policy}: it was trained in {trained}, not in {name}")
     if policy == "target":
         if keywords.get("control", "cartesian") != "cartesian":
             raise ValueError("policy target needs control=cartesian; use --policy random or still")
@@ -56,7 +69,11 @@ def command(
 
         trigger = "alarm" if keywords.get("detector") else "contact"
         env = Reaction(env, reaction, trigger)
-    run(env, policy, seconds, seed, save, port)
+    if save is not None and save.suffix != ".rrd":
+        from tauguard.envs.wrappers import RecordMcap
+
+        env = RecordMcap(env, save)
+    run(env, learned or policy, seconds, seed, save, port)
 
 
 def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
@@ -74,11 +91,10 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
     return found
 
 
-def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, port: int) -> None:
-    """Run episodes until the time is over, in real time unless they go into a file."""
+def opened(inner: Any, save: Path | None, port: int) -> Any:
+    """The viewer, or the file, with its charts."""
     from tauguard.replay.live import LiveView
 
-    inner = env.unwrapped
     view = LiveView(inner.compiled.shown(), save, port)
     charts = {
         "force": "Contact force [N], and of its limit [%]",
@@ -89,13 +105,21 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     if inner.batch.sensing is None:
         del charts["residual"]
     view.layout(charts)
+    return view
+
+
+def run(env: Any, policy: Any, seconds: float, seed: int, save: Path | None, port: int) -> None:
+    """Run episodes until the time is over, in real time unless they go into a file."""
+    inner = env.unwrapped
+    view = opened(inner, save, port) if save is None or save.suffix == ".rrd" else None
     env.action_space.seed(seed)
     period, now, episodes, worst = 1 / inner.compiled.settings.control_rate, 0.0, 0, 0.0
     diverged = 0
     _, info = env.reset(seed=seed)
     began = time.perf_counter()
     while now < seconds:
-        send(view, inner, info, now)
+        if view is not None:
+            send(view, inner, info, now)
         action = chosen(env, inner, policy)
         _, _, terminated, truncated, info = env.step(action)
         now += period
@@ -106,9 +130,10 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
             _, info = env.reset()
         if save is None:
             time.sleep(max(0.0, began + now - time.perf_counter()))
-    view.close()
+    if view is not None:
+        view.close()
     env.close()
-    where = f"; show it with: rerun {save}" if save else ""
+    where = f"; show it with: {'rerun' if view else 'tauguard video'} {save}" if save else ""
     print(
         f"{now:.1f} s, {episodes} episodes ended, "
         f"{f'{diverged} of them diverged, ' if diverged else ''}"
@@ -116,10 +141,12 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     )
 
 
-def chosen(env: Any, inner: Any, policy: str) -> Any:
+def chosen(env: Any, inner: Any, policy: Any) -> Any:
     """The action of the chosen policy."""
     import numpy as np
 
+    if callable(policy):
+        return policy(inner.batch.observation[0])
     if policy == "random":
         return env.action_space.sample()
     if policy == "still":
