@@ -1,5 +1,5 @@
-// What a person's motion is made of: lengths and habits, the script, courses along minimum-jerk
-// paths (Flash & Hogan 1985) and reaches of a hand.
+// Parts of a person's motion: lengths and habits, the script, minimum-jerk paths (Flash & Hogan
+// 1985) and reaches of a hand.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ using geometry::norm;
 using geometry::Vec3;
 
 enum Segment { skull, neck, chest, abdomen, pelvis, limbs };
-// Of a limb, after `limbs`; the left ones come first.
+// Segments of a limb, numbered after `limbs`; the left side comes first.
 enum Limb { upper_arm, lower_arm, hand, thigh, lower_leg, per_side };
 constexpr int person_segments = limbs + 2 * per_side;
 
@@ -51,9 +51,9 @@ constexpr double lean_back = 1.2, lean_rate = 1.2;
 // farther than the fraction `comfort` of the arm's length, which stretches up to `stretch`.
 constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
 
-// A palm, forearm or upper arm stays this far from objects [m]. A hand that is held up climbs at
-// this speed [m/s] over at most this height [m], and comes down at the last [m/s]. Who wants to
-// walk off takes the hands back first, for at most `patience` [s].
+// Palms, forearms and upper arms keep the distance `clearance` from barriers [m]. A hand that is
+// stopped climbs at the speed `climb` [m/s] by at most `highest_climb` [m], and comes down at
+// `descend` [m/s]. Before a walk the person takes both hands back, which may last `patience` [s].
 constexpr double clearance = 0.005, climb = 0.6, highest_climb = 0.6, descend = 0.2, patience = 2.0;
 
 inline double minimum_jerk(double u) {

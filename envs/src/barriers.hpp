@@ -1,5 +1,5 @@
-// What stands in a person's way: objects and the table, whose geoms people do not touch in the
-// simulation. How far a capsule of a person is from the nearest of them, and which way is out.
+// Barriers to a person's motion: the table and objects. MuJoCo has no contacts between them and
+// people, so the distance of a person's capsule from the nearest barrier is computed here.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ using geometry::load;
 using geometry::norm;
 using geometry::Vec3;
 
-// Distance [m], negative inside, and the direction away from the barrier; infinite: nothing near.
+// Distance [m], negative inside, and the direction away from the barrier. Infinite if none is near.
 struct Gap {
   double distance = std::numeric_limits<double>::infinity();
   Vec3 away{0, 0, 1};
@@ -35,7 +35,8 @@ class Barriers {
   const Physics* physics = nullptr;
   std::vector<Barrier> all;
 
-  // Of the geom of a person, were it at this place; the smallest below `margin` [m].
+  // The gap to the nearest barrier if a person's geom were at this pose. Barriers farther than
+  // `margin` [m] are left out.
   Gap nearest(int geom, Vec3 centre, const std::array<double, 4>& quat, double margin) const {
     Gap out;
     const double within = physics->bounding_radius(geom) + margin;

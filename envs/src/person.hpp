@@ -1,6 +1,6 @@
-// A person's motion: reaches, walks between places, drawing back after a touch. It depends on the
-// script, the time, the touches and what stands in the way; the result is a pose of every capsule
-// of tauguard.models.person, in that order.
+// A person's motion: reaches, walks between places, withdrawal after a touch. It depends on the
+// script, the time, the touches and the barriers. The result is a pose of every capsule of
+// tauguard.models.person, in that order.
 #pragma once
 
 #include <algorithm>
