@@ -76,6 +76,12 @@ PHYSICS = (
     *("gravity", "wind", "magnetic", "density", "viscosity", "impratio", "tolerance"),
     *("o_margin", "o_solref", "o_solimp", "o_friction"),
 )
+#: Warnings after which MuJoCo has reset the data.
+_RESETS = {
+    "qpos": int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    "qvel": int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    "qacc": int(mujoco.mjtWarning.mjWARN_BADQACC),
+}
 _NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "npair", "nflex", "nflexvert", "ntendon")
 #: mjLOG_ERROR of mjtLogLevel, which the Python binding does not show.
 _LOG_ERROR = 3
@@ -113,8 +119,12 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     out |= {f"other_{name}": _array(other, name) for name in _OTHER_ARRAYS}
     out |= {name: int(getattr(model, name)) for name in _NUMBERS}
     fields, contact = _layout("mjData"), _layout("mjContact")
+    warning = _layout("mjWarningStat")
     base = data._address
     out |= {name: base + int(getattr(fields, name).offset) for name in (*_MOVING, "time")}
+    for name, kind in _RESETS.items():
+        at = kind * ctypes.sizeof(warning) + int(warning.number.offset)
+        out[f"reset_{name}"] = base + int(fields.warning.offset) + at
     names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
@@ -158,6 +168,8 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
         ctypes.c_double.from_address(found["time"]).value == data.time,
         ctypes.c_int.from_address(found["ncon"]).value == data.ncon,
         ctypes.c_int.from_address(found["nefc"]).value == data.nefc,
+        ctypes.c_int.from_address(found["reset_qacc"]).value
+        == data.warning[_RESETS["qacc"]].number,
         not model.nq or ctypes.c_size_t.from_address(qpos).value == found["qpos"],
     )
     if not all(same):

@@ -157,6 +157,7 @@ Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, do
 }  // namespace
 
 NB_MODULE(_contacts, m) {
+  nb::set_leak_warnings(false);  // a callback of MuJoCo may keep a guard until the end
   m.doc() = "Contacts of a moving scene, and the guarded stepper. Arguments are checked in Python.";
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())

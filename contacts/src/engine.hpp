@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "caught.hpp"
@@ -67,6 +68,8 @@ struct Engine {
   double *const *efc_vel, *const *efc_pos, *const *efc_force;
   int *const *efc_type, *const *efc_id;
 
+  int* resets[3];  // how often MuJoCo has warned of positions, velocities and accelerations
+
   // Fields of `end`.
   double *end_qvel, *end_energy;
   const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
@@ -107,6 +110,24 @@ struct Engine {
     return sum == 0;
   }
   bool is_discrete() const { return *integrator == discrete; }
+};
+
+// Whether MuJoCo resets the data meanwhile, as it does where numbers are not finite or too large.
+// Time alone does not show this at the start of a scene. The counts of warnings are restored.
+class ResetWatch {
+ public:
+  explicit ResetWatch(const Engine& engine) : e_(engine) {
+    for (int k = 0; k < 3; ++k) before_[k] = std::exchange(*e_.resets[k], 0);
+  }
+  ~ResetWatch() {
+    if (happened()) return;
+    for (int k = 0; k < 3; ++k) *e_.resets[k] = before_[k];
+  }
+  bool happened() const { return *e_.resets[0] || *e_.resets[1] || *e_.resets[2]; }
+
+ private:
+  const Engine& e_;
+  int before_[3];
 };
 
 }  // namespace tauguard::contacts

@@ -89,6 +89,8 @@ void set_data(const Addresses& a, Engine* e) {
   a.set("data", &e->data), a.set("end", &e->end), a.set("time", &e->time);
   a.set("qpos", &e->qpos), a.set("qvel", &e->qvel), a.set("energy", &e->energy);
   a.set("qfrc_actuator", &e->actuator), a.set("qfrc_applied", &e->applied);
+  a.set("reset_qpos", &e->resets[0]), a.set("reset_qvel", &e->resets[1]);
+  a.set("reset_qacc", &e->resets[2]);
   a.set("xfrc_applied", &e->wrench), a.set("xpos", &e->xpos), a.set("xmat", &e->xmat);
   a.set("flexvert_xpos", &e->flexvert), a.set("ncon", &e->ncon), a.set("nefc", &e->nefc);
   a.set("contact", &e->contacts), a.set("contact_size", &e->contact_size);

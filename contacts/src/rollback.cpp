@@ -59,9 +59,10 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
   EnergyChange change{};
   for (;;) {
     mocap_.sub_step(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
+    const ResetWatch watch(e_);
     rows_.step(length, held(length), push_);
     ++report_.steps;
-    if (*e_.time != begin + length || !finite()) {
+    if (watch.happened() || *e_.time != begin + length || !finite()) {
       note_reset();
       break;
     }

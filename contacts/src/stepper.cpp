@@ -130,10 +130,14 @@ bool Stepper::step(const std::function<void()>& each) {
   if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   whole_ = *e_.timestep;
   const double after = *e_.time + whole_;
-  e_.step(e_.model, e_.data);
+  bool lost;
+  {
+    const ResetWatch watch(e_);
+    e_.step(e_.model, e_.data);
+    lost = watch.happened() || *e_.time != after || !finite();
+  }
   std::vector<PairHit> hits = judge();
   std::fill(passed_.begin(), passed_.end(), 0);
-  bool lost = *e_.time != after || !finite();
   if (lost) note_reset();
   if (!hits.empty()) {
     for (const PairHit& hit : hits) lost = lost || hit.lost;

@@ -363,6 +363,20 @@ def test_numbers_that_are_not_finite_are_reported_where_mujoco_does_not_reset():
     assert guard.step().passed == guard.pairs
 
 
+@pytest.mark.parametrize("field", ["qpos", "qvel", "qfrc_applied"])
+@pytest.mark.parametrize("steps", [0, 1, 5])
+def test_a_state_that_mujoco_resets_is_reported(field, steps):
+    """At the start of a scene the time after a reset is that of a step."""
+    model = model_of()
+    data, guard = falling(model, 1.0)
+    for _ in range(steps):
+        assert not guard.step().exhausted
+    getattr(data, field)[0] = np.nan
+    assert guard.step().exhausted
+    assert sum(warning.number for warning in data.warning) == 1
+    assert lowest(guard) > 0
+
+
 def test_what_an_edit_puts_into_one_another_is_named_until_it_has_parted():
     model = model_of()
     data, guard = falling(model, 0.0)
