@@ -34,7 +34,9 @@ def read_head(folder: Path) -> dict[str, Any]:
     """
     path = folder / HEAD
     if not folder.is_dir():
-        raise FileNotFoundError(f"{folder}: no such folder; `tauguard generate` makes datasets")
+        raise FileNotFoundError(
+            f"{folder}: no folder of that name; `tauguard generate` makes datasets"
+        )
     if not path.is_file():
         raise ValueError(f"{folder}: no {HEAD} in it; `tauguard generate` makes datasets")
     try:

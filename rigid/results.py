@@ -92,8 +92,15 @@ class Distances:
     normal: NDArray[np.float64]
 
     def within(self, min_distance: float) -> NDArray[np.bool_]:
-        """Whether each pair is no further apart than ``min_distance``. Shape (N,)."""
-        return self.distance <= min_distance
+        """Whether each pair is no further apart than ``min_distance`` [m]. Shape (N,).
+
+        Raises:
+            ValueError: a distance that is not a number.
+        """
+        least = np.asarray(min_distance)
+        if least.dtype.kind not in "fiu" or np.isnan(least).any():
+            raise ValueError(f"min_distance: {min_distance!r}, expected a number [m]")
+        return np.asarray(self.distance <= least)
 
 
 @dataclass(frozen=True, eq=False)

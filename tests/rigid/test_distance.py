@@ -193,3 +193,6 @@ def test_bad_arguments():
     with pytest.raises(ValueError, match="b: 3 bodies against 2"):
         distance(ball, Spheres(np.zeros((3, 3)), 1.0))
     assert distance(ball, ball).within(-1.5).all()
+    for wrong in (np.nan, "a", None):
+        with pytest.raises(ValueError, match="min_distance"):
+            distance(ball, ball).within(wrong)
