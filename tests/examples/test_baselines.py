@@ -4,6 +4,7 @@ import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -48,6 +49,14 @@ def test_the_shipped_policies_do_more_than_random(task):
     random = BASELINES.play(task, "random", 4, FIRST)[:, 2].mean()
     for name in ("ppo", "ppo, budget"):
         assert BASELINES.play(task, name, 4, FIRST)[:, 2].mean() > random + 0.2
+
+
+@pytest.mark.parametrize("file", sorted(BASELINES.POLICIES.glob("*.npz")), ids=lambda f: f.stem)
+def test_the_shipped_policies_say_where_they_were_trained(file):
+    policy = MlpPolicy.load(file)
+    env = gym.make(**policy.environment)
+    assert policy.environment["id"].endswith(file.stem.removesuffix("-budget"))
+    assert env.action_space.contains(policy(env.reset(seed=0)[0]).astype(np.float32))
 
 
 def test_a_policy_is_what_was_saved_and_refuses_other_observations(tmp_path):
