@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.models.body_regions import BodyRegion, body_region
 from tauguard.models.checks import above_zero, not_negative
+from tauguard.models.scene_objects import GROUND_BIT
 
 Vector = tuple[float, float, float]
 
@@ -152,7 +153,7 @@ def add_table(spec: mujoco.MjSpec, table: Table) -> None:
         type=mujoco.mjtGeom.mjGEOM_BOX,
         pos=table.position,
         size=table.half_extents,
-        contype=2,
+        contype=2 | GROUND_BIT,
         conaffinity=1,
         rgba=[0.72, 0.62, 0.5, 1],
     )
@@ -164,7 +165,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0, 0, 0.05],
-        contype=2,
+        contype=2 | GROUND_BIT,
         conaffinity=1,
         rgba=[0.75, 0.77, 0.8, 1],
     )

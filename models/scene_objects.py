@@ -25,9 +25,9 @@ Quat = tuple[float, float, float, float]
 SHAPES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "mesh": 0}
 #: An object is fixed, held by the tool, or free; a fixed object with a path follows it.
 MOTIONS = ("fixed", "held", "free")
-#: Collision bit of objects among themselves; ``Table`` and floor do not have it. The arm collides
-#: with objects through contact pairs.
-OBJECT_BIT = 4
+#: Collision bits: of objects among themselves, and of free objects with table and floor. The arm
+#: collides with objects through contact pairs.
+OBJECT_BIT, GROUND_BIT = 4, 8
 _COLOUR = (0.55, 0.6, 0.65, 1.0)
 #: Mass of a conveyor's belt [kg], large enough that parts on it do not slow it down.
 BELT_MASS = 1e4
@@ -254,6 +254,8 @@ def add_object(spec: mujoco.MjSpec, obj: SceneObject) -> list[mujoco.MjsGeom]:
     geoms = _fill(spec, body, obj)
     for geom in geoms:
         geom.contype = geom.conaffinity = OBJECT_BIT
+        if obj.motion == "free":
+            geom.conaffinity |= GROUND_BIT
         if obj.motion == "free" or obj.belt is not None:
             geom.mass = (obj.mass if obj.belt is None else BELT_MASS) / len(geoms)
     return geoms

@@ -10,7 +10,7 @@ import trimesh
 
 from oracles.contact_forces import contact_forces
 from tauguard.envs import Episode, simulate
-from tauguard.models import SceneObject, SceneSpec, Shape, compose, load_objects
+from tauguard.models import SceneObject, SceneSpec, Shape, Table, compose, load_objects
 
 REACH = "tauguard:tauguard/Reach-v0"
 BALL = Shape("sphere", (0.05,))
@@ -46,6 +46,23 @@ def test_a_loose_part_comes_to_rest_in_a_bin_and_weighs_what_it_says():
     assert env.data.body("part").xpos == pytest.approx([0.6, 0.5, 0.06], abs=2e-3)
     # The bin carries the part; only what the arm does to them counts.
     assert info["region_force"].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("ground", "height"),
+    [({"table": Table((0.6, 0.5, 0.1), (0.3, 0.3, 0.02))}, 0.12), ({"floor": True}, 0.0)],
+    ids=["table", "floor"],
+)
+def test_a_free_part_lies_on_table_and_floor(ground, height):
+    part = SceneObject("part", (BALL,), motion="free", mass=0.7, position=(0.6, 0.5, height + 0.1))
+    model = compose(SceneSpec(objects=(part,), **ground)).model
+    data = mujoco.MjData(model)
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    assert data.body("part").xpos == pytest.approx([0.6, 0.5, height + 0.05], abs=2e-3)
+    sunk = SceneObject("part", (BALL,), motion="free", mass=0.7, position=(0.6, 0.5, height))
+    with pytest.raises(ValueError, match="part is 50 mm inside"):
+        compose(SceneSpec(objects=(sunk,), **ground))
 
 
 def test_a_held_part_is_the_arms_and_the_controller_does_not_know_it():
