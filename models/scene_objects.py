@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.arrays import in_a_line
+from tauguard.arrays import Array, in_a_line
 from tauguard.models.checks import above_zero, not_negative, vector
 from tauguard.models.mjcf import inline_meshes, xml_text
 from tauguard.untrusted_input import read_text, reading
@@ -146,6 +146,15 @@ class SceneObject:
     def moves(self) -> bool:
         """Whether its position changes."""
         return self.motion == "free" or bool(self.path)
+
+    def places(self, step: float) -> Array:
+        """Positions along the path, at most ``step`` apart [m], shape (k, 3)."""
+        rows = np.array(self.path)[:, 1:]
+        pieces = [
+            np.linspace(a, b, 1 + int(np.ceil(np.linalg.norm(b - a) / step)))
+            for a, b in itertools.pairwise(rows)
+        ]
+        return np.concatenate(pieces)
 
     @property
     def touchable(self) -> bool:

@@ -37,6 +37,8 @@ STEP, MOVES = 0.05, 16
 SHOULDER, HANGING = 0.5, 1.1
 #: People may stand this far within a table or an object [m].
 LEANING = 0.01
+#: Where objects are looked at along their paths, and the room for people's sway beside these [m].
+ALONG, ROOM = 0.05, 0.1
 #: A base within this of the origin stands in it [reach].
 CENTRED = 0.1
 
@@ -260,14 +262,27 @@ def blocked_ground(scene: Scene) -> Array:
 
 
 def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
-    """Whether people overlap no table and no object."""
+    """Whether people overlap no table and no object, nor stand in an object's path.
+
+    Arms yield to what moves, so they may be in a path.
+    """
     spec, around = scene.spec, things_around(scene, model)
+    paths = {model.body(o.name).id: o.places(ALONG) for o in spec.objects if o.path}
     for part in people_parts(spec) if around else ():
         own = model.geom(part.name).id
+        yields = part.segment.region in ("upper_arm", "lower_arm", "hand")
         for geom in around:
-            depth = -mujoco.mj_geomDistance(model, placed, own, geom, 0.1, None)
-            if depth > LEANING:
-                raise StartsInContact("person", part.name, _name(model, geom), float(depth))
+            body = int(model.geom_bodyid[geom])
+            start, at = placed.xpos[body].copy(), placed.geom_xpos[geom].copy()
+            passes, name = body in paths and not yields, _name(model, geom)
+            room = ROOM if passes else 0.0
+            for place in paths[body] if passes else start[None]:
+                placed.geom_xpos[geom] = at + place - start
+                depth = room - mujoco.mj_geomDistance(model, placed, own, geom, 0.2, None)
+                if depth > LEANING:
+                    name += f" as it comes by, with {1000 * room:.0f} mm around it" if room else ""
+                    raise StartsInContact("person", part.name, name, float(depth))
+            placed.geom_xpos[geom] = at
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:

@@ -11,7 +11,7 @@ import pytest
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.placing import StartsInContact
 from tauguard.envs.gym.trial import try_arm
-from tauguard.models import BodyProxy, Table
+from tauguard.models import BodyProxy, Person, SceneObject, Shape, Table
 from tests.models.arms import random_arm
 
 REACH = "tauguard:tauguard/Reach-v0"
@@ -58,6 +58,25 @@ def test_what_was_placed_by_hand_inside_the_arm_is_refused_by_name():
     table = Table(position=(0.0, 0.0, 0.5), half_extents=(0.2, 0.2, 0.2))
     with pytest.raises(StartsInContact, match=r"begins in contact: link\d is .* mm inside table"):
         gym.make(REACH, table=table, obstacles=())
+
+
+def test_a_person_does_not_stand_where_a_cart_will_come():
+    box, rows = Shape("box", (0.15, 0.1, 0.3)), ((0, 1.0, -1.5, 0), (2, 1.0, 1.5, 0))
+    cart = SceneObject("cart", (box,), path=rows)
+    env = gym.make(REACH, obstacles=("person",), objects=(cart,)).unwrapped
+    env.reset(seed=0)
+    model, data = env.model, env.data
+    trunk = ("pelvis", "abdomen", "chest", "left_thigh", "right_thigh")
+    own = [model.geom(f"person_{name}").id for name in trunk]
+    (other,) = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body("cart").id]
+    nearest = np.inf
+    for _ in range(400):  # the cart passes twice
+        env.step(np.zeros(6))
+        between = [mujoco.mj_geomDistance(model, data, g, other, 1.0, None) for g in own]
+        nearest = min(nearest, *between)
+    assert 0 < nearest < 0.2  # as near as it can be
+    with pytest.raises(StartsInContact, match="inside cart as it comes by"):
+        gym.make(REACH, obstacles=(Person(position=(1.1, 0)),), objects=(cart,))
 
 
 def test_a_region_that_begins_inside_the_arm_is_drawn_again():
