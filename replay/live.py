@@ -21,6 +21,8 @@ from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, drawn, entity
 
 #: The only address that the viewer listens on; the longest wait for it [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
+#: Where a viewer was closed, or found no display after it had begun to listen.
+GONE = "the rerun viewer ended; without a display use --save FILE.rrd"
 #: Radius of a target's mark [m].
 MARK = 0.03
 #: Grey-blue of a cloth.
@@ -44,6 +46,7 @@ class LiveView:
         self._model, self._bodies = model, bodies(model)
         self._recording = rr.RecordingStream("tauguard_watch")
         self._viewer: subprocess.Popen[bytes] | None = None
+        self._port = port
         if save is not None:
             self._recording.save(save)
         else:
@@ -69,7 +72,15 @@ class LiveView:
         )
 
     def show(self, data: Any, seconds: float, targets: ArrayLike) -> None:
-        """Show the state at ``seconds``, with a ball at each target, shape (k, 3) [m]."""
+        """Show the state at ``seconds``, with a ball at each target, shape (k, 3) [m].
+
+        Raises:
+            OSError: the viewer is gone.
+        """
+        if self._viewer is not None and self._viewer.poll() is not None:
+            if not listens(self._port):
+                raise OSError(GONE)
+            self._viewer = None  # an earlier viewer listens there
         self._recording.set_time(TIMELINE, duration=seconds)
         for index, body in enumerate(self._bodies):
             if body.shapes and (body.moves or seconds == 0):
@@ -117,9 +128,23 @@ class LiveView:
         self._recording.log(origin, rr.Scalars(np.asarray(values, dtype=float).ravel()))
 
     def close(self) -> None:
-        """Send the remaining data; the viewer stays open."""
-        self._recording.flush()
-        self._recording.disconnect()
+        """Send the remaining data; the viewer stays open.
+
+        Raises:
+            OSError: the viewer is gone.
+        """
+        try:
+            self._recording.flush()
+            self._recording.disconnect()
+        except RuntimeError as error:
+            raise OSError(GONE) from error
+
+
+def listens(port: int) -> bool:
+    """Whether something on this machine listens on the port."""
+    with socket.socket() as probe:
+        probe.settimeout(0.2)
+        return probe.connect_ex((HOST, port)) == 0
 
 
 def open_viewer(port: int) -> subprocess.Popen[bytes]:
@@ -134,10 +159,8 @@ def open_viewer(port: int) -> subprocess.Popen[bytes]:
     while time.monotonic() < deadline:
         if viewer.poll() is not None:
             break
-        with socket.socket() as probe:
-            probe.settimeout(0.2)
-            if probe.connect_ex((HOST, port)) == 0:
-                return viewer
+        if listens(port):
+            return viewer
         time.sleep(0.1)
     raise OSError(
         f"the rerun viewer did not come up on {HOST}:{port}; without a display use --save FILE.rrd"

@@ -1,6 +1,7 @@
 """``tauguard watch``: what is shown is what the environment did, and only this machine sees it."""
 
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -100,12 +101,15 @@ def test_values_are_literals_or_text():
     }
 
 
+class Ended:
+    """A process that is over."""
+
+    def poll(self):
+        return 1
+
+
 def test_the_viewer_is_bound_to_this_machine(monkeypatch):
     seen = []
-
-    class Ended:
-        def poll(self):
-            return 1
 
     monkeypatch.setattr(live.subprocess, "Popen", lambda command: seen.append(command) or Ended())
     with pytest.raises(OSError, match="--save"):
@@ -113,6 +117,21 @@ def test_the_viewer_is_bound_to_this_machine(monkeypatch):
     command = [str(part) for part in seen[0]]
     assert command[command.index("--bind") + 1] == "127.0.0.1"
     assert "0.0.0.0" not in command
+
+
+def test_a_viewer_that_ended_is_said(tmp_path):
+    env = gymnasium.make("tauguard/Reach-v0").unwrapped
+    env.reset(seed=0)
+    view = live.LiveView(env.compiled.scene.model, tmp_path / "a.rrd")
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        view._port = server.getsockname()[1]
+        view._viewer = Ended()
+        view.show(env.batch.datas[0], 0.0, np.zeros((1, 3)))  # another one listens there
+    view._viewer = Ended()
+    with pytest.raises(OSError, match="ended; without a display use --save"):
+        view.show(env.batch.datas[0], 0.0, np.zeros((1, 3)))
 
 
 def test_a_zero_force_takes_the_arrow_away(tmp_path):
