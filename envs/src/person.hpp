@@ -12,16 +12,14 @@
 
 #include "anatomy.hpp"
 #include "barriers.hpp"
+#include "posture.hpp"
 
 namespace tauguard::envs {
 
-class Person {
+class Person : public Posture {
  public:
   Person() = default;
-  explicit Person(const Anatomy& anatomy) : body_(anatomy) {}
-
-  std::array<Vec3, person_segments> centre;
-  std::array<std::array<double, 4>, person_segments> quat_wxyz;
+  explicit Person(const Anatomy& anatomy) : Posture(anatomy) {}
 
   // At the script's beginning.
   void reset(const Script& script) {
@@ -105,21 +103,18 @@ class Person {
   }
 
  private:
-  Anatomy body_{};
   Script script_;
   const Barriers* barriers_ = nullptr;
   const int* geoms_ = nullptr;
   std::array<Reach, 2> hands_;
-  std::array<Vec3, 2> grip_;  // where the hands are
-  Vec3 from_, to_;            // of a walk
+  Vec3 from_, to_;  // of a walk
   Course path_, back_;
   bool walking_ = false;
   int next_walk_ = 0;
   double until_ = 0, back_until_ = 0;
-  double turned_ = 0, stride_ = 0, swing_ = 0;  // yaw [rad], phase of the gait [rad], swing [rad]
-  double lean_ = 0;                             // of the trunk, forward [rad]
-  double lowered_ = 0;                          // the hands: 0 in front, 1 beside the body
-  std::array<bool, 2> held_up_{};               // an object keeps the hand from where it would be
+  double turned_ = 0;               // yaw [rad]
+  double lowered_ = 0;              // the hands: 0 in front, 1 beside the body
+  std::array<bool, 2> held_up_{};   // an object keeps the hand from where it would be
   std::array<double, 2> raised_{};  // so high the hand is above its way, to pass an object [m]
   std::array<double, person_segments> touched_{};  // when [s]; -1: not
 
@@ -235,24 +230,6 @@ class Person {
     if (back_.to > 0 && t >= back_until_) back_ = {back_.at(t), 0.0, t, 2 * step_time};
   }
 
-  // ---- where everything is ------------------------------------------------
-
-  struct Axes {
-    Vec3 forward, left, hip;  // hip: between the hip joints
-  };
-  Axes axes_{};
-
-  void place(int segment, Vec3 a, Vec3 b) {
-    centre[segment] = mix(a, b, 0.5);
-    const Vec3 path = b - a;
-    const Vec3 d = (1.0 / norm(path)) * path;
-    // The turn that takes -z to d; no capsule points straight up.
-    std::array<double, 4>& q = quat_wxyz[segment];
-    q = {1.0 - d.z, d.y, -d.x, 0.0};
-    const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
-    for (double& c : q) c /= size;
-  }
-
   // In front of the body, or hanging beside it.
   Vec3 rest_place(int side) const {
     const double sign = side == 0 ? 1.0 : -1.0, reach = body_.upper_arm + body_.lower_arm;
@@ -323,10 +300,6 @@ class Person {
     for (int side = 0; side < 2; ++side) leg(side, side == 0 ? 1.0 : -1.0);
   }
 
-  Vec3 trunk_axis() const {
-    return std::sin(lean_) * axes_.forward + std::cos(lean_) * Vec3{0, 0, 1};
-  }
-
   // The nearest barrier to some of the capsules, within their clearance.
   Gap nearest(std::initializer_list<int> segments) const {
     Gap out;
@@ -371,58 +344,6 @@ class Person {
     const double height = raised_[side] + (climbs ? climb : -descend) * dt;
     raised_[side] = std::min(std::max(height, 0.0), highest_climb);
     held_up_[side] = blocked || raised_[side] > 0 || norm(grip_[side] - goal) > 1e-3;
-  }
-
-  void trunk_and_head() {
-    const Vec3 up = trunk_axis();
-    const Vec3 ahead = std::cos(lean_) * axes_.forward - std::sin(lean_) * Vec3{0, 0, 1};
-    const auto across = [&](int segment, double height) {
-      const Vec3 middle = axes_.hip + height * body_.trunk * up;
-      place(segment, middle - 0.1 * axes_.left, middle + 0.1 * axes_.left);
-    };
-    across(pelvis, 0.02);
-    across(abdomen, 0.42);
-    across(chest, 0.78);
-    const Vec3 base = axes_.hip + body_.trunk * up, chin = base + body_.neck * up;
-    place(neck, chin, base);
-    const Vec3 shift = 0.02 * ahead;
-    place(skull, chin + body_.head * up + shift, chin + shift);
-  }
-
-  // Two links to the goal of the palm, the elbow down and outwards.
-  void arm(int side, Vec3 shoulder, Vec3 goal, double sign) {
-    const double first = body_.upper_arm, second = body_.lower_arm + body_.grip;
-    const Vec3 path = goal - shoulder;
-    const double size = norm(path);
-    const Vec3 direction = size > 1e-6 ? (1.0 / size) * path : axes_.forward;
-    const double least = std::fabs(first - second) + 0.1 * second;
-    const double r = std::min(std::max(size, least), stretch * (first + second));
-    const double c = (first * first + r * r - second * second) / (2.0 * first * r);
-    const Vec3 pole = 0.6 * sign * axes_.left - 0.3 * axes_.forward - Vec3{0, 0, 1};
-    Vec3 bend = pole - dot(pole, direction) * direction;
-    bend = norm(bend) > 1e-6 ? (1.0 / norm(bend)) * bend : axes_.left;
-    const Vec3 elbow = shoulder + first * c * direction + first * std::sqrt(1.0 - c * c) * bend;
-    grip_[side] = shoulder + r * direction;
-    const Vec3 along = (1.0 / second) * (grip_[side] - elbow);
-    const Vec3 wrist = elbow + body_.lower_arm * along;
-    const int at = limbs + side * per_side;
-    place(at + upper_arm, shoulder, elbow);
-    place(at + lower_arm, elbow, wrist);
-    place(at + hand, wrist, wrist + body_.hand * along);
-  }
-
-  void leg(int side, double sign) {
-    const Vec3 joint = axes_.hip + sign * body_.hip_half * axes_.left;
-    const double phase = stride_ + (side == 0 ? 0.0 : M_PI);
-    const double turn = body_.seated ? M_PI / 2 : swing_ * std::sin(phase);
-    const double bend = body_.seated ? M_PI / 2 : 1.2 * swing_ * std::max(0.0, std::cos(phase));
-    const auto along = [&](double angle) {
-      return std::sin(angle) * axes_.forward - std::cos(angle) * Vec3{0, 0, 1};
-    };
-    const Vec3 knee = joint + body_.thigh * along(turn);
-    const int at = limbs + side * per_side;
-    place(at + thigh, joint, knee);
-    place(at + lower_leg, knee, knee + body_.shank * along(turn - bend));
   }
 };
 
