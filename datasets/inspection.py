@@ -149,7 +149,7 @@ def missing(folder: Path) -> list[str]:
 
 
 def verified(folder: Path) -> list[tuple[str, str]]:
-    """Names and faults of damaged or missing files; reads every byte.
+    """Names and faults of damaged, missing and foreign files; reads every byte.
 
     Raises:
         ValueError: ``dataset.json`` is so damaged that the other files are not known.
@@ -165,7 +165,19 @@ def verified(folder: Path) -> list[tuple[str, str]]:
             arm_texts(folder, arm)
         except ValueError as error:
             found.append((f"arms/{arm}", str(error)))
-    return found
+    return found + [(name, "no file of this dataset: move it away") for name in foreign(folder)]
+
+
+def foreign(folder: Path) -> list[str]:
+    """What lies among the shards and is none: a library that reads all of ``data`` reads it too."""
+    known = {
+        path(split, number)
+        for split, number in shards(configuration_in(folder))
+        for path in (data_path, manifest_path)
+    }
+    there = (*folder.glob("data/*"), *folder.glob("manifest/*"))
+    names = (path.relative_to(folder).as_posix() for path in there if not path.name.startswith("."))
+    return sorted(set(names) - known)
 
 
 def unchecked(folder: Path) -> list[str]:

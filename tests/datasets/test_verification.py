@@ -1,5 +1,6 @@
 """``inspect --verify`` sees a flipped bit in every file of a dataset."""
 
+import os
 import shutil
 
 import numpy as np
@@ -89,6 +90,7 @@ def test_a_dataset_of_an_earlier_version_says_what_is_not_checked(copy, tiny, ti
     out = capsys.readouterr().out
     for name in ("dataset.json", "README.md", "croissant.json"):
         assert f"{name}: not checked" in out
+    assert "every file is intact" not in out
     generate_dataset(load(tiny_toml), copy, workers=1)
     assert contents(copy) == contents(tiny)
 
@@ -99,3 +101,22 @@ def test_sha256sum_reads_the_checksums(tiny):
     for line in (tiny / SUMS).read_text().splitlines():
         digest, name = line.split("  ")
         assert hashlib.sha256((tiny / name).read_bytes()).hexdigest() == digest
+
+
+@pytest.mark.parametrize("name", ["data/train-000002.parquet", "manifest/x.jsonl", "data/old/a"])
+def test_a_file_among_the_shards_that_is_none_is_named(copy, capsys, name):
+    (copy / name).parent.mkdir(exist_ok=True)
+    (copy / name).write_bytes((copy / "data/train-000000.parquet").read_bytes())
+    (copy / "notes.txt").write_text("a user's own")
+    with pytest.raises(SystemExit) as stop:
+        main(["inspect", str(copy), "--verify"])
+    assert stop.value.code == 2
+    top = "/".join(name.split("/")[:2])
+    assert f"DAMAGED: {top}: no file of this dataset" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_a_pipe_in_the_place_of_an_arm_blocks_nothing(copy):
+    (copy / "arms/cura6.xml").unlink()
+    os.mkfifo(copy / "arms/cura6.xml")
+    assert any("missing or damaged" in said for _, said in inspection.verified(copy))

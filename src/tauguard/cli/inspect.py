@@ -22,9 +22,9 @@ def command(
 ) -> None:
     """Show the content of a generated dataset; with --verify read every byte of it.
 
-    Exit code 2: --verify found damaged or missing files or leaks between splits, or an episode
-    that was simulated again has other bytes. The command that generated the dataset writes damaged
-    files again, and only those.
+    Exit code 2: --verify found damaged or missing files, others among the shards, or leaks between
+    splits, or an episode that was simulated again has other bytes. The command that generated the
+    dataset writes damaged files again, and only those.
 
     Args:
         folder: folder of the dataset.
@@ -116,7 +116,9 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
         lines.append("files not checked (--verify reads every byte)")
     elif damaged:
         lines += [f"DAMAGED: {name}: {wrong}" for name, wrong in damaged.items()]
-        lines.append("`tauguard generate` with the same configuration writes these again")
+        lines.append("`tauguard generate` with the same configuration writes damaged files again")
+    elif report["unchecked"]:
+        lines.append("every file with a checksum is intact, byte for byte")
     else:
         lines.append("every file is intact, byte for byte")
     for name in report["unchecked"]:
