@@ -24,7 +24,7 @@ from tauguard.detectors.codec import checksum, decode, encode
 from tauguard.detectors.registry import file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.detectors.signature import check_signature, key_of_user, signed
-from tauguard.untrusted_input import reading
+from tauguard.untrusted_input import check_no_device, reading
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
@@ -130,6 +130,7 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
 
 def _container(path: Path) -> Mapping[str, Any]:
     """The outer dictionary of a file of ours."""
+    check_no_device(path)
     try:
         data = path.read_bytes()
     except OSError as error:

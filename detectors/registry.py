@@ -94,6 +94,8 @@ def _of_another(name: str) -> Detector:
         made: Any = getattr(importlib.import_module(module), attribute)()
     except AttributeError:
         raise ValueError(f"detector {name!r}: {module} has no {attribute}") from None
+    except TypeError as error:
+        raise ValueError(f"detector {name!r}: cannot be made without arguments ({error})") from None
     if not (callable(getattr(made, "fit", None)) and isinstance(getattr(made, "name", None), str)):
         raise ValueError(f"detector {name!r}: expected a class with `name` and `fit(traces, arm)`")
     found: Detector = made

@@ -86,7 +86,7 @@ class Session:
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
         self.answer = said
-        self.spans.add(t, said)
+        self.spans.add(t if np.isfinite(t) else self._now, said)
 
     def silent(self, seconds: float) -> tuple[Sample, Answer]:
         """Record that no sample has arrived for ``seconds``.

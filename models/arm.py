@@ -194,6 +194,8 @@ def _by_name(robot: Robot) -> tuple[Robot, Path, dict[str, str]]:
 
 def _cura6(robot: Robot) -> Arm:
     name = robot.file
+    if robot.joints not in (None, cura6.JOINTS):
+        raise ValueError(f"arm {name}: joints: its own six are used; leave `joints` out")
     spec = mujoco.MjSpec.from_string(cura6.arm_xml(name))
     links = tuple(f"link{i}" for i in range(1, len(cura6.JOINTS) + 1))
     model, n, drive = spec.compile(), len(cura6.JOINTS), cura6_drive(name)

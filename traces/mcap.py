@@ -75,13 +75,12 @@ def read_mcap(path: str | Path) -> Trace:
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
-    data = path.read_bytes()
     expected = (
         "expected a complete MCAP file written by tauguard "
         "(logs of other programs: tauguard.datasets.read_log)"
     )
     with reading(path, expected):
-        return decode(Contents(data))
+        return decode(Contents(path.read_bytes()))
 
 
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:

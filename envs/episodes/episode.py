@@ -87,6 +87,8 @@ class Episode:
             value = getattr(self, name)
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} {value}: expected more than 0 and finite")
+        if self.seconds < 2 * self.timestep:
+            raise ValueError(f"seconds {self.seconds}: expected two steps of {self.timestep} s")
         if self.temperature is not None and not math.isfinite(self.temperature):
             raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
         check_percent(self.speed)

@@ -19,9 +19,11 @@ def reading(path: str | Path, expected: str = "") -> Iterator[None]:
     ``expected`` describes a valid file.
 
     Raises:
-        ValueError: the content cannot be read; the cause is chained.
+        ValueError: the content cannot be read; the cause is chained. Also a device such as
+            ``/dev/zero``, which may have no end.
         OSError: as raised inside.
     """
+    check_no_device(path)
     try:
         yield
     except OSError:
@@ -37,6 +39,12 @@ def reading(path: str | Path, expected: str = "") -> Iterator[None]:
     except Exception as error:
         said = f"damaged ({type(error).__name__}: {str(error)[:200]})"
         raise ValueError(_line(path, said, expected)) from error
+
+
+def check_no_device(path: str | Path) -> None:
+    """Refuse a device such as ``/dev/zero``, which may have no end: ``ValueError``."""
+    if Path(path).is_char_device():
+        raise ValueError(f"{path}: a device; expected a file")
 
 
 def _line(path: str | Path, said: str, expected: str) -> str:

@@ -36,6 +36,49 @@ individuals = [10]
 """
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("simulate --out new --speeds", "expected a number or more"),
+        ("simulate --out new --payloads-g", "expected a number or more"),
+        ("simulate --out new --workers 0", "--workers 0: expected 1 or more"),
+        ("simulate --out new --mismatch-seed -3", "--mismatch-seed -3: expected 0 or more"),
+        ("simulate --out new --arm-joints a,b", "leave `joints` out"),
+        ("simulate --out new --collisions 0 --seconds 1e-9", "expected two steps"),
+        ("simulate --out log.csv --episodes 1", "expected a folder, or a new name"),
+        ("train --traces new --model .", "--model .: is a folder"),
+        ("train --traces new --detector os:path", "cannot be made without arguments"),
+        ("robot cura6 --try --episodes -1", "--episodes -1: expected 1 or more"),
+        ("robot cura6 --try --seed -1", "--seed -1: expected 0 or more"),
+        ("demo --out new --seed -1", "--seed -1: expected 0 or more"),
+        ("watch Reach-v0 --seed -1", "--seed -1: expected 0 or more"),
+        ("play-ur log.csv --columns auto --port 70000", "--port 70000: expected 0 to 65535"),
+        ("play-ur log.csv --columns auto --fault frozen@90", "--fault frozen@ 90: expected 0 to 1"),
+        ("replay new --web --port -1", "--port -1: expected 0 to 65535"),
+        ("listen --stdin --model m --robot cura6 --seconds nan", "--seconds nan: expected 0"),
+        ("listen --stdin --model m --robot cura6 --reconnect nan", "--reconnect nan: expected 0"),
+        ("listen --ur h --model m --robot cura6 --port 99999", "--port 99999: expected 1 to"),
+        ("video a.mcap --rate 0", "--rate 0: expected 1 to 1000"),
+        ("video a.mcap --slower nan", "--slower nan: expected"),
+        ("video a.mcap --seconds nan", "--seconds nan: expected 0 or more"),
+        ("video a.mcap --out none/a.gif", "the folder none does not exist"),
+        ("replay /dev/zero", "a device; expected a file"),
+        ("detect /dev/zero --robot cura6", "a device; expected a file"),
+        ("evaluate --traces new --model /dev/zero", "a device; expected a file"),
+    ],
+)
+def test_a_number_or_file_that_no_command_can_use_is_named(
+    tmp_path, monkeypatch, capsys, line, said
+):
+    monkeypatch.chdir(tmp_path)
+    table = np.column_stack([np.linspace(0, 1, 501), *[np.zeros(501)] * 18])
+    names = ["t", *(f"{what}_{i}" for what in ("q", "qd", "current") for i in range(1, 7))]
+    np.savetxt("log.csv", table, delimiter=",", header=",".join(names), comments="")
+    (tmp_path / "mcap").mkdir()
+    assert run(line.split()[0], tmp_path / "mcap", *line.split()[1:]) == 2
+    assert said in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def intact(tmp_path_factory):
     """A folder with a small file of every kind that commands take."""

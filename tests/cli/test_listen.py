@@ -177,6 +177,18 @@ def test_a_robot_whose_clock_begins_anew_is_not_late_for_ever(alarm, struck):
     assert "free" not in states(alarm, struck, np.zeros(len(struck.t)), back(struck, 0.1))[1000:]
 
 
+def test_samples_without_a_time_are_a_fault_in_the_summary(alarm, struck):
+    class Timeless(Handed):
+        def read(self, timeout):
+            late = 1000 <= self._next < 1200
+            sample = super().read(timeout)
+            return replace(sample, t=np.nan) if late else sample
+
+    heard = listen(Timeless(struck), Monitor(alarm, alarm.inputs))
+    named = [one for one in heard.faults() if one.reason == "not-finite: the time is nan"]
+    assert [one.start for one in named] == [struck.t[999]]
+
+
 def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):
     packets = Fault("frozen", 4.0, 0.5).apply(Packets.of(struck))
     frozen = Trace(struck.joint_names, packets.t, packets.q, packets.qd, packets.current)

@@ -116,9 +116,18 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
 
 def said(error: Exception) -> str:
     """The message of an error; for a system error file and cause, without the error number."""
+    if isinstance(error, FileExistsError) and error.filename is not None:
+        return f"{error.filename}: there is a file of that name; expected a folder, or a new name"
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)
+
+
+def expect(flag: str, value: float, least: float, most: float = float("inf")) -> None:
+    """Refuse a flag's number outside ``least`` to ``most``, and NaN: ``ValueError``."""
+    if not least <= value <= most:
+        wanted = f"{least:g} or more" if most == float("inf") else f"{least:g} to {most:g}"
+        raise ValueError(f"{flag} {value:g}: expected {wanted}")
 
 
 def fail(message: str, code: int = 2) -> None:

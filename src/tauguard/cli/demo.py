@@ -41,7 +41,10 @@ def command(
         workers: processes for the simulation (default: all processors).
         json: write the summary here as well.
     """
+    from tauguard.cli import expect
+
     started = time.perf_counter()
+    expect("--seed", seed, 0)
     out.mkdir(parents=True, exist_ok=True)
 
     from tauguard.datasets import demo_plan, simulate_all

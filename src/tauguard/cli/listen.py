@@ -62,6 +62,7 @@ def command(
         record: write the received samples as MCAP here.
         rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
+    from tauguard.cli import expect
     from tauguard.datasets.real_arms import check_robot
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.monitor import Monitor
@@ -81,6 +82,9 @@ def command(
     for name, path in (("--json", json), ("--record", record), ("--rerun", shown)):
         if path is not None and not path.absolute().parent.is_dir():
             raise ValueError(f"{name} {path}: the folder {path.parent} does not exist")
+    expect("--seconds", seconds, 0)
+    expect("--reconnect", reconnect, 0)
+    expect("--port", port, 1, 65535)
     alarm = with_load(load_model(model), model, payload, torque)
     if alarm.inputs is None:
         raise ValueError(f"{model}: does not say what samples look like; train the detector anew")

@@ -25,14 +25,17 @@ def command(
         fault: NAME@SECONDS or NAME@SECONDS+DURATION, several if asked: frozen, stale, encoder,
             missing, late, repeated, rate, jump, bias, saturated, swapped, sign, nan.
     """
+    from tauguard.cli import expect
     from tauguard.datasets.logs import read_log
     from tauguard.live.packets import Fault, Packets
     from tauguard.live.ur_server import HOST, UrServer
 
+    expect("--port", port, 0, 65535)
     faults = [Fault.parse(text) for text in fault]
     trace = read_log(log, columns).trace
     packets = Packets.of(trace)
     for one in faults:
+        expect(f"--fault {one.name}@", one.start, 0, packets.t[-1] - packets.t[0])
         packets = one.apply(packets)
     with UrServer(packets, port) as server:
         print(

@@ -35,6 +35,9 @@ def command(
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, of the page (default: a free one).
     """
+    from tauguard.cli import expect
+
+    expect("--port", port, 0, 65535)
     web = web or path.is_dir() or (path.suffix == ".rrd" and not open)
     path = shown = newest(path)
     if not (path.is_dir() or path.suffix == ".rrd"):

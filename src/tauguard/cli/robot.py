@@ -37,6 +37,7 @@ def command(
         seed: of the first episode, with --try.
         pictures: a PNG of the beginning of an episode in each environment, with --try.
     """
+    from tauguard.cli import expect
     from tauguard.envs.plant import Gains
     from tauguard.models import ROBOTS, SceneSpec, compose
     from tauguard.models.arm import NAMED
@@ -46,6 +47,8 @@ def command(
     if robot is None:
         print(names())
         return
+    expect("--episodes", episodes, 1)
+    expect("--seed", seed, 0)
     if download:
         row = ROBOTS.get(robot)
         model = row.menagerie if row is not None else robot

@@ -58,6 +58,7 @@ def command(
         workers: number of processes; the default is one for each processor.
         json: file for a summary of the simulated episodes, in JSON.
     """
+    from tauguard.cli import expect
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
     from tauguard.datasets.plans import torque_scale
     from tauguard.models import Mismatch, load_objects
@@ -67,6 +68,10 @@ def command(
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
     if min(collisions, free) < 0:
         raise ValueError(f"--collisions {collisions}, --free {free}: expected 0 or more")
+    expect("--workers", 1 if workers is None else workers, 1)
+    expect("--mismatch-seed", mismatch_seed or 0, 0)
+    if not speeds or payloads_g == ():
+        raise ValueError("--speeds and --payloads-g: expected a number or more after each")
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     if payloads_g is None:
         scale = torque_scale(robot)

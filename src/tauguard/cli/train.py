@@ -130,6 +130,8 @@ def _target(model: Path | None) -> Path:
     target = model or Path("model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if target.is_dir():
+        raise IsADirectoryError(f"--model {target}: is a folder; expected the name of a file")
     if model is None and target.exists():
         raise FileExistsError(f"{target} is there already: name the file to write with --model")
     return target

@@ -32,12 +32,21 @@ def command(
         width: width of the picture [px].
         height: height of the picture [px].
     """
+    from tauguard.cli import expect
     from tauguard.cli.replay import newest
     from tauguard.replay.video import frames, write_video
     from tauguard.traces import read_mcap
 
+    expect("--slower", slower, 1e-3, 1e6)
+    expect("--rate", rate, 1, 1000)
+    expect("--width", width, 1, 8192)
+    expect("--height", height, 1, 8192)
+    expect("--start", start, 0)
+    expect("--seconds", 0.0 if seconds is None else seconds, 0)
     source = newest(recording)
     target = out or source.with_suffix(".gif")
+    if not target.absolute().parent.is_dir():
+        raise FileNotFoundError(f"--out {target}: the folder {target.parent} does not exist")
     if target.exists() and out is None:
         raise FileExistsError(f"{target} is there already: name the file to write with --out")
     trace = read_mcap(source)

@@ -41,8 +41,11 @@ def command(
     """
     import gymnasium
 
+    from tauguard.cli import expect
     from tauguard.environments import ENVIRONMENTS
 
+    expect("--seed", seed, 0)
+    expect("--port", port, 0, 65535)
     name = environment if environment.startswith("tauguard/") else f"tauguard/{environment}"
     if name not in ENVIRONMENTS:
         known = ", ".join(one.removeprefix("tauguard/") for one in ENVIRONMENTS)
