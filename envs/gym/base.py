@@ -181,8 +181,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """Go back to what :meth:`get_state` gave: the same actions give the same bits again.
 
         Raises:
-            ValueError: a state of another environment.
+            ValueError: a state of another environment, or none that :meth:`get_state` gave.
         """
+        if not isinstance(state, dict) or not {"memory", "task", "rng", "begun"} <= state.keys():
+            raise ValueError("state: expected what get_state() gave")
         self.batch.set_state(0, state)
         self.task.memory[:] = state["memory"]
         self.task.set_state(state["task"])

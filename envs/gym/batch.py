@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import IntEnum
@@ -81,6 +82,12 @@ ROWS = (
 LATEST = 0.5
 
 
+def _identity(model: mujoco.MjModel) -> str:
+    """SHA-256 of the numbers that tell scenes of equal sizes apart."""
+    numbers = (model.body_pos, model.body_mass, model.geom_size, model.geom_pos, model.dof_armature)
+    return hashlib.sha256(b"".join(values.tobytes() for values in numbers)).hexdigest()
+
+
 class Batch:
     """``rows`` copies of one simulation, independent of one another.
 
@@ -142,6 +149,7 @@ class Batch:
         names = compiled.settings.checkers
         self.checks = [StepChecks(compiled, names) for _ in range(rows)] if names else []
         self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
+        self._scene = _identity(compiled.scene.model)
 
     def __repr__(self) -> str:
         """The arm, the sizes of the tables, and what may be touched."""
@@ -223,6 +231,7 @@ class Batch:
         # forward.
         derived = {name: getattr(data, name).copy() for name in DERIVED}
         return {
+            "scene": self._scene,
             "physics": physics,
             "derived": derived,
             "plant": np.array(self.plants[i].state()),
@@ -235,8 +244,16 @@ class Batch:
         """Go back to what :meth:`get_state` gave.
 
         Raises:
-            ValueError: a state of another scene.
+            ValueError: a state of another scene, or none that :meth:`get_state` gave. Nothing is
+                changed, unless its arrays are damaged.
         """
+        there = self.get_state(i)
+        if not isinstance(state, dict) or not there.keys() <= state.keys():
+            raise ValueError("state: expected what get_state() gave")
+        if state["scene"] != there["scene"]:
+            raise ValueError("state: of another scene")
+        if (state["detector"] is None) != (there["detector"] is None):
+            raise ValueError("state: of an environment with another detector")
         self._become(i, {name: values.copy() for name, values in state["drawn"].items()})
         data, model = self.datas[i], self.model(i)
         if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):

@@ -66,6 +66,26 @@ def test_a_state_of_another_scene_is_refused():
         other.set_state(one.get_state())
 
 
+def test_a_state_of_another_arm_or_detector_and_what_is_no_state_are_refused():
+    env = gym.make("tauguard/Reach-v0").unwrapped
+    env.reset(seed=0)
+    state = env.get_state()
+    for keywords, said in (
+        ({"robot": "cura6-long"}, "another scene"),  # of the same sizes
+        ({"detector": "observer"}, "another detector"),
+    ):
+        other = gym.make("tauguard/Reach-v0", **keywords).unwrapped
+        other.reset(seed=1)
+        own = other.get_state()
+        with pytest.raises(ValueError, match=said):
+            other.set_state(state)
+        np.testing.assert_array_equal(other.get_state()["physics"], own["physics"])
+    for damaged in (None, {}, "state", {k: v for k, v in state.items() if k != "rng"}):
+        with pytest.raises(ValueError, match="expected what get_state"):
+            env.set_state(damaged)
+    env.set_state(state)
+
+
 def test_a_state_with_numbers_that_no_plant_gives_is_refused_and_changes_nothing():
     env = gym.make("tauguard/React-v1", obstacles=("person",)).unwrapped
     env.reset(seed=3)
