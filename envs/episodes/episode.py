@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from tauguard.envs.episodes.motions import check_percent
+from tauguard.envs.episodes.motions import check_load, check_percent
 from tauguard.models import Mismatch, SceneObject
 from tauguard.traces import KINDS
 
@@ -92,9 +92,8 @@ class Episode:
         if self.temperature is not None and not math.isfinite(self.temperature):
             raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
         check_percent(self.speed)
-        loads = [self.payload_g, *(pick.payload_g for pick in self.picks)]
-        if not all(0 <= load < math.inf for load in loads):
-            raise ValueError("payload_g: expected 0 or more grams")
+        for load in (self.payload_g, *(pick.payload_g for pick in self.picks)):
+            check_load(load)
         times = [plan.time for plan in self.collisions] + [pick.time for pick in self.picks]
         for time in times:
             if not 0 <= time < self.seconds:

@@ -79,6 +79,12 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
     return float(max(by_speed.max(), by_acceleration.max(), 0.2))
 
 
+def check_load(grams: float) -> None:
+    """Raise a ``ValueError`` unless ``grams`` is a payload that a simulation can hold."""
+    if not 0 <= grams <= 1e6:
+        raise ValueError(f"payload_g {grams}: expected 0 to 1,000,000 grams")
+
+
 def check_percent(speed: float) -> None:
     """Raise a ``ValueError`` unless ``speed`` is a percentage that cannot be a fraction."""
     if not 1 < speed <= 100:

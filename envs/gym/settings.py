@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from tauguard.envs.episodes.motions import check_load
 from tauguard.envs.gym.randomization import distributions
 from tauguard.models import (
     BODY_REGIONS,
@@ -26,6 +28,17 @@ from tauguard.models.scene import INTEGRATORS
 
 #: Control modes, in the native order; their units stand in :mod:`tauguard.envs.gym.actions`.
 CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian")
+#: Kinds of the keywords that are no words, and what an error says of them.
+_SEVERAL = "one, or a tuple of them"
+_KINDS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("timestep", "control_rate", "payload_g"), (Real, "a number")),
+    **dict.fromkeys(("max_speed", "contact_area"), (Real | None, "a number or None")),
+    "table": (Table | None, "a tauguard.models.Table or None"),
+    "cloth": (Cloth | None, "a tauguard.models.Cloth or None"),
+    "checkers": (Iterable, _SEVERAL),
+    "obstacles": (Iterable | BodyProxy | Person, _SEVERAL),
+    "objects": (Iterable | SceneObject | os.PathLike, _SEVERAL),
+}
 #: Detectors that need no file.
 DETECTORS = ("observer",)
 #: The obstacle that is a whole person.
@@ -80,6 +93,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is wrong and what would work."""
+        for name, (kind, words) in _KINDS.items():
+            if not isinstance(getattr(self, name), kind):
+                raise ValueError(f"{name} {getattr(self, name)!r}: expected {words}")
         one_of("control", self.control, CONTROLS)
         one_of("integrator", self.integrator, tuple(INTEGRATORS))
         for name in ("timestep", "control_rate"):
@@ -93,8 +109,7 @@ class Settings:
                 f"control_rate {self.control_rate} Hz at a timestep of {self.timestep} s: "
                 f"{steps:g} physics steps an action; expected a whole number, 1 or more"
             )
-        if not (np.isfinite(self.payload_g) and self.payload_g >= 0):
-            raise ValueError(f"payload_g {self.payload_g}: expected 0 or more grams")
+        check_load(self.payload_g)
         if isinstance(self.mismatch, int):
             object.__setattr__(self, "mismatch", Mismatch(seed=self.mismatch))
         if not (self.mismatch is None or isinstance(self.mismatch, Mismatch)):

@@ -45,6 +45,8 @@ individuals = [10]
         ("simulate --out new --mismatch-seed -3", "--mismatch-seed -3: expected 0 or more"),
         ("simulate --out new --arm-joints a,b", "leave `joints` out"),
         ("simulate --out new --collisions 0 --seconds 1e-9", "expected two steps"),
+        ("simulate --out new --payloads-g 1e12", "expected 0 to 1,000,000 grams"),
+        ("watch Reach-v0 --set table=1", "table 1: expected a tauguard.models.Table or None"),
         ("simulate --out log.csv --episodes 1", "expected a folder, or a new name"),
         ("train --traces new --model .", "--model .: is a folder"),
         ("train --traces new --detector os:path", "cannot be made without arguments"),

@@ -79,7 +79,7 @@ def test_info_has_the_same_keys_types_and_shapes_at_every_step():
         ({"control_rate": 333}, "whole number"),
         ({"control_rate": np.nan}, "above 0"),
         ({"timestep": -1}, "above 0"),
-        ({"payload_g": -1}, "0 or more"),
+        ({"payload_g": -1}, "0 to 1,000,000 grams"),
         ({"obstacles": ("tail",)}, "lower_arm"),
         ({"detector": "crystal ball"}, "observer"),
         ({"detector": 3}, "CollisionAlarm"),
@@ -87,6 +87,13 @@ def test_info_has_the_same_keys_types_and_shapes_at_every_step():
         ({"max_speed": 0}, "above 0"),
         ({"mismatch": "large"}, "a seed"),
         ({"checkers": "magic"}, "rigid"),
+        ({"table": True}, "table True: expected a tauguard.models.Table or None"),
+        ({"cloth": "silk"}, "cloth 'silk': expected a tauguard.models.Cloth or None"),
+        ({"checkers": None}, "checkers None: expected one, or a tuple of them"),
+        ({"objects": 3}, "objects 3: expected one, or a tuple of them"),
+        ({"control_rate": "fast"}, "control_rate 'fast': expected a number"),
+        ({"max_speed": {}}, "max_speed {}: expected a number or None"),
+        ({"payload_g": 1e9}, "expected 0 to 1,000,000 grams"),
     ],
 )
 def test_keywords_that_cannot_be_say_what_would_work(keywords, words):
