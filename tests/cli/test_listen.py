@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tauguard.cli import main
-from tauguard.cli.listen import Terminal, check_source, report
+from tauguard.cli.listen import Terminal, check_source, opened, report
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model, train
 from tauguard.detectors.alarms.monitor import Answer, Monitor, detect_with_faults
@@ -321,6 +321,15 @@ def test_a_pipe_that_says_nothing_is_a_fault(files, monkeypatch, capsys):
     assert fault["end"] == pytest.approx(0.5, abs=0.2)
     assert result["state"].startswith("fault: no samples")
     assert result["seconds"] == 0.0
+
+
+def test_what_reading_a_played_log_mended_is_said(alarm, struck, tmp_path, capsys):
+    rows = np.column_stack([struck.t, struck.q, struck.qd, struck.current])[:50]
+    rows[[20, 21]] = rows[[21, 20]]
+    names = ["t", *(f"{what}_{i}" for what in ("q", "qd", "current") for i in range(1, 7))]
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(names), comments="")
+    opened(None, 1, tmp_path / "a.csv", "auto", False, None, 0.0, alarm).close()
+    assert "note: a.csv: 1 times a row is earlier than the last: sorted" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -160,10 +160,13 @@ def opened(
     if ur is not None:
         return UrStream(ur, port, 1 / dt, reconnect)
     if play is not None:
+        from tauguard.cli.help_text import print_notes
         from tauguard.datasets.arm_logs import matched
         from tauguard.datasets.columns import column_map
 
-        return PlayedStream(matched(read_log(play, column_map(columns), names).trace, names))
+        log = read_log(play, column_map(columns), names)
+        print_notes(f"{play.name}: {note}" for note in log.notes)
+        return PlayedStream(matched(log.trace, names))
     if ros is not None:
         from tauguard.live.ros import RosStream
 
