@@ -82,7 +82,8 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
 def check_load(grams: float) -> None:
     """Raise a ``ValueError`` unless ``grams`` is a payload that a simulation can hold."""
     if not 0 <= grams <= 1e6:
-        raise ValueError(f"payload_g {grams}: expected 0 to 1,000,000 grams")
+        why = "" if grams > 0 else "a load has 0 or more grams; "
+        raise ValueError(f"payload_g {grams}: {why}expected 0 to 1,000,000 grams")
 
 
 def check_percent(speed: float) -> None:
