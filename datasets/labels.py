@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, runs
 
 #: Columns, in any case, that say whether something touches the arm, if each cell is a LABEL.
 LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
@@ -36,6 +36,5 @@ def labelled(
         marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
         if None in marks:
             continue
-        edges = np.flatnonzero(np.diff(np.array([False, *marks, False], dtype=int)))
-        return tuple((float(t[a]), float(t[b - 1])) for a, b in edges.reshape(-1, 2))
+        return tuple((float(t[a]), float(t[b - 1])) for a, b in runs(np.array(marks)))
     return None

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, runs
 from tauguard.detectors.faults.inputs import FASTEST
 from tauguard.traces.trace import Trace
 
@@ -139,9 +139,8 @@ def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
         peak = float(size.max(initial=0.0))
         if peak == 0 or peak < ABOVE * float(np.median(size)):
             continue
-        top = np.concatenate([[False], size == peak, [False]])
-        edges = np.flatnonzero(np.diff(top.astype(np.int8)))
-        starts, lengths = edges[::2], edges[1::2] - edges[::2]
+        starts, ends = runs(size == peak).T
+        lengths = ends - starts
         long = np.flatnonzero(lengths >= PLATEAU)
         if len(long):
             found.append((name, int(starts[long[0]]), int(lengths[long].max()), peak))

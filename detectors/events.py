@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tauguard.arrays import Array, Bools
+from tauguard.arrays import Array, Bools, runs
 from tauguard.traces.trace import Alarm, Collision, Trace
 
 #: Default t_c [s] (Park et al. 2021; the dissertation's value).
@@ -79,10 +79,10 @@ def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) ->
     times, up = np.asarray(t, dtype=np.float64), np.asarray(alarm, dtype=np.bool_)
     if times.shape != up.shape or times.ndim != 1:
         raise ValueError(f"t and alarm: shapes {times.shape} and {up.shape}, expected (T,) twice")
-    edges = np.diff(np.concatenate(([0], up.astype(np.int8), [0])))
-    starts, ends = times[edges[:-1] == 1], times[edges[1:] == -1]
+    starts, after = runs(up).T
     if not len(starts):
         return ()
+    starts, ends = times[starts], times[after - 1]
     apart = starts[1:] - ends[:-1] >= merge_gap
     first = np.concatenate(([True], apart))
     last = np.concatenate((apart, [True]))

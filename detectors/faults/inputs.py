@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, runs
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.faults.torques import torque_ratios
@@ -162,8 +162,7 @@ def _stuck(trace: Trace) -> Counts:
 
 def _longest_run(mask: NDArray[np.bool_]) -> int:
     """Length of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return int(np.diff(runs(mask), axis=1).max(initial=0))
 
 
 def input_fault(usual: UsualInput, number: int, joint: int, value: float) -> str:

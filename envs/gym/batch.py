@@ -69,9 +69,10 @@ class Override(IntEnum):
 
 #: What an action did to each body region, names of :class:`Batch`'s arrays and of ``info``.
 TOUCHES = ("region_force", "region_pressure", "region_point", "region_direction")
-#: A snapshot holds MuJoCo's integration state, derived fields that are read before the next physics
-#: step, and the rows of a copy.
+#: A snapshot holds, among its keys, MuJoCo's integration state, derived fields that are read before
+#: the next physics step, and the rows of a copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+KEYS = {"scene", "physics", "derived", "plant", "rows", "detector", "drawn"}
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
     "observation", "numbers", "tau_ext", "residual", "alarm", "target", "contacts",
@@ -247,12 +248,13 @@ class Batch:
             ValueError: a state of another scene, or none that :meth:`get_state` gave. Nothing is
                 changed, unless its arrays are damaged.
         """
-        there = self.get_state(i)
-        if not isinstance(state, dict) or not there.keys() <= state.keys():
+        if not isinstance(state, dict) or not state.keys() >= KEYS:
             raise ValueError("state: expected what get_state() gave")
-        if state["scene"] != there["scene"]:
+        if state["scene"] != self._scene:
             raise ValueError("state: of another scene")
-        if (state["detector"] is None) != (there["detector"] is None):
+        listener = self.sensing[i].detector if self.sensing else None
+        own = listener.get_state() if listener else None
+        if (state["detector"] is None) != (own is None):
             raise ValueError("state: of an environment with another detector")
         self._become(i, {name: values.copy() for name, values in state["drawn"].items()})
         data, model = self.datas[i], self.model(i)
@@ -266,7 +268,7 @@ class Batch:
             getattr(self, name)[i : i + 1] = values
         if self.sensing is not None:
             self.sensing[i].reset()
-            listener = self.sensing[i].detector
+            listener = self.sensing[i].detector  # the reset has made another
             if listener is not None:
                 listener.set_state(state["detector"])
 

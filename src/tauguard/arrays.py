@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 #: Array of doubles; docstrings give units and shapes.
 Array = NDArray[np.float64]
@@ -13,6 +13,12 @@ Bools = NDArray[np.bool_]
 
 #: Largest array, in elements, and largest text, in characters, that a message shows whole.
 FEW, SHORT = 7, 60
+
+
+def runs(mask: ArrayLike) -> NDArray[np.int64]:
+    """First row, and the row after the last, of each run of True in a mask (T,). Shape (K, 2)."""
+    padded = np.concatenate([[False], np.asarray(mask, dtype=np.bool_), [False]])
+    return np.flatnonzero(np.diff(padded.astype(np.int8))).reshape(-1, 2)
 
 
 def in_a_line(value: Any) -> str:
