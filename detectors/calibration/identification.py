@@ -257,11 +257,19 @@ def _fit(
         if not held:
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
             gain = gain / np.clip(1 + solution[system.gain : system.load], 0.5, 2.0)
-    bodies = slice(INERTIAL * robot.joints)
-    spread = np.sqrt(np.diag(np.linalg.inv(matrix))[bodies])
-    spread[spread**2 > 0.5 * deviations[bodies] ** 2] = np.nan
     found = _result(arm, system, solution, gain, rms, friction)
-    return replace(found, inertial_error=spread.reshape(-1, INERTIAL)), error
+    return replace(found, inertial_error=_spread(matrix, deviations, robot.joints)), error
+
+
+def _spread(matrix: Array, deviations: Array, joints: int) -> Array:
+    """Standard deviations of the inertial numbers, shape (n, 10); NaN: the logs hardly show them.
+
+    A number is shown where the logs leave less than half of the variance of its prior.
+    """
+    bodies = slice(INERTIAL * joints)
+    found: Array = np.sqrt(np.diag(np.linalg.inv(matrix))[bodies])
+    found[found**2 > 0.5 * deviations[bodies] ** 2] = np.nan
+    return found.reshape(-1, INERTIAL)
 
 
 def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:

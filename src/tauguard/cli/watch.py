@@ -54,14 +54,9 @@ def command(
         raise ValueError(f"seconds {seconds}: expected above 0")
     keywords, learned = parsed(set), None
     if policy not in WORDS:
-        from tauguard.envs.policies import MlpPolicy
-
-        if not Path(policy).is_file():
-            raise ValueError(f"policy {policy}: no such file; expected one, or {', '.join(WORDS)}")
-        learned = MlpPolicy.load(policy)
-        keywords = {"id": name, **learned.environment, **keywords}
-        if (trained := keywords.pop("id").removeprefix("tauguard:")) != name:
-            raise ValueError(f"policy {policy}: it was trained in {trained}, not in {name}")
+        learned = policy_of(policy, name)
+        own = {key: value for key, value in learned.environment.items() if key != "id"}
+        keywords = own | keywords
     if policy == "target":
         if keywords.get("control", "cartesian") != "cartesian":
             raise ValueError("policy target needs control=cartesian; use --policy random or still")
@@ -77,6 +72,18 @@ def command(
 
         env = RecordMcap(env, save)
     run(env, learned or policy, seconds, seed, save, port)
+
+
+def policy_of(file: str, name: str) -> Any:
+    """The policy in a file, if it was trained in the environment of that name."""
+    from tauguard.envs.policies import MlpPolicy
+
+    if not Path(file).is_file():
+        raise ValueError(f"policy {file}: no such file; expected one, or {', '.join(WORDS)}")
+    policy = MlpPolicy.load(file)
+    if (trained := policy.environment.get("id", name).removeprefix("tauguard:")) != name:
+        raise ValueError(f"policy {file}: it was trained in {trained}, not in {name}")
+    return policy
 
 
 def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
