@@ -74,9 +74,16 @@ def followed_fields(model: Any, options: Regions) -> Regions:
 
 
 @functools.cache
-def _structure() -> tuple[str, ...]:
+def _fields() -> dict[str, NDArray[Any]]:
+    """Every array of a model without objects: the names and kinds of all models' fields."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    names = [name for name in dir(model) if _STRUCTURE.match(name)]
+    fields = {name: getattr(model, name) for name in dir(model)}
+    return {name: field for name, field in fields.items() if isinstance(field, np.ndarray)}
+
+
+@functools.cache
+def _structure() -> tuple[str, ...]:
+    names = filter(_STRUCTURE.match, _fields())
     return tuple(name for name in names if not _NOT_STRUCTURE.match(name))
 
 
@@ -118,12 +125,11 @@ def hull_rows(model: Any) -> NDArray[np.int64]:
 @functools.cache
 def _rules() -> dict[str, int]:
     """The rule of each field of doubles of the objects."""
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    fields = {name: getattr(model, name) for name in dir(model) if _OBJECTS.match(name)}
-    rules = {}
-    for name, field in fields.items():
-        if isinstance(field, np.ndarray) and field.dtype == np.float64:
-            rules[name] = _NOT_NAN if _LIMITS.search(name) else _FINITE
+    rules = {
+        name: _NOT_NAN if _LIMITS.search(name) else _FINITE
+        for name, field in _fields().items()
+        if _OBJECTS.match(name) and field.dtype == np.float64
+    }
     return rules | dict.fromkeys(_MASSES, _NOT_NEGATIVE)
 
 
