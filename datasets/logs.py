@@ -21,8 +21,8 @@ from tauguard.untrusted_input import reading
 
 #: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
-#: Rows that repeat the state are left out if they are at least this fraction: then the recorder is
-#: faster than its robot. Below it, a standing arm may repeat its values by chance.
+#: Rows that repeat the state are left out if they are at least this fraction of all rows: then the
+#: recorder is faster than its robot. Below it, a standing arm may repeat its values by chance.
 REPEATED = 0.2
 
 

@@ -58,6 +58,6 @@ class Step:
         return center, turn.as_matrix() @ self.xmat[geoms]
 
     def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
-        """Bound of the motion by rotation of points within ``radius`` (K,) of the centre."""
+        """Upper bound of how far rotation moves points within ``radius`` (K,) of the centre [m]."""
         spin = np.linalg.norm(self.turn[geoms], axis=1)
         return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))
