@@ -111,7 +111,7 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
     resource_tracker.ensure_running()  # start() would otherwise start it and unblock Ctrl-C
-    with _stop_signals_deferred(), _ctrl_c_blocked():
+    with _stop_signals_deferred(), _ctrl_c_blocked(), _without_opengl():
         process.start()
         crew[ours] = process
     theirs.close()
@@ -152,6 +152,22 @@ def _ctrl_c_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _without_opengl() -> Iterator[None]:
+    """Let MuJoCo load no OpenGL in processes started here; workers draw nothing.
+
+    GLFW asks for its version in one more process, which reports a stop as a broken pipe.
+    """
+    before = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        os.environ.pop("MUJOCO_GL")
+        if before is not None:
+            os.environ["MUJOCO_GL"] = before
 
 
 def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:

@@ -129,6 +129,14 @@ def test_results_of_workers_are_complete_and_errors_come_through():
         list(in_processes(math.sqrt, [1.0, -1.0, 4.0], 2))
 
 
+def test_workers_load_no_opengl(monkeypatch):
+    """GLFW's check of its version, one more process, would report a stop as a broken pipe."""
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    loaded = "__import__('mujoco') and 'glfw' in __import__('sys').modules"
+    assert list(in_processes(eval, [loaded] * 2, 2)) == [False, False]
+    assert "MUJOCO_GL" not in os.environ
+
+
 def test_a_damaged_shard_is_found_named_and_made_again_alone(tiny, tiny_toml, tmp_path):
     folder = tmp_path / "damaged"
     shutil.copytree(tiny, folder)
