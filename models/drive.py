@@ -6,11 +6,12 @@ Units are those of the joint side: ``tau = gain * current`` with the gain in N m
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array, in_a_line
+from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
 from tauguard.models.left_over import LeftOver, Player
@@ -161,29 +162,31 @@ class Sensors:
         Raises:
             ValueError: signals whose shapes differ, or are not (T, n) of these sensors.
         """
-        if not (q.shape == qd.shape == current.shape and q.shape[-1:] == self.current_noise.shape):
+        if not (q.shape == qd.shape == current.shape and q.shape[1:] == self.current_noise.shape):
             raise ValueError(
                 f"measure: shapes {q.shape}, {qd.shape}, {current.shape}; "
                 f"expected (T, {len(self.current_noise)}) each"
             )
-        amperes = current + rng.normal(size=current.shape) * self.current_noise
+        measured = np.empty((3, *q.shape))
+        measured[0] = q
+        noise = rng.standard_normal(q.shape) * self.current_noise
+        np.add(current, noise, out=measured[2])
         if player is not None:
-            amperes += player.next(qd)
-        speed = qd + rng.normal(size=qd.shape) * self.velocity_noise
-        return (
-            _rounded(q, self.position_quantum),
-            _rounded(speed, self.velocity_quantum),
-            _rounded(amperes, self.current_quantum),
-        )
+            measured[2] += player.next(qd)
+        np.add(qd, rng.standard_normal(q.shape) * self.velocity_noise, out=measured[1])
+        quanta, given = self._grids
+        rounded = measured / quanta
+        np.rint(rounded, out=rounded)
+        rounded *= quanta
+        np.copyto(measured, rounded, where=given)
+        return measured[0], measured[1], measured[2]
 
-
-def _rounded(signal: Array, quantum: Array | float) -> Array:
-    """Round to the nearest multiple of ``quantum``; a quantum of 0 changes nothing."""
-    given = np.asarray(quantum) > 0
-    if given.all():
-        return np.rint(signal / quantum) * quantum
-    step = np.where(given, quantum, 1.0)
-    return np.where(given, np.rint(signal / step) * step, signal)
+    @cached_property
+    def _grids(self) -> tuple[Array, Bools]:
+        """Quanta of q, qd and current, shape (3, 1, n), 1 for a quantum of 0; which are not 0."""
+        each = (self.position_quantum, self.velocity_quantum, self.current_quantum)
+        quanta = np.array([np.broadcast_to(one, self.current_noise.shape) for one in each])[:, None]
+        return np.where(quanta > 0, quanta, 1.0), quanta > 0
 
 
 #: Parts that :meth:`Drive.without` can leave out: all friction; three parts of it (the higher level

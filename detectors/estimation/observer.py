@@ -128,7 +128,7 @@ class MomentumObserver:
         self.robot = robot
         self.gain = per_joint("gain", gain, robot.joints)
         self.dt = float(intervals(dt, 2)[0])
-        self._native = _observer.Observer(robot.chain, self.gain)
+        self.native = _observer.Observer(robot.chain, self.gain)
 
     def reset(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | None = None) -> None:
         """Start again from the sample ``(q, qd, tau)`` before the next step. The residual is zero.
@@ -143,11 +143,11 @@ class MomentumObserver:
         at, speed = rows("q", np.atleast_2d(q), n), rows("qd", np.atleast_2d(qd), n)
         if tau is None:
             tau = -momentum_terms(self.robot, at, speed, threads=1)[1]
-        self._native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
+        self.native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
 
     def get_state(self) -> Array:
         """Its state between two steps, for :meth:`set_state`, shape (1 + 4 n,)."""
-        return np.array(self._native.state())
+        return np.array(self.native.state())
 
     def set_state(self, state: Array) -> None:
         """Go back to what :meth:`get_state` gave.
@@ -155,7 +155,7 @@ class MomentumObserver:
         Raises:
             ValueError: a state of an arm with other joints.
         """
-        self._native.restore(state.tolist())
+        self.native.restore(state.tolist())
 
     def step(
         self,
@@ -183,10 +183,10 @@ class MomentumObserver:
         if out is None:
             out = np.empty_like(self.gain)
         try:
-            if self._native.started:
-                self._native.step(q, qd, tau, self.dt if dt is None else dt, out)
+            if self.native.started:
+                self.native.step(q, qd, tau, self.dt if dt is None else dt, out)
             else:
-                self._native.reset(q, qd, tau)
+                self.native.reset(q, qd, tau)
                 out[:] = 0.0
         except TypeError:
             n = self.robot.joints

@@ -191,6 +191,45 @@ void bind_chain(nb::module_& m) {
           "link"_a, "q"_a, "qd"_a, "p"_a.noconvert(), "beta"_a.noconvert(), "threads"_a);
 }
 
+// Samples in turn of an observer with fixed thresholds: residuals, and where one is beyond its
+// bound. Numbers of the joints, a row each: drive gain, Coulomb friction (times `direction`),
+// viscous friction, least and largest position, bound of the residual. Beyond these positions, and
+// for `hold` samples after, a joint feels its stop and its residual counts as 0; `left` has what is
+// left of them.
+void alarms(Observer& observer, In2 q, In2 qd, In2 direction, In2 current, In2 numbers, double dt,
+            std::int64_t hold, nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig> left, Out2 out,
+            nb::ndarray<bool, nb::ndim<1>, nb::c_contig> up) {
+  same_rows(observer.chain(), q, qd, direction, current, out);
+  const std::size_t rows = q.shape(0), n = q.shape(1);
+  require(
+      numbers.shape(0) == 6 && numbers.shape(1) == n && left.shape(0) == n && up.shape(0) == rows,
+      "alarms: arrays differ in shape");
+  for (const In2* signal : {&q, &qd, &current})
+    require(finite(signal->data(), rows * n), "q, qd, current: every entry must be finite");
+  const double *gain = numbers.data(), *coulomb = gain + n, *viscous = coulomb + n,
+               *low = viscous + n, *high = low + n, *bound = high + n;
+  std::vector<double> tau(n);
+  for (std::size_t t = 0, at = 0; t < rows; ++t, at += n) {
+    const double *position = q.data() + at, *speed = qd.data() + at;
+    for (std::size_t j = 0; j < n; ++j)
+      tau[j] = gain[j] * current.data()[at + j] - coulomb[j] * direction.data()[at + j] -
+               viscous[j] * speed[j];
+    if (observer.started())
+      observer.step(position, speed, tau.data(), dt);
+    else
+      observer.reset(position, speed, tau.data());
+    up.data()[t] = false;
+    for (std::size_t j = 0; j < n; ++j) {
+      std::int64_t& waits = left.data()[j];
+      const bool beyond = position[j] < low[j] || position[j] > high[j];
+      waits = beyond ? hold : std::max<std::int64_t>(waits - 1, 0);
+      const double residual = waits > 0 ? 0.0 : observer.residual()[j];
+      out.data()[at + j] = residual;
+      up.data()[t] |= std::fabs(residual) > bound[j];
+    }
+  }
+}
+
 void bind_observer(nb::module_& m) {
   nb::class_<Observer>(m, "Observer")
       .def(
@@ -226,7 +265,9 @@ void bind_observer(nb::module_& m) {
             const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
             std::copy(r, r + q.shape(0), out.data());
           },
-          "q"_a, "qd"_a, "tau"_a, "dt"_a, "out"_a.noconvert());
+          "q"_a, "qd"_a, "tau"_a, "dt"_a, "out"_a.noconvert())
+      .def("alarms", &alarms, "q"_a, "qd"_a, "direction"_a, "current"_a, "numbers"_a, "dt"_a,
+           "hold"_a, "left"_a.noconvert(), "out"_a.noconvert(), "up"_a.noconvert());
 }
 
 }  // namespace

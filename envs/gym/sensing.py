@@ -73,42 +73,15 @@ class Listener(Protocol):
         """Go back to what :meth:`get_state` gave."""
 
 
-class JointEnds:
-    """Removes the torque of the joints' stops from residuals, sample by sample.
-
-    A stop acts on its own joint only. While a joint is near an end of its range, and until the
-    observer has forgotten it, its residual counts as zero. A collision that only this joint would
-    show is not detected meanwhile.
-    """
-
-    def __init__(self, ranges: Array, dt: float, gain: float) -> None:
-        """For one arm.
-
-        Args:
-            ranges: of the joints [rad], infinite where free, shape (n, 2).
-            dt: sample interval of the samples [s].
-            gain: gain of the observer [1/s].
-        """
-        self._low, self._high = ranges[:, 0] + MARGIN, ranges[:, 1] - MARGIN
-        self._hold = round(FORGOTTEN / (gain * dt))
-        #: Samples that each joint's residual still counts as zero, shape (n,).
-        self.left = np.zeros(len(ranges), dtype=np.int64)
-
-    def clear(self, q: Array, residuals: Array) -> None:
-        """Samples in turn: positions (T, n) [rad]; residuals (T, n) are changed in place."""
-        near = (q < self._low) | (q > self._high)
-        if not (near.any() or self.left.any()):
-            return
-        for row in range(len(q)):
-            self.left = np.where(near[row], self._hold, np.maximum(self.left - 1, 0))
-            residuals[row, self.left > 0] = 0.0
-
-
 class ObserverListener:
     """The momentum observer with fixed thresholds: nothing is trained, so any arm can have it.
 
     The nominal Coulomb and viscous friction is compensated; the static friction decides the
     threshold. A trained detector is several times as sensitive.
+
+    The stop of a joint acts on it alone. While a joint is near an end of its range, and until the
+    observer has forgotten it, its residual counts as zero. A collision that only this joint would
+    show is not detected meanwhile.
     """
 
     name, settle, fault = "observer", 0.0, ""
@@ -130,35 +103,40 @@ class ObserverListener:
             gain: gain of the observer [1/s].
             ranges: of the joints [rad], (n, 2): a joint at an end of its range feels its stop.
         """
-        free = np.tile([-np.inf, np.inf], (robot.joints, 1))
-        self._ends = JointEnds(free if ranges is None else ranges, dt, gain)
         self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
-        bounds = TORQUE_FACTOR * limit
-        if drive.friction is not None:
-            bounds = bounds + FRICTION_FACTOR * drive.friction.static
+        bounds, none = TORQUE_FACTOR * limit, np.zeros(robot.joints)
+        friction = drive.friction
+        if friction is not None:
+            bounds = bounds + FRICTION_FACTOR * friction.static
         self.bounds: Array = np.where(np.isfinite(bounds), bounds, PLAIN_THRESHOLD)
+        coulomb, viscous = (friction.coulomb, friction.viscous) if friction else (none, none)
+        low, high = (none - np.inf, none + np.inf) if ranges is None else ranges.T
+        self._numbers = np.array(
+            [drive.gain, coulomb, viscous, low + MARGIN, high - MARGIN, self.bounds]
+        )
+        self._hold = round(FORGOTTEN / (gain * dt))
+        #: Samples that each joint's residual still counts as zero, shape (n,).
+        self._left = np.zeros(robot.joints, dtype=np.int64)
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """An alarm is up where a residual exceeds its bound."""
-        tau = self._drive.gain * current
-        friction = self._drive.friction
-        if friction is not None:
-            tau = tau - friction.coulomb * np.tanh(qd / STANDSTILL) - friction.viscous * qd
-        residuals, step = np.empty_like(q), self._observer.step
-        for row in range(len(q)):
-            step(q[row], qd[row], tau[row], out=residuals[row])
-        self._ends.clear(q, residuals)
-        return residuals, np.any(np.abs(residuals) > self.bounds, axis=1)
+        residuals, alarms = np.empty_like(q), np.empty(len(q), dtype=np.bool_)
+        direction = np.tanh(qd / STANDSTILL)
+        signals, own = (q, qd, direction, current), self._observer
+        own.native.alarms(
+            *signals, self._numbers, own.dt, self._hold, self._left, residuals, alarms
+        )
+        return residuals, alarms
 
     def get_state(self) -> Any:
         """See :class:`Listener`."""
-        return self._observer.get_state(), self._ends.left.copy()
+        return self._observer.get_state(), self._left.copy()
 
     def set_state(self, state: Any) -> None:
         """See :class:`Listener`."""
         self._observer.set_state(state[0])
-        self._ends.left = state[1].copy()
+        self._left = state[1].copy()
 
 
 class AlarmListener:
@@ -377,4 +355,5 @@ class Sensing:
         n = q.shape[1]
         observation[:n], observation[n : 2 * n] = q[-1], qd[-1]
         observation[2 * n : 3 * n] = self._gain * current[-1]
-        np.clip(observation, self._low, self._high, out=observation)
+        np.maximum(observation, self._low, out=observation)
+        np.minimum(observation, self._high, out=observation)

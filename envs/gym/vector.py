@@ -106,9 +106,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         mask = self._chosen((options or {}).get("reset_mask"))
         for k in np.flatnonzero(mask):
             self._begin(int(k), stated)
-        return self.batch.observation.copy(), self._infos(
-            self._no_reward(), np.zeros_like(mask), mask
-        )
+        none = np.zeros_like(mask)
+        infos = self._infos(self._no_reward(), none, mask, self._metrics())
+        return self.batch.observation.copy(), infos
 
     def _chosen(self, mask: Any) -> Bools:
         if mask is None:
@@ -153,12 +153,15 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         truncated = (diverged | late) & going
         terms = {name: np.where(going, term, 0.0) for name, term in terms.items()}
         rewards = sum(terms.values(), np.zeros(self.num_envs))
-        for i in np.flatnonzero(~going):
+        fresh = (~going).nonzero()[0]
+        for i in fresh:
             self._begin(int(i))
-        infos = self._infos(terms, successes & going, np.ones_like(going))
+        if fresh.size:
+            step = self._metrics()
+        infos = self._infos(terms, successes & going, np.ones_like(going), step)
         infos["reason"][terminated & successes] = task.ended
         infos["reason"][terminated & ~successes] = task.failed
-        for i in np.flatnonzero(successes & going & ~diverged):
+        for i in (successes & going & ~diverged).nonzero()[0]:
             task.after(int(i), self._rngs[i])
         self._over = terminated | truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
@@ -179,7 +182,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             final[f"_{key}"] = done.copy()
         for i in np.flatnonzero(done):
             self._begin(int(i))
-        fresh = self._infos(self._no_reward(), np.zeros_like(done), done)
+        fresh = self._infos(self._no_reward(), np.zeros_like(done), done, self._metrics())
         for key in [k for k in infos if not k.startswith("_")]:
             infos[key][done] = fresh[key][done]
         return {
@@ -196,10 +199,12 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def _no_reward(self) -> dict[str, Array]:
         return {name: np.zeros(self.num_envs) for name in self.task.terms}
 
-    def _infos(self, terms: dict[str, Array], success: Bools, mask: Bools) -> dict[str, Any]:
-        batch, area, step = self.batch, self.compiled.settings.contact_area, self._metrics()
+    def _infos(
+        self, terms: dict[str, Array], success: Bools, mask: Bools, step: StepMetrics
+    ) -> dict[str, Any]:
+        batch, area = self.batch, self.compiled.settings.contact_area
         reason = np.full(self.num_envs, "", dtype=object)
-        for i in np.flatnonzero(step.diverged):
+        for i in step.diverged.nonzero()[0]:
             reason[i] = divergence(self.compiled, step.diverged[i])
         infos: dict[str, Any] = {
             "time": step.time,
@@ -220,9 +225,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "reason": reason,
         } | {name: rows.copy() for name, rows in self._arrays.items()}
         infos |= {f"reward_{name}": term for name, term in terms.items()}
-        for key in list(infos):
-            infos[f"_{key}"] = mask.copy()
-        return infos
+        shown = mask.copy()
+        return infos | {f"_{key}": shown for key in infos}
 
     def render(self) -> Any:
         """Pictures of the first copy, one a call."""
