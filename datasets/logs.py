@@ -4,6 +4,7 @@ import csv
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from math import isfinite
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -296,31 +297,40 @@ def parse(
             cut = len(row) < width and index == len(rows) - 1
             more = "; to leave the last row out, say --mend tail" if cut else ""
             raise ValueError(f"line {line}: {len(row)} columns, expected {width}{more}")
-        found = [number(row[i]) for i in wanted]
-        bad = next((i for i, v in zip(wanted, found, strict=True) if v is None), None)
-        if bad is not None and (row[bad].strip() or "nan" not in columns.repair):
-            raise ValueError(
-                f"line {line}, {column_text(bad, header)}: {row[bad]!r} is not a number"
-            )
-        cells = [np.nan if v is None else v for v in found]
-        if not np.isfinite(cells).all():
-            if "nan" in columns.repair:
-                dropped.append(line)
+        try:
+            cells = [float(row[i]) for i in wanted]
+            if all(map(isfinite, cells)):
+                values.append(cells)
+                lines.append(line)
                 continue
-            bad = wanted[int(np.flatnonzero(~np.isfinite(cells))[0])]
-            cell = row[bad].strip() or "empty"
-            raise ValueError(
-                f"line {line}, {column_text(bad, header)}: {cell}, not finite; to "
-                "leave such rows out, say --mend nan"
-            )
-        values.append(cells)
-        lines.append(line)
+        except ValueError:
+            pass
+        _lacking(row, wanted, line, columns, header)
+        dropped.append(line)
     if dropped:
         notes.append(
             f"{len(dropped)} rows without finite numbers left out, first: line {dropped[0]}"
         )
     table = np.array(values, np.float64).reshape(len(values), len(wanted))
     return table, np.array(lines, np.int64), notes
+
+
+def _lacking(
+    row: Sequence[str], wanted: Sequence[int], line: int, columns: ColumnMap, header: Sequence[str]
+) -> None:
+    """Refuse a row with a cell that is no finite number, unless "nan" mends it."""
+    for i in wanted:
+        cell, value = row[i].strip(), number(row[i])
+        if value is not None and isfinite(value):
+            continue
+        said = f"{row[i]!r} is not a number" if value is None else f"{cell}, not finite"
+        if cell and value is None:
+            raise ValueError(f"line {line}, {column_text(i, header)}: {said}")
+        if "nan" not in columns.repair:
+            raise ValueError(
+                f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
+                "--mend nan"
+            )
 
 
 def increasing(

@@ -14,11 +14,12 @@ from tauguard.detectors.calibration.assessment import (
     OUTLYING,
     OUTLYING_IN_DOUBT,
     UNEXPLAINED_LADEN,
+    LeftOver,
     explained,
     outlier,
     start_gains,
 )
-from tauguard.detectors.calibration.recording import Load, Recording, moves
+from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.dynamics.robot import holding
 from tauguard.models import pin_model
 from tauguard.traces import Trace
@@ -202,25 +203,29 @@ def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
 
 
 def calibration_notes(
-    arm: ArmModel, logs: Mapping[str, Recording], held: Sequence[Any]
+    joints: Sequence[str],
+    left: Mapping[str, LeftOver],
+    logs: Mapping[str, Recording],
+    held: Sequence[Any],
 ) -> list[str]:
     """Notes on torque that a calibration does not explain, and on a log that may have had a load.
 
     Args:
-        arm: the identified arm.
+        joints: names.
+        left: what the calibration leaves of each log in which some joint moves, by file name.
         logs: by file name, with their loads.
         held: held-out residual of each [N m], (n,) each; empty: not known.
 
     Raises:
         ValueError: so much torque is unexplained that the logs cannot be the arm's as given.
     """
-    names, recordings, refused = list(logs), list(logs.values()), ""
-    bare = [k for k, r in enumerate(recordings) if r.load == Load() and moves(r.trace)]
-    laden = [r for r in recordings if r.load != Load() and moves(r.trace)]
+    names, refused = list(logs), ""
+    bare = [k for k, n in enumerate(names) if n in left and logs[n].load == Load()]
+    laden = [one for n, one in left.items() if logs[n].load != Load()]
     notes: tuple[str, ...] = ()
     try:
-        notes = explained(arm, [recordings[k] for k in bare])
-        notes += explained(arm, laden, limit=UNEXPLAINED_LADEN)
+        notes = explained(joints, [left[names[k]] for k in bare])
+        notes += explained(joints, laden, limit=UNEXPLAINED_LADEN)
     except ValueError as error:
         refused = str(error)
     doubtful = bool(notes or refused)
@@ -236,7 +241,7 @@ def calibration_notes(
         )
     given = [
         f"{r.load.mass:g} kg in {n}"
-        for n, r in zip(names, recordings, strict=True)
+        for n, r in logs.items()
         if r.load is not None and r.load.mass > 0
     ]
     if given and doubtful:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.identification import REAL_FRICTION, Beliefs, identify
+from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
     Load,
     Recording,
@@ -17,8 +17,7 @@ from tauguard.detectors.calibration.recording import (
     moves,
     moving_span,
 )
-from tauguard.detectors.calibration.regression import filtered
-from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.calibration.regression import Filtered, filtered
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import intervals, low_pass
@@ -48,53 +47,63 @@ WRONG_LOAD = (0.8, 0.3)
 #: is left over its median, at most. Up to 1.8 in 20 free logs of five arms, each alone; 4 to 9 in
 #: three logs of arms that were pushed.
 BURSTS = 2.5
+#: Rate of the observer [1/s].
+RATE = 20.0
 #: Shortest motion of a joint that is judged so [s], and times that a message lists.
 ENOUGH, SAID = 3.0, 6
 #: Slower joints are not judged [rad/s], because static friction hides their torque.
 FAST_ENOUGH = 0.05
 
 
-def residual_rms(
-    arm: ArmModel,
-    trace: Trace,
-    rate: float = 20.0,
-    unknowns: Unknowns | None = None,
-    stop: float = 0.0,
-) -> Array:
+def residual_rms(arm: ArmModel, trace: Trace) -> Array:
     """Root mean square of the observer's residual from the first motion to the last one.
 
     Args:
         arm: identified.
         trace: collision-free.
-        rate: rate of the observer [1/s].
-        unknowns: what is tracked meanwhile (default: nothing, the plain observer).
-        stop: seconds before the last motion that do not count, see
-            :func:`~tauguard.detectors.calibration.recording.moving_span`.
 
     Returns:
         [N m], shape (n,).
     """
-    estimator = Estimator(arm, rate, trace.dt, unknowns or Unknowns.none())
+    estimator = Estimator(arm, RATE, trace.dt, Unknowns.none())
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
-    level: Array = np.sqrt((left[moving_span(trace, stop=stop)] ** 2).mean(axis=0))
+    level: Array = np.sqrt((left[moving_span(trace)] ** 2).mean(axis=0))
     return level
 
 
-def _in_motion(arm: ArmModel, recording: Recording, rate: float) -> tuple[Array, Array, Bools]:
-    """What is left of a log's torque, the torque [N m], and where joints move, (T, n) each.
+@dataclass(frozen=True, eq=False)
+class LeftOver:
+    """What a calibration leaves of a log's torque; rows are samples."""
+
+    t: Array  #: [s], shape (T,)
+    left: Array  #: not explained [N m], shape (T, n)
+    torque: Array  #: [N m], shape (T, n)
+    moves: Bools  #: where a joint is fast enough to be judged, shape (T, n)
+
+
+def left_over(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, LeftOver]:
+    """What a calibration leaves of the torques of each log in which some joint moves.
 
     A load that is not known is tracked, so only what no load explains is left.
+
+    Args:
+        arm: identified.
+        recordings: collision-free, by name.
     """
+    return {n: _left_over(arm, r) for n, r in recordings.items() if moves(r.trace)}
+
+
+def _left_over(arm: ArmModel, recording: Recording) -> LeftOver:
     trace = recording.trace
     arm, load = laden(arm, recording.load)
     unknowns = Unknowns.none()
     if recording.load != Load():
         tracked = Unknowns.for_logs(load.mass, load.moment)
         unknowns = replace(tracked, offset=0.0, viscous=0.0, coulomb=0.0)
-    estimator = Estimator(arm, rate, trace.dt, unknowns)
+    estimator = Estimator(arm, RATE, trace.dt, unknowns)
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
-    moves = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
-    return left, trace.current * arm.drive_gain, moves
+    fast = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
+    return LeftOver(trace.t, left, trace.current * arm.drive_gain, fast)
 
 
 def _size(values: Array, rows: Bools) -> Array:
@@ -102,44 +111,37 @@ def _size(values: Array, rows: Bools) -> Array:
     return np.asarray(np.sqrt((np.where(rows, values, 0.0) ** 2).sum(axis=0)))
 
 
-def check_bursts(
-    arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording], rate: float = 20.0
-) -> None:
+def check_bursts(joints: Sequence[str], logs: Mapping[str, LeftOver]) -> None:
     """Refuse logs whose unexplained torque comes in bursts, as that of contacts does.
 
     Friction, loads and wrong numbers leave an error all along; contacts leave little between them.
 
     Args:
-        arm: identified from these logs.
-        names: of the recordings.
-        recordings: said to be collision-free; those in which no joint moves are not judged.
-        rate: rate of the observer [1/s].
+        joints: names.
+        logs: by name, under a calibration from them, see :func:`left_over`.
 
     Raises:
         ValueError: names each such log and the seconds.
     """
     found = []
-    for name, recording in zip(names, recordings, strict=True):
-        if not moves(recording.trace):
-            continue
-        left, torque, rows = _in_motion(arm, recording, rate)
-        whole = _size(torque, rows)
+    for name, log in logs.items():
+        t, left, rows = log.t, log.left, log.moves
+        whole = _size(log.torque, rows)
         fraction = _size(left, rows) / np.maximum(whole, FAINT * whole.max() + 1e-12)
-        judged = rows.sum(axis=0) * recording.trace.dt > ENOUGH
-        burst, level = np.zeros(arm.robot.joints), np.full(arm.robot.joints, np.inf)
+        judged = rows.sum(axis=0) * float(np.median(np.diff(t))) > ENOUGH
+        burst, level = np.zeros(len(joints)), np.full(len(joints), np.inf)
         for j in np.flatnonzero(judged):
             usual, level[j] = np.quantile(np.abs(left[rows[:, j], j]), (0.5, 0.99))
             burst[j] = fraction[j] * level[j] / max(usual, 1e-12)
         worst = int(np.argmax(burst))
         if burst[worst] > BURSTS:
-            t = recording.trace.t
             peaks = rows[:, worst] & (np.abs(left[:, worst]) > 0.5 * level[worst])
             starts = [f"{alarm.start - t[0]:.1f}" for alarm in find_alarms(t, peaks)]
             said = ", ".join(starts[:SAID]) + (", ..." if len(starts) > SAID else "")
             found.append(
                 f"{name}: {100 * fraction[worst]:.0f} % of the torque of "
-                f"{arm.robot.joint_names[worst]} in motion is not explained, and it comes in "
-                f"bursts, as contacts do, at {said} s after the beginning"
+                f"{joints[worst]} in motion is not explained, and it comes in bursts, as contacts "
+                f"do, at {said} s after the beginning"
             )
     if found:
         raise ValueError(
@@ -149,39 +151,32 @@ def check_bursts(
 
 
 def explained(
-    arm: ArmModel,
-    recordings: Sequence[Recording],
-    rate: float = 20.0,
-    limit: float = UNEXPLAINED,
+    joints: Sequence[str], logs: Sequence[LeftOver], limit: float = UNEXPLAINED
 ) -> tuple[str, ...]:
     """Notes on joints of whose torque in motion a calibration leaves much unexplained.
 
     Args:
-        arm: identified.
-        recordings: collision-free, some joint moves in each.
-        rate: rate of the observer [1/s].
+        joints: names.
+        logs: what the calibration leaves of them, see :func:`left_over`.
         limit: fraction of a joint's torque that may be left.
 
     Raises:
         ValueError: more than ``limit`` of a joint's torque is left.
     """
-    left, torque = np.zeros(arm.robot.joints), np.full(arm.robot.joints, 1e-12)
-    rows = np.zeros(arm.robot.joints)
-    for recording in recordings:
-        residual, given, on = _in_motion(arm, recording, rate)
-        left += _size(residual, on) ** 2
-        torque += _size(given, on) ** 2
-        rows += on.sum(axis=0)
+    left, torque, rows = np.zeros(len(joints)), np.full(len(joints), 1e-12), np.zeros(len(joints))
+    for log in logs:
+        left += _size(log.left, log.moves) ** 2
+        torque += _size(log.torque, log.moves) ** 2
+        rows += log.moves.sum(axis=0)
     fraction = np.sqrt(left / np.maximum(torque, FAINT**2 * torque.max()))
     worst = int(np.argmax(fraction))
-    name = arm.robot.joint_names[worst]
     error, whole = (float(np.sqrt(x[worst] / max(rows[worst], 1))) for x in (left, torque))
     said = (
-        f"{100 * fraction[worst]:.0f} % of the torque of {name} in motion is not explained "
-        f"({error:.2g} N m beside {whole:.2g} N m, root mean square): friction that changes with "
-        "temperature, a load that was not named (--payload), contacts (nothing may touch the arm "
-        "in these logs), another arm's robot file, or wrong order, signs, units (milliamperes?) or "
-        "gains of the currents or torques"
+        f"{100 * fraction[worst]:.0f} % of the torque of {joints[worst]} in motion is not "
+        f"explained ({error:.2g} N m beside {whole:.2g} N m, root mean square): friction that "
+        "changes with temperature, a load that was not named (--payload), contacts (nothing may "
+        "touch the arm in these logs), another arm's robot file, or wrong order, signs, units "
+        "(milliamperes?) or gains of the currents or torques"
     )
     if fraction[worst] > limit:
         raise ValueError(said)
@@ -207,23 +202,33 @@ def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float]
     return (k, times) if times > least else None
 
 
-def check_loads(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> None:
+def filtered_logs(arm: ArmModel, recordings: Sequence[Recording]) -> list[Filtered]:
+    """What :func:`identify` takes as ``data``, for several calls with the same gains."""
+    return [filtered(r, arm.robot, arm.drive_gain, REAL_FRICTION, RATE) for r in recordings]
+
+
+def check_loads(
+    arm: ArmModel, recordings: Mapping[str, Recording], data: Sequence[Filtered]
+) -> None:
     """Refuse a given load that the torques of its log do not show.
 
     Args:
         arm: nominal numbers, and gains whose scale holds.
-        names: names of the logs.
-        recordings: with the loads given.
+        recordings: by name, with the loads given.
+        data: of :func:`filtered_logs`.
 
     Raises:
         ValueError: names the log, what was given and what its torques show.
     """
-    for k, (name, recording) in enumerate(zip(names, recordings, strict=True)):
+    logs = list(recordings.values())
+    for k, (name, recording) in enumerate(recordings.items()):
         given = recording.load.mass if recording.load is not None else 0.0
         if given == 0:
             continue
-        open_ = [replace(r, load=None) if i == k else r for i, r in enumerate(recordings)]
-        shown = float(identify(arm, open_).loads[k, 0])
+        open_ = replace(recording, load=None)
+        asked = [*logs[:k], open_, *logs[k + 1 :]]
+        own = [*data[:k], *filtered_logs(arm, [open_]), *data[k + 1 :]]
+        shown = float(identify(arm, asked, data=own).loads[k, 0])
         if abs(shown - given) > max(WRONG_LOAD[0], WRONG_LOAD[1] * given):
             raise ValueError(
                 f"{name}: {given:g} kg were given, its torques show {shown:.1f} kg beside the "
@@ -236,16 +241,12 @@ def left_out(
     recordings: Sequence[Recording],
     *,
     scale: str = "gains",
-    friction: FrictionModel = REAL_FRICTION,
-    beliefs: Beliefs | None = None,
-    rate: float = 20.0,
-    stop: float = 0.0,
+    data: Sequence[Filtered] | None = None,
 ) -> list[Array]:
     """Residual RMS of each recording under a calibration from the other recordings [N m].
 
     Each array has the shape (n,). If gains are identified, they come from all recordings. One set
-    of gains makes the figures of the recordings comparable. :func:`residual_rms` describes
-    ``stop``.
+    of gains makes the figures of the recordings comparable. ``data``: as in :func:`identify`.
 
     Raises:
         ValueError: fewer than two recordings, or what :func:`identify` raises.
@@ -253,19 +254,14 @@ def left_out(
     if len(recordings) < 2:
         raise ValueError("one log alone cannot be held out: give two or more")
     if scale != "gains":
-        whole = identify(
-            arm, recordings, scale=scale, friction=friction, beliefs=beliefs, rate=rate
-        )
-        arm = ArmModel(arm.robot, whole.arm.drive_gain)
-    rest = (beliefs or Beliefs()).rest
-    data = [filtered(r, arm.robot, arm.drive_gain, friction, rate, rest) for r in recordings]
+        arm = ArmModel(arm.robot, identify(arm, recordings, scale=scale).arm.drive_gain)
+    data = data or filtered_logs(arm, recordings)
     found = []
     turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
     for k, recording in enumerate(turns):
         others = [*recordings[:k], *recordings[k + 1 :]]
         own = [*data[:k], *data[k + 1 :]]
-        part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate, data=own)
-        found.append(residual_rms(part.arm, recording.trace, rate, stop=stop))
+        found.append(residual_rms(identify(arm, others, data=own).arm, recording.trace))
     return found
 
 

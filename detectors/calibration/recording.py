@@ -65,7 +65,7 @@ def moves(trace: Trace) -> bool:
     return bool((quick & (np.ptp(trace.q, axis=0) > SHIFTED)).any())
 
 
-def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
+def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
     """Rows from the first motion of any joint to the last one, shape (T,).
 
     Before and after, static friction takes an unknown fraction of the torque.
@@ -73,8 +73,6 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
     Args:
         trace: the log.
         margin: seconds at the log's beginning that are left out in any case.
-        stop: seconds before the last motion that are left out: a program that is cut off brakes all
-            joints within a sample or two, which the log does not resolve.
 
     Raises:
         ValueError: no joint ever moves, or only in what is left out.
@@ -84,12 +82,10 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
         raise ValueError(f"no joint moves faster than {MOVING} rad/s")
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     rows[moves[0] : moves[-1] + 1] = True
-    within = (trace.t >= trace.t[0] + margin) & (trace.t <= trace.t[moves[-1]] - stop)
-    rows &= within
+    rows &= trace.t >= trace.t[0] + margin
     if not rows.any():
         raise ValueError(
-            f"no motion is left without the first {margin:g} s of the log and the last {stop:g} s "
-            "of its motion: give a longer log"
+            f"no motion is left without the first {margin:g} s of the log: give a longer log"
         )
     return rows
 

@@ -53,7 +53,7 @@ def upper_quantile(
         np.concatenate([x @ prior - y, prior]),
         A_ub=np.vstack([columns, -columns]),
         b_ub=np.tile(pull, 2),
-        bounds=[each] * len(y) + [(0.0, None)] * k,
+        bounds=np.vstack([np.tile(each, (len(y), 1)), np.tile((0.0, np.inf), (k, 1))]),
         method="highs",
     )
     if found.x is None:

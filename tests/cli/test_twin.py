@@ -186,8 +186,35 @@ def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):
     run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
     said = capsys.readouterr().out
     assert "c: hardly moves; its friction is a prior" in said
-    assert "not judged: give three logs or more" in said
+    assert "not judged: each third log without a load is left out to judge, and there is" in said
     assert "# c: hardly moves" in (tmp_path / "t.toml").read_text()
+
+
+def test_a_log_that_is_touched_all_along_is_refused_unless_accepted(folder, tmp_path, capsys):
+    trace = record(7)
+    for start in np.arange(2.0, trace.t[-1] - 1, 3.0):
+        trace = add_contact(trace, GAIN, Added(float(start), 0.2, (0.0, 4.0, 8.0), "push"))
+    write(tmp_path / "touched.csv", trace)
+    out = tmp_path / "t.toml"
+    flags = (tmp_path / "touched.csv", "--robot", folder / "arm.xml", "--out", out)
+    with pytest.raises(SystemExit):
+        run(folder, "twin", *flags)
+    line = capsys.readouterr().err
+    assert "touched.csv: " in line
+    assert "in bursts, as contacts do" in line
+    assert "say --accept alarms" in line
+    assert not out.exists()
+    run(folder, "twin", *flags, "--accept", "alarms")
+    assert out.exists()
+
+
+def test_why_the_logs_that_are_left_make_no_twin(folder, tmp_path, capsys):
+    """Of three logs the third is judged on; the other two carry a load."""
+    logs = [folder / "free" / f"log{seed}.csv" for seed in range(3)]
+    loads = ("--payload", "log0=unknown", "log1=unknown")
+    run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", tmp_path / "t.toml", *loads)
+    said = capsys.readouterr().out
+    assert "without log2.csv, the other logs make no twin (all logs carry a load:" in said
 
 
 def test_short_logs_make_a_twin_without_intervals(folder, tmp_path, capsys):
@@ -196,6 +223,7 @@ def test_short_logs_make_a_twin_without_intervals(folder, tmp_path, capsys):
         write(tmp_path / f"log{seed}.csv", cut(log, slice(0, round(len(log.t) * 7 / 25))))
     logs, out = [tmp_path / f"log{seed}.csv" for seed in (1, 2)], tmp_path / "t.toml"
     run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", out)
-    assert "not judged: give three logs or more" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "intervals lack a part of the logs: 6.9 s of motion, from each log's first to" in said
     (viscous,) = (line for line in out.read_text().splitlines() if line.startswith("viscous"))
     assert viscous.endswith("# N m s/rad")

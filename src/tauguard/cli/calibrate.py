@@ -63,12 +63,11 @@ def command(
         reading: how logs are read.
         json: write the figures here as JSON.
     """
-    from tauguard.cli.free_logs import free_logs, hold_to
+    from tauguard.cli.free_logs import explain, free_logs, hold_to
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown
-    from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.arm_file import save_arm
-    from tauguard.detectors.calibration.assessment import check_bursts, check_loads, left_out
+    from tauguard.detectors.calibration.assessment import check_loads, filtered_logs, left_out
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
@@ -83,21 +82,26 @@ def command(
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
     names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
     traces = [recording.trace for recording in recordings]
-    found = identify(arm, recordings, scale=given.scale)
-    if given.scale == "gains":
+    data = filtered_logs(arm, recordings) if given.scale == "gains" else None
+    found = identify(arm, recordings, scale=given.scale, data=data)
+    if data is not None:
         weight = (given.numbers, found.arm.robot, traces)
         hold_to("gravity", accept, lambda: check_weight(*weight))
-        check_loads(arm, names, recordings)
+        check_loads(arm, given.logs, data)
     elif (ratio := torque_per_ampere(found.arm, traces)) < SMALL_GAIN:
         print(
             f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
             "they held joint torques: if they are in N m, say --torque"
         )
-    held = left_out(arm, recordings, scale=given.scale) if each_can_be_left_out(recordings) else []
+    held = (
+        left_out(arm, recordings, scale=given.scale, data=data)
+        if each_can_be_left_out(recordings)
+        else []
+    )
     shown = not_shown(list(given.all_traces.values()))
-    print_notes((*calibration_notes(found.arm, given.logs, held), *shown))
+    print_notes(shown)
+    explain(found.arm, given.logs, held, accept)
     logs_of = (found.arm, names, recordings)
-    hold_to("alarms", accept, lambda: check_bursts(*logs_of))
     hold_to("error", accept, lambda: check_held_out(*logs_of, held))
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=names)

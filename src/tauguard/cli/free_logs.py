@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
@@ -101,9 +101,6 @@ def free_detector(
         ValueError: too little motion, another arm's gravity torques, much torque that is not
             explained, or in bursts as of contacts.
     """
-    from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.real_arms import calibration_notes
-    from tauguard.detectors.calibration.assessment import check_bursts
     from tauguard.detectors.calibration.checks import check_weight
     from tauguard.detectors.scores.free_motion import FreeMotion
 
@@ -111,11 +108,38 @@ def free_detector(
     found = FreeMotion().fit(logs, arm)
     weight = (arm.robot, found.arm.robot, [log.trace for log in logs])
     hold_to("gravity", accept, lambda: check_weight(*weight))
-    print_notes(calibration_notes(found.arm, recordings, ()))
-    vouched = {name for name in recordings if {name, Path(name).stem} & set(accept or ())}
-    others = {name: log for name, log in recordings.items() if name not in vouched}
-    hold_to("alarms", accept, lambda: check_bursts(found.arm, list(others), list(others.values())))
+    explain(found.arm, recordings, (), accept)
     return found
+
+
+def explain(
+    arm: ArmModel,
+    recordings: Mapping[str, Recording],
+    held: Sequence[Any],
+    accept: Collection[str] | None,
+) -> list[str]:
+    """Print notes on torque that a calibration does not explain, and return them.
+
+    Args:
+        arm: identified.
+        recordings: by file name.
+        held: held-out residual of each [N m], (n,) each; empty: not known.
+        accept: checks and logs that the user vouches for; None: the command has no such flag.
+
+    Raises:
+        ValueError: much torque is not explained, or in bursts as of contacts.
+    """
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.real_arms import calibration_notes
+    from tauguard.detectors.calibration.assessment import check_bursts, left_over
+
+    joints, left = arm.robot.joint_names, left_over(arm, recordings)
+    notes = calibration_notes(joints, left, recordings, held)
+    print_notes(notes)
+    vouched = set(accept or ())
+    others = {name: one for name, one in left.items() if not {name, Path(name).stem} & vouched}
+    hold_to("alarms", accept, lambda: check_bursts(joints, others))
+    return notes
 
 
 def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -32,6 +32,7 @@ def command(
     payload: tuple[str, ...] = (),
     torque: bool = False,
     judge: tuple[Path, ...] = (),
+    accept: tuple[Literal["alarms"], ...] = (),
     figure: Path | None = None,
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
@@ -50,14 +51,14 @@ def command(
         torque: the logs hold joint torques in N m where they would hold currents.
         judge: free logs without a load of programs that LOGS do not have; without them, each third
             log of LOGS is left out for the judgement, and used for the twin afterwards.
+        accept: make a twin although a log has torque in bursts as of contacts (alarms).
         figure: a PNG of residuals, real and simulated, with the verdict.
         reading: how logs are read.
         json: write the figures here as JSON.
     """
-    from tauguard.cli.free_logs import free_logs
+    from tauguard.cli.free_logs import explain, free_logs
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_logs
-    from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.recording import each_can_be_left_out, pieces
     from tauguard.models import load_arm
@@ -72,12 +73,23 @@ def command(
     given, left = of_one_arm(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
     )
+    print_notes(left)
     recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
+    apart = (
+        left_out(given.arm, recordings, scale=given.scale)
+        if each_can_be_left_out(recordings)
+        else []
+    )
+    seen = explain(twin.arm, given.logs, apart, accept)
     parts = pieces(recordings, PARTS)
     rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
-    twin = with_intervals(twin, [one for some in rest if (one := _made(given, some, limit))])
+    others, lacking = _made_of_each(given, rest, limit)
+    twin = with_intervals(twin, others)
+    own = [*twin.notes, *(f"intervals lack a part of the logs: {why}" for why in lacking)]
+    print_notes(own)
+    notes = (*left, *seen, *own)
     held: list[int] = []
     if judge:
         tried = read_logs(judge, columns, robot, torque, reading).traces
@@ -85,20 +97,13 @@ def command(
         held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
         tried = {names[k]: recordings[k].trace for k in held}
     used = [r for k, r in enumerate(recordings) if k not in held]
-    judged = _made(given, used, limit) if held else twin
+    judged, reasons = _made_of_each(given, [used], limit) if held else ([twin], [])
     likeness = None
-    if judged is not None and tried:
-        likeness = compare(judged.arm, judged.drive, list(tried.values()))
+    if judged and tried:
+        likeness = compare(judged[0].arm, judged[0].drive, list(tried.values()))
         likeness = with_alarms(likeness, used, given.arm, list(tried.values()))
-    apart = (
-        left_out(given.arm, recordings, scale=given.scale)
-        if each_can_be_left_out(recordings)
-        else []
-    )
-    notes = (*left, *calibration_notes(twin.arm, given.logs, apart), *twin.notes)
-    print_notes(notes)
-    written = write_twin(replace(twin, notes=tuple(notes)), robot, out, names, given.source)
-    rows = report(twin.arm.robot.joint_names, likeness, list(tried))
+    written = write_twin(replace(twin, notes=notes), robot, out, names, given.source)
+    rows = report(twin.arm.robot.joint_names, likeness, list(tried), reasons)
     if figure is not None and likeness is not None:
         from tauguard.twin.figure import draw
 
@@ -148,12 +153,17 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 
 
-def _made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin | None:
-    """As :func:`made`; None where the logs are too short, or all carry a load."""
-    try:
-        return made(given, used, limit)
-    except ValueError:
-        return None
+def _made_of_each(
+    given: FreeLogs, groups: list[list[Recording]], limit: Array
+) -> tuple[list[Twin], list[str]]:
+    """As :func:`made` from each group of logs, and why some groups make none, each reason once."""
+    found, reasons = [], list[str]()
+    for used in groups:
+        try:
+            found.append(made(given, used, limit))
+        except ValueError as error:
+            reasons += [str(error)] if str(error) not in reasons else []
+    return found, reasons
 
 
 def _unloaded(recording: Recording) -> bool:
@@ -161,13 +171,15 @@ def _unloaded(recording: Recording) -> bool:
 
 
 def report(
-    joints: tuple[str, ...], likeness: Likeness | None, logs: list[str]
+    joints: tuple[str, ...], likeness: Likeness | None, logs: list[str], reasons: list[str]
 ) -> list[dict[str, Any]]:
-    """Print how like the twin is; the rows, ready for JSON."""
+    """Print how like the twin is, or the reasons why that is not known; rows, ready for JSON."""
     from tauguard.report import table
 
     if likeness is None:
-        print("not judged: give three logs or more, of which two have 10 s of motion, or --judge")
+        why = f"without {', '.join(logs)}, the other logs make no twin ({'; '.join(reasons)})"
+        few = "each third log without a load is left out to judge, and there is none"
+        print(f"not judged: {why if logs else few}; give more logs, or --judge")
         return []
     kinds = {
         "rms, moving": likeness.rms,
