@@ -10,7 +10,6 @@ import difflib
 import importlib
 from collections.abc import Callable
 from functools import partial
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def _score(module: str, maker: str) -> Any:
-    return attrgetter(maker)(importlib.import_module(f"tauguard.detectors.scores.{module}"))()
+    return getattr(importlib.import_module(f"tauguard.detectors.scores.{module}"), maker)()
 
 
 #: Every method, in the order that reports show them.
@@ -26,13 +25,9 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "srq-svr": partial(_score, "learned", "SrqSvr"),
     "srq-svr-plain": partial(_score, "learned", "PlainSrqSvr"),
     "current-network": partial(_score, "currents", "CurrentNetwork"),
-    "current-network-static": partial(_score, "currents", "CurrentNetwork.static"),
-    "current-threshold": partial(_score, "currents", "CurrentThreshold"),
     "residual-thresholds": partial(_score, "baselines", "ResidualThresholds"),
     "moving-thresholds": partial(_score, "baselines", "MovingThresholds"),
-    "cusum": partial(_score, "baselines", "Cusum"),
     "window-network": partial(_score, "learned", "WindowNetwork"),
-    "boosting": partial(_score, "learned", "Boosting"),
     "free-motion": partial(_score, "free_motion", "FreeMotion"),
 }
 
@@ -52,12 +47,12 @@ FILE_TYPES: dict[str, str] = {
         "features.free_bound": "Bound",
         "features.front_end": "FrontEnd Scaling",
         "features.windows": "WindowShape",
-        "scores.baselines": "FittedCusum FittedThresholds",
-        "scores.currents": "FittedCurrentNetwork FittedCurrentThreshold Inputs",
+        "scores.baselines": "FittedThresholds",
+        "scores.currents": "FittedCurrentNetwork Inputs",
         "scores.free_motion": "FittedFreeMotion",
         "scores.kernel": "KernelMachine",
         "scores.learned": "OneOutput",
-        "scores.regressors": "Forest Network",
+        "scores.network": "Network",
         "scores.windowed": "FittedWindowed",
         "thresholds.speed_normalisation": "SpeedNormalisation",
     }.items()

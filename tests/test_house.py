@@ -140,7 +140,7 @@ BELOW, ABOVE = (
         "signature",
     },
 )
-NATIVE = {"_kernel", "_observer", "_ranking"}
+NATIVE = {"_kernel", "_observer", "_network"}
 
 
 def detector_imports(path: Path) -> set[str]:

@@ -1,4 +1,4 @@
-"""A first-order low-pass that starts at its first sample, in batch and sample by sample."""
+"""A network that predicts motor currents from the motion; its largest error is the score."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import free_rows
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_trace, common_interval
-from tauguard.detectors.scores.regressors import Network
+from tauguard.detectors.scores.network import Network
 from tauguard.traces.trace import Trace
 
 
@@ -44,107 +44,6 @@ class LowPass:
         return self._state + self._first
 
 
-@dataclass(frozen=True)
-class CurrentThreshold:
-    """The fast part of each current, compared with a threshold that follows its recent size.
-
-    The fast part is the current less its low-pass at ``slow``; the threshold of a joint is
-    a + b level + c total, with the low-pass of its own |fast part| and of the sum over all joints
-    at ``follow``. The weights are fitted to collision-free motion. The score is the largest ratio
-    of fast part to threshold over the joints.
-    """
-
-    slow: float = 20.0  #: [1/s]
-    follow: float = 4.0  #: [1/s]
-    settle: float = 1.0  #: [s]
-    name: ClassVar[str] = "current-threshold"
-
-    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentThreshold:
-        """Fit the threshold's weights to the collision-free rows.
-
-        Raises:
-            ValueError: traces that do not fit, or without collision-free motion.
-        """
-        from scipy.optimize import nnls
-
-        dt = common_interval(traces, arm.robot.joint_names)
-        fast, levels = [], []
-        for trace in traces:
-            rows = np.flatnonzero(free_rows(trace, self.settle))[::5]
-            own, level = _parts(trace.current, self.slow, self.follow, dt)
-            fast.append(np.abs(own[rows]))
-            levels.append(level[rows])
-        size, level = np.concatenate(fast), np.concatenate(levels)
-        if not len(size):
-            raise ValueError("no collision-free motion in the traces")
-        total = level.sum(axis=1)
-        table = [np.column_stack([np.ones_like(total), own, total]) for own in level.T]
-        weights = np.array([nnls(a, b)[0] for a, b in zip(table, size.T, strict=True)])
-        floor = np.maximum(0.1 * size.mean(axis=0), 1e-9)
-        weights[:, 0] = np.maximum(weights[:, 0], floor)
-        return FittedCurrentThreshold(arm, dt, self.settle, self.slow, self.follow, weights)
-
-
-def _parts(current: Array, slow: float, follow: float, dt: float) -> tuple[Array, Array]:
-    """The fast part, and its recent size up to the sample before, shape (T, n) each."""
-    fast = current - smoothed(current, slow, dt)
-    # One sample late: an impact must not raise the threshold that it is compared with.
-    size = np.abs(np.concatenate([fast[:1], fast[:-1]]))
-    return fast, smoothed(size, follow, dt)
-
-
-@dataclass(frozen=True, eq=False)
-class FittedCurrentThreshold:
-    """A :class:`~tauguard.detectors.detector.FittedDetector`."""
-
-    arm: ArmModel  #: as it was given: nothing of it is used
-    dt: float  #: [s]
-    settle: float  #: [s]
-    slow: float  #: [1/s]
-    follow: float  #: [1/s]
-    weights: Array  #: a [A], b, c of each joint, shape (n, 3)
-    name: ClassVar[str] = "current-threshold"
-
-    def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
-        if self.weights.shape != (self.arm.robot.joints, 3) or not (self.weights[:, 0] > 0).all():
-            raise ValueError("weights: expected three a joint, the first above 0")
-
-    def scores(self, trace: Trace) -> Array:
-        """The largest ratio over the joints, shape (T,)."""
-        check_trace(trace, len(self.weights), self.dt)
-        return self._score(*_parts(trace.current, self.slow, self.follow, self.dt))
-
-    def _score(self, fast: Array, level: Array) -> Array:
-        a, b, c = self.weights.T
-        score: Array = (np.abs(fast) / (a + b * level + c * level.sum(axis=1, keepdims=True))).max(
-            axis=1
-        )
-        return score
-
-    def stream(self) -> CurrentThresholdStream:
-        """The same, sample by sample."""
-        return CurrentThresholdStream(self)
-
-
-class CurrentThresholdStream:
-    """Sample by sample."""
-
-    def __init__(self, detector: FittedCurrentThreshold) -> None:
-        """Begin anew."""
-        self._detector = detector
-        self._slow = LowPass(detector.slow, detector.dt)
-        self._follow = LowPass(detector.follow, detector.dt)
-        self._size: Array | None = None
-
-    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample; the currents alone count."""
-        fast = current - self._slow.step(current)
-        level = self._follow.step(np.abs(fast) if self._size is None else self._size)
-        self._size = np.abs(fast)
-        return float(self._detector._score(fast[None], level[None])[0])
-
-
 #: Rate of the filter that differentiates the velocity [1/s].
 DERIVATIVE = 100.0
 
@@ -170,14 +69,14 @@ class Inputs:
     """The inputs of the network."""
 
     lags: tuple[float, ...]  #: ages of the window's samples [s]
-    memory: float  #: age of the past sample that is fed back [s]; 0: none
+    memory: float  #: age of the past sample that is fed back [s]
     dt: float  #: [s]
 
     @property
     def ages(self) -> tuple[int, ...]:
-        """Ages of the window's samples and, if there is one, of the sample that is fed back."""
+        """Ages of the window's samples and of the sample that is fed back."""
         own = tuple(round(lag / self.dt) for lag in self.lags)
-        return (*own, max(1, round(self.memory / self.dt))) if self.memory > 0 else own
+        return (*own, max(1, round(self.memory / self.dt)))
 
     def of(self, now: Sample, past: Sequence[Sample]) -> Array:
         """The inputs, shape (N, d).
@@ -192,14 +91,9 @@ class Inputs:
         parts = [np.sin(now.q), np.cos(now.q), np.tanh(now.qd / REVERSAL)]
         for sample in past[: len(self.lags)]:
             parts += [sample.qd, sample.qdd]
-        if self.memory > 0:
-            fed = past[-1]
-            parts += [fed.current, fed.q - now.q, np.tanh(fed.qd / REVERSAL)]
+        fed = past[-1]
+        parts += [fed.current, fed.q - now.q, np.tanh(fed.qd / REVERSAL)]
         return np.concatenate(parts, axis=1)
-
-    def base(self, now: Sample, past: Sequence[Sample]) -> Array:
-        """The currents to which the network's output is added [A], shape (N, n)."""
-        return past[-1].current if self.memory > 0 else np.zeros_like(now.current)
 
     def rows(self, trace: Trace, rows: NDArray[np.intp]) -> tuple[Sample, list[Sample]]:
         """Samples of a trace and their past; before the first sample is the first."""
@@ -214,21 +108,19 @@ class Inputs:
 
 @dataclass(frozen=True)
 class CurrentNetwork:
-    """Predicts every motor's current from the motion; the largest error is the score."""
+    """Predicts how far each motor's current changes since a past sample; the largest error counts.
+
+    Without the past sample an unknown payload would be an error.
+    """
 
     lags: tuple[float, ...] = (0.0, 0.025, 0.05)  #: ages of the window's samples [s]
-    memory: float = 0.05  #: age of the past sample that is fed back [s]; 0: none, the static form
+    memory: float = 0.05  #: age of the past sample that is fed back [s]
     hidden: tuple[int, ...] = (64, 32)
     rows: int = 30_000  #: collision-free samples to train on
     epochs: int = 60
     seed: int = 0
     settle: float = 0.5  #: [s]
-    name: str = "current-network"
-
-    @classmethod
-    def static(cls) -> CurrentNetwork:
-        """The form without past currents: an unknown payload is a residual."""
-        return cls(memory=0.0, name="current-network-static")
+    name: ClassVar[str] = "current-network"
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentNetwork:
         """Train on collision-free samples of all traces, more of them where the arm accelerates.
@@ -245,7 +137,7 @@ class CurrentNetwork:
             if len(rows):
                 now, past = inputs.rows(trace, rows)
                 x.append(inputs.of(now, past))
-                y.append(now.current - inputs.base(now, past))
+                y.append(now.current - past[-1].current)
         network = Network.fit(
             np.concatenate(x), np.concatenate(y), self.hidden, seed=self.seed, epochs=self.epochs
         )
@@ -292,7 +184,7 @@ class FittedCurrentNetwork(Frozen):
         return self._score(*self.inputs.rows(trace, np.arange(len(trace.t))))
 
     def _score(self, now: Sample, past: Sequence[Sample]) -> Array:
-        predicted = self.inputs.base(now, past) + self.network(self.inputs.of(now, past))
+        predicted = past[-1].current + self.network(self.inputs.of(now, past))
         score: Array = np.abs(now.current - predicted).max(axis=1)
         return score
 

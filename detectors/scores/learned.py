@@ -1,6 +1,6 @@
 """Learned methods that score windows of the residual.
 
-Support vector regression with the SRQ kernel, boosting and a neural network.
+Support vector regression with the SRQ kernel, and a neural network.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, Sc
 from tauguard.detectors.features.windows import WindowShape, draw_windows, median_distance
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
-from tauguard.detectors.scores.regressors import Forest, Network
+from tauguard.detectors.scores.network import Network
 from tauguard.detectors.scores.windowed import Regressor, Windowed
 from tauguard.traces.trace import Trace
 
@@ -94,22 +94,6 @@ class PlainSrqSvr(SrqSvr):
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""
         return Scaling(front.joints)
-
-
-@dataclass(frozen=True)
-class Boosting(Windowed):
-    """A forest that ranks windows by the severity of what happens in them."""
-
-    trees: int = 150
-    depth: int = 4
-    rate: float = 0.1
-    name: ClassVar[str] = "boosting"
-
-    def learn(self, x: Array, y: Array) -> Forest:
-        """Stochastic gradient boosting."""
-        return Forest.boosted(
-            x, y, trees=self.trees, depth=self.depth, rate=self.rate, seed=self.seed
-        )
 
 
 @dataclass(frozen=True)

@@ -89,12 +89,9 @@ ALL = (
     "srq-svr",
     "srq-svr-plain",
     "current-network",
-    "current-threshold",
     "residual-thresholds",
     "moving-thresholds",
-    "cusum",
     "window-network",
-    "boosting",
 )
 #: Those that judge all of the collision-free motion.
 THOROUGH = ("srq-svr",)

@@ -21,7 +21,7 @@ from tauguard.models.arm import NAMED
 from tauguard.report import Row
 
 #: The shipped detector, and others of which the first two read the same residual.
-NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "boosting")
+NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds")
 #: False alarms per hour that the thresholds aim at.
 ASKED = 1.0
 #: Robots of a run that names none: those of the package.

@@ -185,8 +185,8 @@ def test_train_any_detector_with_a_guarantee(tmp_path, capsys):
         path.rename(struck / f"free-{path.name}")
     model = str(tmp_path / "model.skops")
     train = ("train", "--traces", str(struck), "--model", model)
-    assert "did you mean 'cusum'" in fails(capsys, *train, "--detector", "cusom")
-    flags = ("--detector", "cusum", "--calibration", str(free))
+    assert "did you mean 'srq-svr'" in fails(capsys, *train, "--detector", "srq-svm")
+    flags = ("--detector", "moving-thresholds", "--calibration", str(free))
     line = fails(capsys, *train, *flags, "--false-alarms-per-hour", "1")
     assert "cannot guarantee 1 false alarms per hour" in line
     assert "give " in line

@@ -101,11 +101,13 @@ def _write_model(path: Path) -> None:
     from slow.small_detector import bare_arm
     from tauguard.datasets import free_episodes
     from tauguard.detectors import CollisionAlarm, save_model
-    from tauguard.detectors.scores.currents import CurrentThreshold
+    from tauguard.detectors.scores.currents import CurrentNetwork
     from tauguard.envs import simulate
 
     trace = simulate(free_episodes(0, 1, 4.0, (30.0,), (0.0,), None)[0])
-    save_model(CollisionAlarm(CurrentThreshold().fit([trace], bare_arm()), 3.0), path)
+    save_model(
+        CollisionAlarm(CurrentNetwork(rows=500, epochs=2).fit([trace], bare_arm()), 3.0), path
+    )
 
 
 def _write_robot(path: Path) -> None:
