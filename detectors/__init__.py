@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
     from tauguard.detectors.evaluation.diagnosis_metrics import diagnosis_metrics, match_diagnoses
     from tauguard.detectors.evaluation.matching import Matching, match, match_detection, matchings
-    from tauguard.detectors.evaluation.metrics import detection_metrics, poisson_rate
+    from tauguard.detectors.evaluation.metrics import detection_metrics
     from tauguard.detectors.events import confirmed, find_alarms
     from tauguard.detectors.model_file import load_model, save_model
     from tauguard.detectors.registry import DETECTORS, make_detector
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
     from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
+    from tauguard.report import poisson_rate
     from tauguard.report import rate as wilson
 
 __all__ = [

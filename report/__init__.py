@@ -3,7 +3,7 @@
 from tauguard.report.digits import two_digits
 from tauguard.report.json_file import write_json
 from tauguard.report.machine import machine, measured, versions
-from tauguard.report.rates import rate
+from tauguard.report.rates import poisson_rate, rate
 from tauguard.report.table import WIDTH, Row, cell, table
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "cell",
     "machine",
     "measured",
+    "poisson_rate",
     "rate",
     "table",
     "two_digits",

@@ -1,4 +1,4 @@
-"""Proportions with their 95 % intervals."""
+"""Proportions and rates with their intervals."""
 
 from typing import Any
 
@@ -20,3 +20,27 @@ def rate(successes: int, trials: int) -> dict[str, Any]:
     low = 0.0 if successes == 0 else float(interval.low)
     high = 1.0 if successes == trials else float(interval.high)
     return {"value": successes / trials, "low": low, "high": high, "n": trials}
+
+
+def poisson_rate(count: int, hours: float, confidence: float = 0.95) -> dict[str, Any]:
+    """Events per hour with the exact (Garwood) Poisson interval; ``n`` is the count.
+
+    Raises:
+        ValueError: a count or hours below 0.
+    """
+    from scipy.special import gammaincinv  # scipy.stats loads for seconds
+
+    if count < 0 or not hours >= 0:
+        raise ValueError(f"{count} events in {hours} h: expected 0 or more")
+    if hours == 0:
+        return {"value": None, "low": None, "high": None, "n": count, "hours": 0.0}
+    side = (1 - confidence) / 2
+    low = 0.0 if count == 0 else float(gammaincinv(count, side))
+    high = float(gammaincinv(count + 1, 1 - side))
+    return {
+        "value": count / hours,
+        "low": low / hours,
+        "high": high / hours,
+        "n": count,
+        "hours": hours,
+    }

@@ -220,7 +220,7 @@ def test_the_list_of_commands_leaves_heavy_libraries_unloaded():
 def test_models_are_looked_for_without_the_learning_libraries():
     code = (
         "from tauguard.detectors import load_model\n"
-        "from tauguard.detectors.evaluation.metrics import poisson_rate\n"
+        "from tauguard.detectors import poisson_rate\n"
         "from tauguard.detectors.registry import make_detector\n"
         "make_detector('free-motion'); poisson_rate(1, 1.0)\n"
         "try: load_model('none.skops')\n"

@@ -1,15 +1,15 @@
 """Checks that all logs are of one arm with the stated loads; others would falsify a twin."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import ArmModel
 from tauguard.detectors.calibration.assessment import OUTLYING, outlier, residual_rms
-from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import Load, Recording
-from tauguard.detectors.calibration.regression import filtered
 
 #: Logs are of two arms if each half predicts its own logs better than all logs do by this factor.
 #: Splitting the logs of one arm by program gives factors of 1.0 to 1.2 (UR5, UR3, UR10e). Two arms,
@@ -54,18 +54,15 @@ class _Errors:
     """Residual of a log under a calibration from others [N m]; inf where they are too short."""
 
     def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
-        self._arm, self._recordings = arm, recordings
-        self._data = [
-            filtered(r, arm.robot, arm.drive_gain, REAL_FRICTION, 20.0) for r in recordings
-        ]
+        self._recordings = recordings
+        self._calibrated = Subsets(replace(arm, friction=None), recordings)
         self._known: dict[tuple[int, ...], ArmModel | None] = {}
 
     def __call__(self, k: int, group: Sequence[int]) -> float:
         own = tuple(sorted(set(group) - {k})) or (k,)
         if own not in self._known:
-            parts, data = [self._recordings[i] for i in own], [self._data[i] for i in own]
             try:
-                self._known[own] = identify(self._arm, parts, data=data).arm
+                self._known[own] = self._calibrated(own)
             except ValueError:  # too little motion
                 self._known[own] = None
         arm = self._known[own]

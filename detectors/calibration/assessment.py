@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.identification import RATE, REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import (
     Load,
     Recording,
@@ -47,8 +47,6 @@ WRONG_LOAD = (0.8, 0.3)
 #: is left over its median, at most. Up to 1.8 in 20 free logs of five arms, each alone; 4 to 9 in
 #: three logs of arms that were pushed.
 BURSTS = 2.5
-#: Rate of the observer [1/s].
-RATE = 20.0
 #: Shortest motion of a joint that is judged so [s], and times that a message lists.
 ENOUGH, SAID = 3.0, 6
 #: Slower joints are not judged [rad/s], because static friction hides their torque.
@@ -277,7 +275,7 @@ def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
     for trace in traces:
         dt, count = intervals(trace.t, len(trace.t)), robot.joints
         p, beta = momentum_terms(robot, trace.q, trace.qd)
-        rate = np.full(count, 20.0)
+        rate = np.full(count, RATE)
         rows = moving_span(trace)
         nothing = np.zeros_like(p)
         torque.append(low_pass(rate, dt, p, beta)[rows])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.recording import moves, moving_span
+from tauguard.detectors.calibration.recording import Recording, moves, moving_span
 from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
@@ -30,29 +30,26 @@ ENOUGH = 3.0
 LIGHTEST, HEAVIEST = 0.55, 1.8
 
 
-def check_signs(arm: ArmModel, name: str, trace: Trace) -> None:
+def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
     """Refuse a log in which a joint's torque drives its friction instead of being braked by it.
 
     Args:
         arm: its gains' signs count.
-        name: name of the log.
-        trace: collision-free.
+        logs: by name, collision-free.
 
     Raises:
         ValueError: names log and joints.
     """
-    if not moves(trace):
-        return
-    against = [
-        arm.robot.joint_names[j]
-        for j, value in enumerate(drag(arm.robot, trace, np.sign(arm.drive_gain)))
-        if value < AGAINST
-    ]
-    if against:
-        raise ValueError(
-            f"{name}: friction would push {', '.join(against)}: the sign of the current or torque, "
-            "or of the velocity, is the other one than the robot file's"
-        )
+    for name, recording in logs.items():
+        if not moves(recording.trace):
+            continue
+        drags = drag(arm.robot, recording.trace, np.sign(arm.drive_gain))
+        pairs = zip(arm.robot.joint_names, drags, strict=True)
+        if against := [joint for joint, value in pairs if value < AGAINST]:
+            raise ValueError(
+                f"{name}: friction would push {', '.join(against)}: the sign of the current or "
+                "torque, or of the velocity, is the other one than the robot file's"
+            )
 
 
 def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> Array:

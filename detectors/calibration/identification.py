@@ -76,6 +76,12 @@ class Beliefs:
     rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
 
 
+BELIEFS = Beliefs()
+
+#: Rate of the filter that everything passes through [1/s].
+RATE = 20.0
+
+
 @dataclass(frozen=True)
 class Identified:
     """An identified arm and how it was found."""
@@ -97,13 +103,12 @@ def _deviations(
     system: System,
     robot: RobotNumbers,
     recordings: Sequence[Recording],
-    beliefs: Beliefs,
     gain: Array,
     free_masses: bool,
     friction: Array,
 ) -> tuple[Array, Array]:
     """Standard deviations and means of all unknowns."""
-    spread = 4.0 if free_masses else 1.0
+    beliefs, spread = BELIEFS, 4.0 if free_masses else 1.0
     body = spread * body_deviations(robot, beliefs.mass, beliefs.centre, beliefs.inertia)
     poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 20)] for r in recordings])
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
@@ -128,17 +133,17 @@ def _deviations(
 
 
 def _friction_beliefs(
-    friction: FrictionModel, beliefs: Beliefs, gain: Array, recordings: Sequence[Recording]
+    friction: FrictionModel, gain: Array, recordings: Sequence[Recording]
 ) -> Array:
     """Standard deviations of the friction weights, shape (n, columns)."""
     sizes = [np.abs(r.trace.current * gain) for r in recordings]
     moving = [size[moving_span(r.trace)] for size, r in zip(sizes, recordings, strict=True)]
     usual = np.max([np.median(size, axis=0) for size in moving], axis=0)
-    out = np.repeat(np.maximum(beliefs.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
-    out[:, friction.load_columns] = beliefs.loaded
+    out = np.repeat(np.maximum(BELIEFS.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
+    out[:, friction.load_columns] = BELIEFS.loaded
     if friction.saturation:
         peaks = np.max([size.max(axis=0) for size in sizes], axis=0)
-        out[:, -1] = beliefs.saturation / np.maximum(peaks, 1e-9)
+        out[:, -1] = BELIEFS.saturation / np.maximum(peaks, 1e-9)
     return out
 
 
@@ -148,8 +153,6 @@ def identify(
     *,
     scale: str = "gains",
     friction: FrictionModel = REAL_FRICTION,
-    beliefs: Beliefs | None = None,
-    rate: float = 20.0,
     data: Sequence[Filtered] | None = None,
 ) -> Identified:
     """Identify inertia, friction and, if something fixes their scale, the drive gains.
@@ -160,38 +163,52 @@ def identify(
         scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
             recording with a known load above 0 does) or "masses" (those of ``arm`` do).
         friction: its columns.
-        beliefs: standard deviations of the assumed numbers.
-        rate: rate of the filter that everything passes through [1/s].
         data: of each recording, from :func:`filtered` (default: made here); only for "gains".
 
     Raises:
         ValueError: another scale, no load to take it from, too little motion, or another arm's log.
     """
-    beliefs = beliefs or Beliefs()
     _check(recordings, arm.robot, scale)
     # With a hundred unknowns, threads of the linear algebra cost more time than they save.
     with threadpool_limits(1, "blas"):
         if scale == "gains":
-            return _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)[0]
-        return _identify_scale(arm, recordings, scale, friction, beliefs, rate)
+            return _fit(arm, recordings, scale, friction, data, 2)[0]
+        return _identify_scale(arm, recordings, scale, friction)
+
+
+class Subsets:
+    """Calibrations from some of the recordings, whose columns are filtered once; gains hold."""
+
+    def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
+        """Take what is believed, with the friction to use if it has one, and all recordings."""
+        self._arm, self._recordings = arm, recordings
+        self._friction = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
+        self._data = [
+            filtered(r, arm.robot, arm.drive_gain, self._friction, RATE, BELIEFS.rest)
+            for r in recordings
+        ]
+
+    def __call__(self, use: Sequence[int]) -> ArmModel:
+        """The arm that the recordings of these numbers show.
+
+        Raises:
+            ValueError: as of :func:`identify`.
+        """
+        own, data = [self._recordings[k] for k in use], [self._data[k] for k in use]
+        return identify(self._arm, own, friction=self._friction, data=data).arm
 
 
 def _identify_scale(
-    arm: ArmModel,
-    recordings: Sequence[Recording],
-    scale: str,
-    friction: FrictionModel,
-    beliefs: Beliefs,
-    rate: float,
+    arm: ArmModel, recordings: Sequence[Recording], scale: str, friction: FrictionModel
 ) -> Identified:
     """As :func:`identify`, where gains are found, too."""
     # A torque per ampere that changes with the current would explain a load, so it is left out
     # while the scale is sought.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
-    sought, error = _fit(arm, recordings, scale, constant, beliefs, rate, None, 6)
-    unsure = error > 0.5 * beliefs.gain
+    sought, error = _fit(arm, recordings, scale, constant, None, 6)
+    unsure = error > 0.5 * BELIEFS.gain
     start = ArmModel(arm.robot, np.where(unsure, arm.drive_gain, sought.arm.drive_gain))
-    found, _ = _fit(start, recordings, "gains", friction, beliefs, rate, None, 2)
+    found, _ = _fit(start, recordings, "gains", friction, None, 2)
     notes = tuple(
         f"{arm.robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
         f"{100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept, give it with --gains"
@@ -205,8 +222,6 @@ def _fit(
     recordings: Sequence[Recording],
     scale: str,
     friction: FrictionModel,
-    beliefs: Beliefs,
-    rate: float,
     data: Sequence[Filtered] | None,
     rounds: int,
 ) -> tuple[Identified, Array]:
@@ -222,26 +237,26 @@ def _fit(
     first: Sequence[Filtered] = ()
     for turn in range(rounds):
         if data is None or not (held or rescaled):
-            data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+            data = [filtered(r, robot, gain, friction, RATE, BELIEFS.rest) for r in recordings]
         elif not held:
             data = [d.with_gain(gain / arm.drive_gain) for d in first]
         first = first or data
         if turn and friction.modelled:  # loads that were not given are known by now
             data = [
-                d if is_known(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
+                d if is_known(r) else filtered(r, robot, gain, friction, RATE, BELIEFS.rest, load)
                 for d, r, load in zip(data, recordings, loads, strict=True)
             ]
         if turn == 0:
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         system = System(robot, friction.columns, len(recordings))
-        loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
-        weights = _friction_beliefs(friction, beliefs, gain, recordings)
+        loose = np.full(robot.joints, 0.0 if held else BELIEFS.gain)
+        weights = _friction_beliefs(friction, gain, recordings)
         deviations, means = _deviations(
-            system, robot, recordings, beliefs, loose, scale != "masses", weights
+            system, robot, recordings, loose, scale != "masses", weights
         )
         means[system.gain : system.load] = gain / arm.drive_gain - 1
         for k, one in enumerate(data):
-            system.add(one, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
+            system.add(one, k, 1 / (BELIEFS.softness * np.maximum(level, 1e-6)), known[k])
         precision = deviations**-2.0
         matrix = system.matrix + np.diag(precision)
         solution = solve_physically_consistent(
@@ -253,7 +268,7 @@ def _fit(
         loads = solution[system.load :].reshape(-1, INERTIAL)
         seen = np.concatenate([d.weight for d in data])
         rms = np.sqrt((seen * unexplained**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0))
-        level = np.maximum(rms, beliefs.evenness * rms.max())
+        level = np.maximum(rms, BELIEFS.evenness * rms.max())
         if not held:
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
             gain = gain / np.clip(1 + solution[system.gain : system.load], 0.5, 2.0)

@@ -11,8 +11,8 @@ from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.evaluation.card_page import times
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
-from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.features.free_bound import friction_levels
+from tauguard.report import poisson_rate
 
 #: Held-out error over the level that a joint's bounds are measured in, at most: a detector tracks a
 #: part of it. Up to 1.3 on three real arms (a wrist that moves in one log only).
@@ -22,27 +22,24 @@ HELD_OUT = 2.0
 ASKED = 10.0
 
 
-def check_own_alarms(
-    alarms: int, seconds: float, asked: float = ASKED, logs: Sequence[CrossValidatedLog] = ()
-) -> None:
+def check_own_alarms(logs: Sequence[CrossValidatedLog], asked: float = ASKED) -> None:
     """Refuse more alarms in the logs, each judged by the others, than ``asked`` an hour.
 
     Args:
-        alarms: in all logs.
-        seconds: of all logs.
+        logs: each judged by the others.
         asked: false alarms an hour that are accepted.
-        logs: where they were; empty: not known.
 
     Raises:
         ValueError: so many that, with 97.5 % confidence, the rate is above ``asked``.
     """
+    alarms, seconds = sum(len(log.alarms) for log in logs), sum(log.seconds for log in logs)
     low = poisson_rate(alarms, seconds / 3600)["low"]
-    if low <= asked:
+    if low is None or low <= asked:
         return
     own = ", ".join(f"{log.name}: {times(log)}" for log in logs if log.alarms)
     raise ValueError(
         f"{alarms} alarms in {seconds / 60:.1f} min of logs without a contact, each judged by the "
-        f"others{own and f' ({own})'}: at least {low:.0f} an hour where {asked:g} are accepted; if "
+        f"others ({own}): at least {low:.0f} an hour where {asked:g} are accepted; if "
         "something touched the arm there, leave these logs out or cut the touches out, else more "
         "logs of such motion would help"
     )

@@ -7,13 +7,14 @@ more of them for its length than the others stands out.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import (
     UNKNOWN_LOAD,
     Recording,
@@ -21,7 +22,6 @@ from tauguard.detectors.calibration.recording import (
     moves,
     pieces,
 )
-from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import (
@@ -30,7 +30,6 @@ from tauguard.detectors.features.free_bound import (
     standing_positions,
 )
 from tauguard.detectors.scores.free_motion import (
-    CALIBRATION_RATE,
     FOLDS,
     SETTLE,
     FittedFreeMotion,
@@ -129,8 +128,13 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
 
     One log alone is cut, and each part judged by the other parts.
 
+    Where the others show too little motion to calibrate from, the calibration is that of all logs.
+
     Returns:
-        In order; empty where the others together show too little motion to learn from.
+        In order.
+
+    Raises:
+        ValueError: all together show too little motion.
     """
     parts = dict(recordings)
     whole = [name for name, r in parts.items() if moves(r.trace)]
@@ -139,11 +143,7 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
         cuts = pieces([parts.pop(whole[0])], FOLDS)
         parts |= {f"{whole[0]} {k}": part for k, part in enumerate(cuts)}
         owner = {part: whole[0] if part not in recordings else part for part in parts}
-    try:
-        seen = _seen(list(parts.values()), arm)
-    except ValueError:  # without some of them too little motion is left
-        return []
-    found = []
+    seen, found = _seen(list(parts.values()), arm), []
     for name, recording in recordings.items():
         own = [one for part, one in zip(parts, seen, strict=True) if owner[part] == name]
         alarms = tuple(alarm for one in own for alarm in one[0])
@@ -158,24 +158,26 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
     if not any(moves(part.trace) for part in parts):  # one bound for all, of their calmest pieces
         still = standing_detector(arm, parts)
         return [_alarms_and_level(with_load_of(part, still).judge(part.trace)) for part in parts]
-    bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-    moving = [k for k, part in enumerate(parts) if moves(part.trace)]
-    data = {
-        k: filtered(parts[k], arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for k in moving
-    }
-    turn = {k: place % TURNS for place, k in enumerate(moving)}
+    numbers = [k for k, part in enumerate(parts) if moves(part.trace)]
+    moving = [parts[k] for k in numbers]
+    turn = {k: place % TURNS for place, k in enumerate(numbers)}
     dt = max(part.trace.dt for part in parts)
+    calibrated = Subsets(arm, moving)
 
-    def detector(others: Sequence[int]) -> FittedFreeMotion:
-        own, known = [parts[k] for k in others], [data[k] for k in others]
-        found = identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
-        bound = Bound.prior(*friction_levels(found, own), *standing_positions(parts))
-        return FittedFreeMotion(found, dt, bound, UNKNOWN_LOAD, 0.0, 0)
+    @functools.cache
+    def without(left: int) -> FittedFreeMotion:
+        use = [place for place in range(len(moving)) if place % TURNS != left]
+        try:
+            found = calibrated(use)
+        except ValueError:  # too little motion is left without the turn
+            if left < 0:
+                raise
+            return without(-1)
+        levels = friction_levels(found, [moving[place] for place in use])
+        bound = Bound.prior(*levels, *standing_positions(parts))
+        return FittedFreeMotion(found, dt, bound, UNKNOWN_LOAD, 0.0)
 
-    fitted = {one: detector([k for k in moving if turn[k] != one]) for one in set(turn.values())}
-    whole = detector(moving) if len(moving) < len(parts) else None
-    own = [fitted[turn[k]] if k in turn else whole for k in range(len(parts))]
-    judges = [one for one in own if one is not None]
+    judges = [without(turn.get(k, -1)) for k in range(len(parts))]
     first = [with_load_of(r, one).judge(r.trace) for r, one in zip(parts, judges, strict=True)]
     found = []
     for k, (part, judge) in enumerate(zip(parts, judges, strict=True)):

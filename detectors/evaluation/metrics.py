@@ -8,32 +8,12 @@ from typing import Any
 import numpy as np
 
 from tauguard.detectors.evaluation.matching import Matching
+from tauguard.report import poisson_rate
 from tauguard.report import rate as wilson
 from tauguard.traces.severity import STRATA, stratum
 
 #: The headline is over collisions from here up [N m].
 HEADLINE = 16.0
-
-Rate = dict[str, Any]
-
-
-def poisson_rate(count: int, hours: float) -> Rate:
-    """Events per hour with the exact (Garwood) Poisson 95 % interval; ``n`` is the count."""
-    from scipy.special import gammaincinv  # scipy.stats loads for seconds
-
-    if count < 0 or not hours >= 0:
-        raise ValueError(f"{count} events in {hours} h: expected 0 or more")
-    if hours == 0:
-        return {"value": None, "low": None, "high": None, "n": count, "hours": 0.0}
-    low = 0.0 if count == 0 else float(gammaincinv(count, 0.025))
-    high = float(gammaincinv(count + 1, 0.975))
-    return {
-        "value": count / hours,
-        "low": low / hours,
-        "high": high / hours,
-        "n": count,
-        "hours": hours,
-    }
 
 
 def delay_metrics(delays: Iterable[float | None]) -> dict[str, Any]:

@@ -13,11 +13,11 @@ from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobia
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
 from tauguard.detectors.estimation.observer import LOG_GAIN
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
-from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import FREE_GAIN
 from tauguard.detectors.features.motion_regimes import motion_regimes
 from tauguard.detectors.scores.free_motion import SETTLE, FittedFreeMotion, Judged
+from tauguard.report import poisson_rate
 from tauguard.traces.trace import Trace
 
 #: Fraction of a torque on a standing joint that the detector sees for long enough, if the torque
@@ -56,9 +56,9 @@ class ThresholdCard:
     all poses and directions; infinite where no force is found in so many."""
     moment: float  #: at the last link that is found moving, in half of them [N m]
     seconds: float  #: of the logs
-    alarms: int  #: in left-out logs, under bounds from the others
+    alarms: int  #: in all logs, each judged by the others
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
-    logs: tuple[CrossValidatedLog, ...]  #: each judged by the others; empty: not known one by one
+    logs: tuple[CrossValidatedLog, ...]  #: each judged by the others
     left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
     replay: tuple[int, int]
@@ -94,14 +94,14 @@ class ThresholdCard:
 
 
 def threshold_card(
-    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: CrossValidation | None = None
+    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: CrossValidation
 ) -> ThresholdCard:
     """The card of a fitted detector.
 
     Args:
         detector: fitted.
         traces: its training logs, for poses, regimes and bounds in motion.
-        sifted: the cross-validation of these logs (default: only their alarms' number is known).
+        sifted: the cross-validation of these logs.
     """
     bound, robot = detector.bound, detector.arm.robot
     judged = [detector.judge(trace) for trace in traces]
@@ -118,8 +118,7 @@ def threshold_card(
         "stopped": (bound.rest + bound.stop) / COUNTS,
         "moving": usual,
     }
-    logs = sifted.kept if sifted is not None else ()
-    alarms = sum(len(log.alarms) for log in logs) if logs else detector.alarms
+    alarms = sum(len(log.alarms) for log in sifted.kept)
     return ThresholdCard(
         robot.joint_names,
         levels["standing"],
@@ -131,8 +130,8 @@ def threshold_card(
         detector.seconds,
         alarms,
         poisson_rate(alarms, detector.seconds / 3600),
-        logs,
-        sifted.left_out if sifted is not None else (),
+        sifted.kept,
+        sifted.left_out,
         dict(detector.unseen),
         replayed(detector, traces, usual, starting),
     )

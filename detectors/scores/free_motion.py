@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
-from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.identification import REAL_FRICTION, Subsets
 from tauguard.detectors.calibration.recording import (
     UNKNOWN_LOAD,
     Load,
@@ -30,10 +30,9 @@ from tauguard.detectors.calibration.recording import (
     moves,
     pieces,
 )
-from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals
-from tauguard.detectors.events import SERIES, find_alarms, sustained
+from tauguard.detectors.events import sustained
 from tauguard.detectors.features.free_bound import (
     CREEP,
     PRIOR,
@@ -64,9 +63,6 @@ EVERY = 0.04
 
 #: Calibrations that leave logs out, at most.
 FOLDS = 5
-
-#: Rate of the filter that the calibration looks through [1/s].
-CALIBRATION_RATE = 20.0
 
 #: What left-out logs showed at most counts so many times, between these fractions of the bounds at
 #: rest, after motion and in motion, and against so many seconds of the prior.
@@ -108,7 +104,6 @@ class FittedFreeMotion(Frozen):
     bound: Bound
     load: LoadDeviation  #: how uncertain the carried load is
     seconds: float  #: of collision-free motion that the bounds rest on
-    alarms: int  #: in the training logs, each under calibration and bounds from the others
     unseen: Unseen = ()  #: what the logs do not show
     name: str = "free-motion"
     settle: float = SETTLE  #: [s]
@@ -192,30 +187,20 @@ class FreeMotion:
         models, whole = _calibrations(arm, moving)
         bound = Bound.prior(*friction_levels(whole, moving), *standing_positions(parts))
         dt = max(r.trace.dt for r in recordings)
-        prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0, 0)
+        prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0)
         left_out = [replace(prior, arm=model) for model in models] + [prior] * len(standing)
-        parts = [*moving, *standing]
-        own_arms = zip(parts, left_out, strict=True)
+        own_arms = zip([*moving, *standing], left_out, strict=True)
         judged = [with_load_of(part, one).judge(part.trace) for part, one in own_arms]
-        alarms = 0
-        for fold in range(FOLDS):
-            own = range(fold, len(parts), FOLDS)
-            if not own:
-                continue
-            fresh = learned(bound, [j for k, j in enumerate(judged) if k not in own])
-            for k in own:
-                judge = with_load_of(parts[k], replace(left_out[k], bound=fresh))
-                alarms += _alarms(judge, parts[k])
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
         lacking = unseen([r.trace for r in recordings])
         fresh = learned(bound, judged)
-        return replace(prior, bound=fresh, seconds=seconds, alarms=alarms, unseen=lacking)
+        return replace(prior, bound=fresh, seconds=seconds, unseen=lacking)
 
 
 def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotion:
     """The detector of an arm that no log shows moving: it watches while the arm stands.
 
-    Its ``alarms`` are those in these logs: they rest on the calmest pieces, so contacts raise some.
+    Its bounds rest on the calmest pieces, so contacts in these logs raise alarms.
 
     Raises:
         ValueError: logs that are too short.
@@ -224,7 +209,7 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     bare = replace(REAL_FRICTION, weights=np.zeros((n, REAL_FRICTION.columns)))
     arm = replace(arm, friction=bare, noise=np.ones(n))
     bound = Bound.prior(np.ones(n), np.ones(n), *standing_positions(recordings))
-    prior = FittedFreeMotion(arm, dt, bound, LoadDeviation(), 0.0, 0)
+    prior = FittedFreeMotion(arm, dt, bound, LoadDeviation(), 0.0)
     judged = [with_load_of(r, prior).judge(r.trace) for r in recordings]
     noise = np.fmin(_noise(judged, np.full(n, np.nan)), CALM * _calmest(judged, n))
     if not np.isfinite(noise).all():
@@ -233,8 +218,7 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     bound = replace(bound, noise=noise, static=KEEPS * noise, friction=KEEPS * noise)
     seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
     lacking = unseen([r.trace for r in recordings])
-    found = replace(prior, bound=bound, seconds=seconds, unseen=lacking)
-    return replace(found, alarms=sum(_alarms(with_load_of(r, found), r) for r in recordings))
+    return replace(prior, bound=bound, seconds=seconds, unseen=lacking)
 
 
 def _calmest(judged: Sequence[Judged], joints: int) -> Array:
@@ -266,14 +250,7 @@ def _has_collisions(trace: Trace) -> bool:
 
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
     """For each part the calibration from the parts of other folds, and that from all."""
-    bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-    data = [filtered(r, arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for r in parts]
-
-    def calibrated(use: Sequence[int]) -> ArmModel:
-        own, known = [parts[i] for i in use], [data[i] for i in use]
-        return identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
-
-    everything = range(len(parts))
+    calibrated, everything = Subsets(arm, parts), range(len(parts))
     whole = calibrated(everything)
     models = [whole] * len(parts)
     turns = range(min(FOLDS, len(parts)))
@@ -389,10 +366,3 @@ def _noise(judged: Sequence[Judged], prior: Array) -> Array:
         return prior
     noise: Array = np.median(np.abs(all_of), axis=0) / 0.6745 / np.sqrt(2)
     return np.fmax(noise, 1e-3 * prior)
-
-
-def _alarms(detector: FittedFreeMotion, recording: Recording) -> int:
-    """False alarms in a collision-free recording."""
-    trace = recording.trace
-    above = (detector.scores(trace) > 1) & (trace.t - trace.t[0] > SETTLE)
-    return len(find_alarms(trace.t, above, SERIES))

@@ -3,8 +3,7 @@
 Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that are rarer than the
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
 replacement, since the moments of one episode are alike. Every draw has its own tail. The tails
-differ most in rare alarms, and a few of them give many alarms; the expected rate is the mean over
-the draws. A tail has an end only if the peaks show this beyond chance.
+differ most in rare alarms. A tail has an end only if the peaks show this beyond chance.
 
 No tail contains moments that no episode shows. Therefore an interval always contains the exact
 Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an
@@ -27,6 +26,7 @@ from tauguard.detectors.thresholds.tail_model import (
     shape_error,
     tail_fraction,
 )
+from tauguard.report import poisson_rate
 
 #: Bounds of the tail's shape if the peaks do not show that it ends, and the lowest shape if they
 #: do.
@@ -72,61 +72,12 @@ class ExpectedRate:
             found[counted] = (self.draws[counted] @ np.array(above)) / self.draw_hours[counted]
         return found
 
-    def mean(self, threshold: float) -> float:
-        """The expected rate [1/h]."""
-        return float(np.mean(self.rates(threshold)))
-
-    def quantile(self, threshold: float, fraction: float) -> float:
-        """The rate that this fraction of the draws does not exceed [1/h]."""
-        return float(np.quantile(self.rates(threshold), fraction))
-
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
         """The lowest and the highest rate that the motion allows [1/h]."""
         side = (1 - confidence) / 2
-        least = self.episode_bound(threshold, side)
-        most = self.episode_bound(threshold, 1 - side)
-        low, high = self.quantile(threshold, side), self.quantile(threshold, 1 - side)
-        return min(low, least), max(high, most)
-
-    def episode_bound(self, threshold: float, confidence: float) -> float:
-        """The exact Poisson bound of the rate of episodes with an alarm [1/h], whatever the tail.
-
-        An upper one where ``confidence`` is above one half, else a lower one.
-        """
-        from scipy import stats
-
-        count = int(np.sum(self.highest > threshold)) + int(confidence > 0.5)
-        return float(stats.chi2.ppf(confidence, 2 * count) / 2 / self.hours) if count else 0.0
-
-    def threshold(self, per_hour: float, confidence: float | None = None) -> float:
-        """The threshold whose rate is expected to be ``per_hour``.
-
-        Args:
-            per_hour: false alarms to accept, above 0.
-            confidence: take the threshold that suffices for this fraction of the draws; ``None``:
-                the expected one.
-
-        Raises:
-            ValueError: a rate that is not above 0.
-        """
-        from scipy import optimize
-
-        if not per_hour > 0:
-            raise ValueError(f"per_hour: {per_hour}, expected above 0")
-
-        def above(threshold: float) -> float:
-            if confidence is None:
-                return self.mean(threshold) - per_hour
-            return self.quantile(threshold, confidence) - per_hour
-
-        low = min(float(peaks[0]) for peaks in self.blocks)
-        if above(low) <= 0:
-            return low
-        step = max(float(np.max(self.highest)) - low, 1e-9)
-        while above(low + step) > 0:
-            step *= 2
-        close = 1e-9 * step
-        return float(optimize.bisect(above, low, low + step, xtol=close)) + close
+        low, high = np.quantile(self.rates(threshold), (side, 1 - side))
+        seen = poisson_rate(int(np.sum(self.highest > threshold)), self.hours, confidence)
+        return min(float(low), seen["low"]), max(float(high), seen["high"])
 
 
 @dataclass(frozen=True)

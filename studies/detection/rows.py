@@ -7,8 +7,8 @@ import numpy as np
 
 from studies.detection.operating import AMPERES, HOURLY, Fleet, Outcome, Tallies, Tally
 from studies.framework import groups, table_rows
-from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics, poisson_rate
-from tauguard.report import Row, rate
+from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
+from tauguard.report import Row, poisson_rate, rate
 from tauguard.traces import stratum
 
 #: The dissertation's confusion matrices (TP, FN, FP, TN; 65 collisions) by speed [%]:

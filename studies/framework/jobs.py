@@ -119,10 +119,21 @@ def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
 
     call, own, path = job
     result = call(own)
-    # skops cannot store keys that are tuples.
-    kept = ([*result], [*result.values()]) if isinstance(result, dict) else result
-    write_atomic(path, dumps(kept))
+    write_atomic(path, dumps(_stored(result)))
     return result
+
+
+def _stored(result: Any) -> Any:
+    """Dictionaries as pairs of lists, also in a list: skops cannot store keys that are tuples."""
+    if isinstance(result, list):
+        return [_stored(one) for one in result]
+    return ([*result], [*result.values()]) if isinstance(result, dict) else result
+
+
+def _restored(kept: Any) -> Any:
+    if isinstance(kept, list):
+        return [_restored(one) for one in kept]
+    return dict(zip(*kept, strict=True)) if isinstance(kept, tuple) else kept
 
 
 def read(path: Path) -> Any:
@@ -134,7 +145,7 @@ def read(path: Path) -> Any:
         kept = loads(data, trusted=[t for t in get_untrusted_types(data=data) if _is_result(t)])
     except Exception as error:  # a damaged file can make the reader raise anything
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
-    return dict(zip(*kept, strict=True)) if isinstance(kept, tuple) else kept
+    return _restored(kept)
 
 
 def _is_result(name: str) -> bool:

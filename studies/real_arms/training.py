@@ -15,6 +15,7 @@ from studies.real_arms.arms import available, nominal, recordings, thinned
 from tauguard.detectors import ArmModel, RobotNumbers, poisson_rate
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Recording, cut
+from tauguard.detectors.evaluation.cross_validation import judge_logs
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion, with_load_of
 from tauguard.envs import Episode, simulate
@@ -69,7 +70,8 @@ def _row(
         except ValueError as error:
             row["note"] = str(error)
             continue
-        promised += fitted.alarms, fitted.seconds / 3600
+        for log in judge_logs({str(k): r for k, r in enumerate(use)}, start):
+            promised += len(log.alarms), log.seconds / 3600
         for recording in (logs[log] for log in held):
             trace = recording.trace
             known = with_load_of(recording, fitted)

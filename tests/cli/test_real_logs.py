@@ -12,8 +12,8 @@ from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.recording import Load, cut
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
+from tests.oracles.added_contact import Added, add_contact
 
 COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}
 GAINS = [str(g) for g in GAIN]

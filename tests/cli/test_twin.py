@@ -11,9 +11,9 @@ from tauguard.cli import main
 from tauguard.datasets.recordings import labelled
 from tauguard.detectors import load_model
 from tauguard.detectors.calibration.recording import Load, cut
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.models import load_arm
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
+from tests.oracles.added_contact import Added, add_contact
 
 COLUMNS = {
     "t": "t",

@@ -47,11 +47,11 @@ def double(job):
         log.write(f"{job} ")
     if job == 3 and "FAIL" in os.environ:
         raise ZeroDivisionError("three")
-    return {"value": 2.0 * job, ("a", 1): [job, None]}
+    return [{"value": 2.0 * job, ("a", 1): [job, None]}]
 def measure(quick, seed, keep=None):
     cache = JobCache.of(keep, "jobs", seed, "size")
     with Workers() as each:
-        found = [one["value"] for one in cache.over(each, "double")(double, [5, 3, 4])]
+        found = [one["value"] for (one,) in cache.over(each, "double")(double, [5, 3, 4])]
     return [{"study": "a", "us": value} for value in found]
 """
 RECORDED = """

@@ -56,8 +56,7 @@ def free_logs(
         check_named(robot, columns, list(traces.values()))
     recordings = {name: known[name] for name in traces}
     arm, source = initial_arm(read.numbers, list(recordings.values()), columns, gains, scale)
-    for name, trace in traces.items():
-        check_signs(arm, name, trace)
+    check_signs(arm, recordings)
     chosen = "gains" if source in ("preset", "torques") else source
     return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
 
@@ -82,8 +81,7 @@ def free_arm(
     from tauguard.detectors.calibration.checks import check_signs
 
     arm, source = known_arm(robot, numbers, list(recordings.values()), columns, gains)
-    for name, recording in recordings.items():
-        check_signs(arm, name, recording.trace)
+    check_signs(arm, recordings)
     return arm, source
 
 

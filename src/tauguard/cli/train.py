@@ -232,10 +232,7 @@ def free_motion(
     print_notes(not_shown(list(traces.values())))
     held = [log for log in sifted.kept if log not in sifted.accepted]
     hold_to("error", accept, lambda: check_own_error(held))
-    seen = (sum(len(log.alarms) for log in held), sum(log.seconds for log in held))
-    counts = seen if sifted.kept else (detector.alarms, detector.seconds)
-    if counts[1]:
-        hold_to("alarms", accept, lambda: check_own_alarms(*counts, per_hour, held))
+    hold_to("alarms", accept, lambda: check_own_alarms(held, per_hour))
     save_model(free_alarm(detector, list(traces.values())), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")

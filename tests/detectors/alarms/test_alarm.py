@@ -17,13 +17,13 @@ from tauguard.detectors import (
     train,
 )
 from tauguard.detectors.alarms.training import left_out, train_and_score, with_rate
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.detectors.features.front_end import FrontEndSettings
 from tauguard.detectors.scores.baselines import MovingThresholds
 from tauguard.detectors.thresholds.speed_normalisation import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.models import Mismatch
+from tests.oracles.added_contact import Added, add_contact
 
 
 def test_it_finds_collisions_on_unseen_motions_with_unknown_payloads(alarm, unseen):

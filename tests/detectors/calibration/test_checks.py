@@ -7,26 +7,27 @@ import pytest
 
 from tauguard.detectors import ArmModel
 from tauguard.detectors.calibration.checks import check_signs, check_weight, drag, torque_per_ampere
+from tauguard.detectors.calibration.recording import Recording
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
 
 @pytest.mark.parametrize("joint", range(3))
 def test_a_current_of_the_other_sign_is_named(joint):
     arm, trace = ArmModel(nominal(), GAIN), record(3)
-    check_signs(arm, "log.csv", trace)
+    check_signs(arm, {"log.csv": Recording(trace)})
     sign = np.where(np.arange(3) == joint, -1.0, 1.0)
     with pytest.raises(ValueError, match=rf"^log.csv: friction would push {'abc'[joint]}:"):
-        check_signs(arm, "log.csv", replace(trace, current=trace.current * sign))
+        check_signs(arm, {"log.csv": Recording(replace(trace, current=trace.current * sign))})
     # A gain of that sign makes up for it.
     told = replace(arm, drive_gain=GAIN * sign)
-    check_signs(told, "log.csv", replace(trace, current=trace.current * sign))
+    check_signs(told, {"log.csv": Recording(replace(trace, current=trace.current * sign))})
 
 
 def test_joints_that_hardly_move_say_nothing():
     trace = record(3, seconds=8.0)
     still = replace(trace, qd=trace.qd * [1.0, 0.0, 1.0])
     assert np.isnan(drag(nominal(), still, np.ones(3)))[1]
-    check_signs(ArmModel(nominal(), GAIN), "log", replace(trace, qd=0 * trace.qd))
+    check_signs(ArmModel(nominal(), GAIN), {"log": Recording(replace(trace, qd=0 * trace.qd))})
 
 
 @pytest.mark.parametrize("factor", [0.4, 2.5])

@@ -19,7 +19,6 @@ from tauguard.detectors.calibration.identification import identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
 from tauguard.detectors.dynamics.physical_consistency import is_physically_consistent
 from tauguard.detectors.dynamics.robot import RobotNumbers
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,
@@ -30,6 +29,7 @@ from tests.detectors.synthetic_arm import (
     record,
     true_model,
 )
+from tests.oracles.added_contact import Added, add_contact
 
 
 @pytest.fixture(scope="module")

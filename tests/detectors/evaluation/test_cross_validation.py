@@ -13,9 +13,9 @@ from tauguard.detectors.evaluation.cross_validation import (
     judge_logs,
     standing_out,
 )
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.traces import Alarm
 from tests.detectors.synthetic_arm import GAIN, nominal, record
+from tests.oracles.added_contact import Added, add_contact
 
 ARM = ArmModel(nominal(), GAIN)
 PUSHES = (3.0, 5.5, 12.0, 15.0, 18.0, 21.0)
@@ -70,8 +70,15 @@ def test_one_log_is_judged_part_by_part():
     assert log.alarms == ()
 
 
-def test_too_little_motion_judges_nothing():
-    assert judge_logs({"a": Recording(record(1, 6.0)), "b": Recording(record(2, 6.0))}, ARM) == []
+def test_logs_too_short_to_be_left_out_are_judged_by_the_calibration_of_all():
+    short = {"a": Recording(record(1, 6.0)), "b": Recording(record(2, 6.0))}
+    assert [(log.name, log.alarms) for log in judge_logs(short, ARM)] == [("a", ()), ("b", ())]
+    pushed = add_contact(short["a"].trace, GAIN, Added(3.0, 0.5, (30.0, -40.0, 20.0), "push"))
+    first, second = judge_logs(short | {"a": Recording(pushed)}, ARM)
+    assert [round(alarm.start) for alarm in first.alarms] == [3]
+    assert second.alarms == ()
+    with pytest.raises(ValueError, match="6 s of motion"):
+        judge_logs({"a": short["a"]}, ARM)
     assert standing_out([]) == []
 
 

@@ -9,12 +9,13 @@ from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
 from tauguard.detectors._observer import REGIME_SETTLES
 from tauguard.detectors.alarms.training import carrying
 from tauguard.detectors.calibration.recording import Load, Recording
-from tauguard.detectors.evaluation.semi_real import Added, add_contact
+from tauguard.detectors.evaluation.cross_validation import CrossValidation, judge_logs
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
-from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion, standing_detector
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tests.detectors.synthetic_arm import GAIN, nominal, record
+from tests.oracles.added_contact import Added, add_contact
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +60,9 @@ def test_touches_in_a_standing_log_are_alarms_in_it(size):
             touched, GAIN, Added(start, 0.5, (1.8 * size, -1.8 * size, 0.6), "push")
         )
     arm = ArmModel(nominal(), GAIN)
-    assert standing_detector(arm, [Recording(free)]).alarms == 0
-    assert standing_detector(arm, [Recording(touched)]).alarms > 20
+    for trace, least, most in ((free, 0, 0), (touched, 21, 99)):
+        (log,) = judge_logs({"log": Recording(trace)}, arm)
+        assert least <= len(log.alarms) <= most
 
 
 def test_what_a_push_leaves_is_taken_up(alarm):
@@ -248,7 +250,7 @@ def test_thirty_seconds_in_one_log_are_enough():
 
 
 def test_the_card_counts_what_the_bounds_are(fitted):
-    card = threshold_card(fitted, [record(0)])
+    card = threshold_card(fitted, [record(0)], CrossValidation((), (), ()))
     assert (card.standing < card.moving).all()
     assert (card.moving < card.starting).all()
     assert card.tool["standing"][0] < card.tool["moving"][0]
@@ -285,7 +287,8 @@ def test_other_joints_are_refused(alarm):
 
 def test_what_the_card_promises_in_motion_is_found(fitted, alarm):
     """Pushes of the promised size, added to logs that training has not seen."""
-    moving = threshold_card(fitted, [record(seed) for seed in range(3)]).moving
+    traces = [record(seed) for seed in range(3)]
+    moving = threshold_card(fitted, traces, CrossValidation((), (), ())).moving
     rng, found = np.random.default_rng(4), []
     for trace in (record(7), record(8)):
         for start in rng.uniform(2.0, 7.0, 12):
