@@ -169,13 +169,15 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def foreign(folder: Path) -> list[str]:
-    """What lies among the shards and is none: a library that reads all of ``data`` reads it too."""
+    """What lies among shards and arms and is neither: who reads all of ``data`` reads it too."""
     known = {
         path(split, number)
         for split, number in shards(configuration_in(folder))
         for path in (data_path, manifest_path)
     }
-    there = (*folder.glob("data/*"), *folder.glob("manifest/*"))
+    arms = read_head(folder).get("arms_sha256", {})
+    known |= {f"arms/{name if '.' in name else f'{name}.xml'}" for name in arms}
+    there = (path for name in ("data", "manifest", "arms") for path in folder.glob(f"{name}/*"))
     names = (path.relative_to(folder).as_posix() for path in there if not path.name.startswith("."))
     return sorted(set(names) - known)
 

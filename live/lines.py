@@ -7,7 +7,7 @@ from typing import TextIO
 
 import numpy as np
 
-from tauguard.live.stream import Closing, Sample, StreamClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
 #: Largest length of a line [bytes].
 LONGEST = 1 << 16
@@ -33,9 +33,11 @@ class LineStream(Closing):
     def read(self, timeout: float) -> Sample | None:
         """The sample of the next line, or None if none came within ``timeout`` seconds.
 
+        A line that is no sample is an event, and its values are NaN: the monitor calls it a fault.
+
         Raises:
-            StreamClosed: the stream has ended.
-            ValueError: a line with another number of columns, or with something else than numbers.
+            StreamClosed: the stream has ended, or a line has no end.
+            ValueError: the first line is no sample.
         """
         deadline = time.monotonic() + timeout
         left = timeout
@@ -48,13 +50,13 @@ class LineStream(Closing):
                 continue
             if not data:
                 if self._pending.strip():  # its last number may be cut
-                    self.events.append(f"line {self._lines + 1} has no end and was left out")
+                    add_event(self.events, f"line {self._lines + 1} has no end and was left out")
                     self._pending = b""
                 raise StreamClosed("the input has ended")
             self._pending += data
             if len(self._pending) > LONGEST and b"\n" not in self._pending:
-                raise ValueError(
-                    f"line {self._lines + 1}: more than {LONGEST} bytes without an end"
+                raise StreamClosed(
+                    f"line {self._lines + 1}: more than {LONGEST} bytes without an end", lost=True
                 )
         arrived = time.monotonic_ns()
         line, _, self._pending = self._pending.partition(b"\n")
@@ -68,10 +70,14 @@ class LineStream(Closing):
         except ValueError:
             values = np.empty(0)
         if len(values) != 1 + 3 * n:
-            raise ValueError(
+            wrong = (
                 f"line {self._lines}: expected {1 + 3 * n} numbers (t, {n} q, {n} qd, {n} "
                 f"currents) separated by commas, got {line[:60]!r}"
             )
+            if self._lines == 1:
+                raise ValueError(wrong)
+            add_event(self.events, wrong)
+            values = np.full(1 + 3 * n, np.nan)
         q, qd, current = np.split(values[1:], 3)
         return Sample(float(values[0]), q, qd, current, arrived)
 

@@ -61,7 +61,9 @@ class Session:
     ended: str = ""  #: why the session ended
     lost: bool = False  #: the session ended because the connection broke
     _silence: Silence | None = None  #: the present silence
-    _now: float = np.nan  #: robot's time of the last sample, with a fault or without [s]
+    _now: float = np.nan  #: the last robot's time that was new [s]
+    _told: int = 0  #: this machine's clock when it came [ns]
+    _at: float = np.nan  #: robot's time of the last sample; where it stands, this machine's goes on
 
     def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
         """Record one sample.
@@ -77,7 +79,8 @@ class Session:
         self.slowest = max(self.slowest, latency)
         self._silence = None
         t = sample.t
-        self._now = t if np.isfinite(t) else self._now
+        if np.isfinite(t) and t != self._now:
+            self._now, self._told = t, sample.arrived
         if not answer.reason:
             self.first = t if np.isnan(self.first) else self.first
             self.last = t
@@ -86,7 +89,8 @@ class Session:
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
         self.answer = said
-        self.spans.add(t if np.isfinite(t) else self._now, said)
+        self._at = self._now + 1e-9 * (sample.arrived - self._told)
+        self.spans.add(self._at, said)
 
     def silent(self, seconds: float) -> tuple[Sample, Answer]:
         """Record that no sample has arrived for ``seconds``.
@@ -96,7 +100,7 @@ class Session:
             the collision whose alarm was up when the samples ended.
         """
         if self._silence is None:
-            self._silence = Silence(self._now, seconds)
+            self._silence = Silence(self._at, seconds)
             self.silences.append(self._silence)
         self._silence.seconds = seconds
         alarm = self.answer.alarm
@@ -107,6 +111,12 @@ class Session:
             self._silence.after + seconds, nothing, nothing, nothing, time.monotonic_ns()
         )
         return sample, self.answer
+
+    def close(self, why: str, lost: bool) -> None:
+        """Record that the source ended: no sample comes any more, so the state is not free."""
+        self.ended, self.lost = why, lost
+        if not self.answer.alarm and self._silence is None:
+            self.answer = self.answer._replace(state=FAULT, reason=f"no samples: {why}")
 
     @property
     def state(self) -> str:
@@ -243,7 +253,7 @@ def listen(
                 clock.heard(sample, answer, latency, said)
             session.ended = f"{seconds:g} s are over"
     except StreamClosed as closed:
-        session.ended, session.lost = str(closed), closed.lost
+        session.close(str(closed), closed.lost)
     except KeyboardInterrupt:
         session.ended = "ended by hand"
     finally:

@@ -114,14 +114,19 @@ class Span:
 class Spans:
     """The spans so far.
 
-    A collision that began within 20 ms before a fault is attributed to the fault.
+    A collision that began within 20 ms before a fault is attributed to the fault. Where the clock
+    begins anew, the open spans end, and what lasts opens new ones.
     """
 
     found: list[Span] = field(default_factory=list)
     _open: dict[str, Span] = field(default_factory=dict)
+    _last: float = -np.inf  #: the last finite time [s]
 
     def add(self, t: float, answer: Answer) -> None:
         """One sample's answer; ``t`` is its time [s]."""
+        if t < self._last - MERGED:
+            self._open.clear()
+        self._last = t if np.isfinite(t) else self._last
         if answer.state == FAULT:
             self._take_back(t)
         self.mark(COLLISION, answer.alarm, t, "")
@@ -140,14 +145,14 @@ class Spans:
             return  # the span begins with the next finite time
         if up and span is None:
             last = next((span for span in reversed(self.found) if span.state == state), None)
-            if last is not None and t - last.end < MERGED:
-                last.end = t
+            if last is not None and abs(t - last.end) < MERGED:
+                last.end = max(last.end, t)
             else:
                 last = Span(state, t, t, reason)
                 self.found.append(last)
             self._open[state] = last
         elif up and span is not None:
-            span.end = t if np.isfinite(t) else span.end
+            span.end = max(span.end, t) if np.isfinite(t) else span.end
         elif span is not None:
             del self._open[state]
 

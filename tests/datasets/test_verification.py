@@ -103,7 +103,9 @@ def test_sha256sum_reads_the_checksums(tiny):
         assert hashlib.sha256((tiny / name).read_bytes()).hexdigest() == digest
 
 
-@pytest.mark.parametrize("name", ["data/train-000002.parquet", "manifest/x.jsonl", "data/old/a"])
+@pytest.mark.parametrize(
+    "name", ["data/train-000002.parquet", "manifest/x.jsonl", "data/old/a", "arms/ur5.xml"]
+)
 def test_a_file_among_the_shards_that_is_none_is_named(copy, capsys, name):
     (copy / name).parent.mkdir(exist_ok=True)
     (copy / name).write_bytes((copy / "data/train-000000.parquet").read_bytes())

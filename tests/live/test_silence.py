@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from tauguard.detectors.alarms.monitor import Answer
+from tauguard.detectors.alarms.monitor import Answer, Spans
 from tauguard.live import LineStream, PlayedStream, Sample, StreamClosed, UrStream, rtde, ur
 from tauguard.live.ros import RosStream
 from tauguard.live.session import listen
@@ -407,6 +407,73 @@ def test_an_input_that_does_not_block_has_not_ended():
             stream.read(1.0)
         assert stream.events == ["line 2 has no end and was left out"]
     text.close()
+
+
+def test_a_line_that_is_no_sample_is_a_fault_and_ends_nothing():
+    text, into = piped()
+    os.write(into, b"1,0,0,0\n1.008,0,oops\n1.016,0,0,0\n")
+    os.close(into)
+    with LineStream(text, ("a",), RATE) as stream:
+        samples = [stream.read(1.0) for _ in range(3)]
+    assert [sample.t for sample in samples] == pytest.approx([1, np.nan, 1.016], nan_ok=True)
+    assert np.isnan(samples[1].q).all()
+    (said,) = stream.events
+    assert said.startswith("line 2: expected 4 numbers")
+    text.close()
+
+
+def test_a_first_line_that_is_no_sample_is_refused():
+    text, into = piped()
+    os.write(into, b"t,q1,qd1,i1\n")
+    with LineStream(text, ("a",), RATE) as stream, pytest.raises(ValueError, match="line 1: exp"):
+        stream.read(1.0)
+    os.close(into)
+    text.close()
+
+
+def test_an_input_that_has_ended_is_not_free():
+    text, into = piped()
+    os.write(into, b"1,0,0,0\n1.008,0,0,0\n")
+    os.close(into)
+    session = listen(LineStream(text, ("a",), RATE), AlwaysFree())
+    assert session.state == "fault: no samples: the input has ended"
+    assert session.faults() == []
+    text.close()
+
+
+class Named(AlwaysFree):
+    """A monitor that calls each sample a fault."""
+
+    def step(self, t, q, qd, current):
+        return Answer("fault", False, 0.0, "time stands still")
+
+
+def test_where_the_clock_of_the_robot_stands_still_a_fault_has_its_length():
+    text, into = piped()
+
+    def write():
+        for _ in range(50):
+            os.write(into, b"7,0,0,0\n")
+            time.sleep(1 / RATE)
+        os.close(into)
+
+    threading.Thread(target=write, daemon=True).start()
+    session = listen(LineStream(text, ("a",), RATE), Named())
+    (span,) = session.spans.of("fault")
+    assert span.start == 7
+    assert 49 / RATE <= span.end - span.start < 49 / RATE + 10 * BUSY
+    text.close()
+
+
+def test_a_collision_before_the_clock_begins_anew_is_kept():
+    """The fault's time lies before the collision's: it looked as if it had begun just then."""
+    spans = Spans()
+    for t in np.arange(20, 21, 0.008):
+        spans.add(t, Answer("collision", True, 2.0, ""))
+    spans.add(0.0, Answer("fault", False, 0.0, "time"))
+    spans.add(0.008, Answer("fault", False, 0.0, "time"))
+    found = [(span.state, span.start, span.end) for span in spans.found]
+    assert found == [("collision", 20, pytest.approx(20.992)), ("fault", 0, 0.008)]
 
 
 class Alarmed(AlwaysFree):
