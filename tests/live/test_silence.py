@@ -344,7 +344,7 @@ def test_a_pause_of_a_played_log_is_a_fault():
     (fault,) = [f for f in session.faults() if f.end - f.start > 0.4]
     assert fault.start == pytest.approx(0.192)
     assert fault.end == pytest.approx(0.8, abs=0.03)
-    assert session.state == "free"
+    assert session.state == "fault: no samples: the log is over"
 
 
 class Stuck:
