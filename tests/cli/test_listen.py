@@ -313,7 +313,7 @@ def test_a_pipe_that_says_nothing_is_a_fault(files, monkeypatch, capsys):
         main([*given(files), "--stdin", "--seconds", "0.5", "--json", str(files / "b.json")])
     os.close(into)
     screen = capsys.readouterr().out
-    assert "  fault: no samples: nothing for 0.02" in screen
+    assert "  fault: no samples: nothing for 0.0" in screen
     assert "free" not in screen
     result = json.loads((files / "b.json").read_text())
     (fault,) = result["faults"]
