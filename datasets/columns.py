@@ -51,6 +51,7 @@ class ColumnMap:
     """N m in one unit, a number or one a joint; -1 where the log's sign is not the robot file's."""
     clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
+    decimal: str = "."  #: mark of decimals
     joint_names: tuple[str, ...] = ()  #: empty: unknown
     width: int | None = None  #: number of columns of every row; None: not known
     headerless: bool = False  #: files have no header line; one with a header is refused
@@ -104,6 +105,8 @@ class ColumnMap:
                 raise ValueError(f"columns: {scale!r} as a scale, expected a number, not 0")
         if not (isinstance(self.separator, str) and len(self.separator) == 1):
             raise ValueError(f"columns.separator: {self.separator!r}, expected one character")
+        if self.decimal not in (".", ",") or self.decimal == self.separator:
+            raise ValueError(f"columns.decimal: {self.decimal!r}, expected . or , as no separator")
 
     def groups(self) -> dict[str, tuple[Column, ...]]:
         """The columns of the signals that have any, by the trace's field."""
@@ -240,6 +243,19 @@ PRESETS = {
         repair=frozenset({"repeat", "tail", "state"}),
     ),
 }
+
+
+def preset_of(columns: ColumnMap) -> str | None:
+    """The preset that a map is, units, repairs and form of a row apart."""
+    for name, known in PRESETS.items():
+        own = {n: getattr(known, n) for n in _FORM}
+        if dataclasses.replace(columns, **own) == known:
+            return name
+    return None
+
+
+#: Fields in which a file of a preset's columns may differ from it.
+_FORM = ("separator", "decimal", "degrees", "time_scale", "current_scale", "repair")
 
 
 def presets_of(header: Collection[str]) -> list[str]:

@@ -7,8 +7,10 @@ is an error that names the row.
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array, runs
+from tauguard.datasets.columns import ColumnMap
 from tauguard.detectors.faults.inputs import FASTEST
 from tauguard.traces.trace import Trace
 
@@ -23,6 +25,11 @@ AMPERES = 100.0
 #: A current is saturated if it stays at its largest value for this many samples in a row, and that
 #: value is at least this multiple of the median.
 PLATEAU, ABOVE = 5, 3.0
+#: A clock that was set back has fewer backward steps than this, and more rows after each.
+FEW = 5
+#: Rows that repeat the state are left out if they are at least this fraction of all rows: then the
+#: recorder is faster than its robot. Below it, a standing arm may repeat its values by chance.
+REPEATED = 0.2
 
 Where = Callable[[int], str]
 
@@ -123,7 +130,10 @@ def _meaning(ratio: float, name: str) -> str:
         return f"{name}: velocities in degrees/s, positions in rad"
     if -1.4 < ratio < -0.7:
         return f"{name}: the velocity has the other sign"
-    return f"{name}: the units of velocity, position and time do not fit (time in ms?)"
+    for word, scale in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+        if 0.7 < ratio / scale < 1.4:
+            return f"{name}: time in {word}? Then say --mend {word}"
+    return f"{name}: the units of velocity, position and time do not fit"
 
 
 def _alike(a: Array, b: Array) -> float:
@@ -145,3 +155,69 @@ def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
         if len(long):
             found.append((name, int(starts[long[0]]), int(lengths[long].max()), peak))
     return found
+
+
+def refuse_set_back(t: Array, lines: NDArray[np.int64]) -> None:
+    """Refuse to sort rows of a clock that was set back: two times would be mixed."""
+    back = np.flatnonzero(np.diff(t) < 0) + 1
+    for begin, row, end in zip([0, *back[:-1]], back, [*back[1:], len(t)], strict=True):
+        over = float(min(t[row - 1], t[end - 1]) - max(t[row], t[begin]))
+        if len(back) < FEW and end - row > FEW and over > max(5 * np.median(np.diff(t)), 0.05):
+            raise ValueError(
+                f"line {lines[row]}: the clock was set back by {over:.3g} s: cut the log there "
+                "into two"
+            )
+
+
+def increasing(
+    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[str]
+) -> NDArray[np.bool_]:
+    """Rows to keep so that time increases strictly; times may repeat only if the map allows it."""
+    step = np.diff(t)
+    back = np.flatnonzero(step < 0)
+    if back.size:
+        row = back[0] + 1
+        raise ValueError(
+            f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
+            "say --mend order"
+        )
+    same = np.flatnonzero(step == 0)
+    if same.size and "repeat" not in columns.repair:
+        raise ValueError(
+            f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
+            "--mend repeat"
+        )
+    if same.size:
+        notes.append(
+            f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
+        )
+    return np.concatenate([[True], step > 0])
+
+
+def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
+    """Rows to keep so that a recorder's copies of one state are not taken for samples.
+
+    A difference quotient is 0 over a copy and twice the speed after it. A state that really stays
+    is kept at the usual interval of new ones.
+
+    Args:
+        t: times [s], shape (T,).
+        state: all signals, shape (T, columns).
+        keep: rows to consider, shape (T,).
+        notes: a line on the rows left out is appended.
+    """
+    rows = np.flatnonzero(keep)
+    new = np.concatenate([[True], (np.diff(state[rows], axis=0) != 0).any(axis=1)])
+    share = 1 - new.mean()
+    if share < REPEATED or new.sum() < 3:
+        return keep
+    usual = float(np.median(np.diff(t[rows][new])))
+    kept, last = np.zeros_like(keep), -np.inf
+    for row, is_new in zip(rows, new, strict=True):
+        if is_new or t[row] - last > 1.4 * usual:
+            kept[row], last = True, t[row]
+    notes.append(
+        f"{100 * share:.0f} % of the rows repeat the state before: left out, a state comes every "
+        f"{1e3 * usual:.3g} ms"
+    )
+    return kept

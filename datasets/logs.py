@@ -1,8 +1,8 @@
 """Logs of real arms as traces: CSV with a column map, MCAP with ``sensor_msgs/JointState``."""
 
 import csv
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from math import isfinite
 from pathlib import Path
@@ -13,18 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
+from tauguard.datasets.columns import (
+    PRESETS,
+    Column,
+    ColumnMap,
+    preset_of,
+    presets_of,
+    presets_of_width,
+)
 from tauguard.datasets.labels import labelled
-from tauguard.datasets.log_checks import checked
-from tauguard.datasets.recognition import described, recognised
+from tauguard.datasets.log_checks import checked, fresh, increasing, refuse_set_back
+from tauguard.datasets.recognition import described, in_units_of, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
 #: Rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
-#: Rows that repeat the state are left out if they are at least this fraction of all rows: then the
-#: recorder is faster than its robot. Below it, a standing arm may repeat its values by chance.
-REPEATED = 0.2
 
 
 @dataclass(frozen=True)
@@ -84,19 +88,24 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     """The given map, the preset of the given name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
+    form = _form(path)
     if columns is not None and columns != "auto":
         if columns not in PRESETS:
             raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
-        return PRESETS[columns]
-    with open(path, newline="") as stream:
-        first = next(csv.reader(stream), [])
-    names = {cell.strip() for cell in first}
-    for name in presets_of(names):
-        return PRESETS[name]
-    found = recognised(*_beginning(path))
+        return replace(PRESETS[columns], **form)
+    header, table = _beginning(path, **form)
+    found = recognised(header, table)
+    found = None if found is None else replace(found, **form)
+    for name in presets_of(header):
+        preset = replace(PRESETS[name], **form)
+        return preset if columns is None or found is None else in_units_of(preset, found)
     if found is not None and columns == "auto":
         return found
     known = f"give a column map, or a preset: {', '.join(PRESETS)}"
+    if found is None and not header_of(header):
+        raise ValueError(
+            f"no names of columns in the first line: {known}; a map may count columns from 0"
+        )
     if found is None:
         raise ValueError(
             "no column map, and no positions, efforts and time (or velocities that tell the clock) "
@@ -107,10 +116,26 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     )
 
 
-def _beginning(path: Path) -> tuple[list[str], Array]:
-    """Column names, and the values of the first rows; NaN for a cell that is no number."""
+def _form(path: Path) -> dict[str, str]:
+    """Separator and mark of decimals, as the first two lines show them."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
-        rows = list(islice((row for row in csv.reader(stream) if row), LOOKED_AT + 1))
+        first, second = stream.readline(), stream.readline()
+    separator = max(",;\t", key=first.count)
+    decimal = "," if separator != "," and "," in second and "." not in second else "."
+    return {"separator": separator, "decimal": decimal}
+
+
+def _rows(path: Path, separator: str, decimal: str) -> Iterator[tuple[int, list[str]]]:
+    """Line numbers and cells of all rows that are not empty, with points in numbers."""
+    with open(path, newline="", encoding="utf-8-sig") as stream:
+        for n, row in enumerate(csv.reader(stream, delimiter=separator), 1):
+            if row:
+                yield n, row if decimal == "." else [cell.replace(decimal, ".") for cell in row]
+
+
+def _beginning(path: Path, separator: str, decimal: str) -> tuple[list[str], Array]:
+    """Column names, and the values of the first rows; NaN for a cell that is no number."""
+    rows = [row for _, row in islice(_rows(path, separator, decimal), LOOKED_AT + 1)]
     header = [cell.strip() for cell in rows[0]] if rows else []
     table = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
     for k, row in enumerate(rows[1:]):
@@ -124,10 +149,7 @@ def read_csv(
     path: Path, columns: ColumnMap, joint_names: Sequence[str] | None, auto: bool = False
 ) -> Log:
     """A CSV file as a trace; see :func:`read_log`. ``auto``: a note says what the columns are."""
-    with open(path, newline="", encoding="utf-8-sig") as stream:
-        rows = [
-            (n, r) for n, r in enumerate(csv.reader(stream, delimiter=columns.separator), 1) if r
-        ]
+    rows = list(_rows(path, columns.separator, columns.decimal))
     if not rows:
         raise ValueError("empty file")
     header, where = _located(rows[0][1], columns)
@@ -145,6 +167,7 @@ def read_csv(
     times = parts.pop("t")
     t = times[:, 0] * columns.time_scale if columns.times else np.arange(len(table)) / columns.clock
     if "order" in columns.repair and (np.diff(t) < 0).any():
+        refuse_set_back(t, lines)
         order = np.argsort(t, kind="stable")
         notes.append(f"{int((np.diff(t) < 0).sum())} times a row is earlier than the last: sorted")
         t, lines = t[order], lines[order]
@@ -155,9 +178,9 @@ def read_csv(
     kept_parts = {name: np.ascontiguousarray(value[keep]) for name, value in parts.items()}
     signals: dict[str, Any] = _in_si_units(kept_parts, columns)
     meta = {"log": path.name}
-    if preset := [name for name, known in PRESETS.items() if known == columns]:
-        meta["columns"] = preset[0]
-    elif auto:
+    if preset := preset_of(columns):
+        meta["columns"] = preset
+    if auto and columns not in PRESETS.values():
         notes.insert(0, f"read as {described(columns)}")
     if columns.torque:
         meta["effort"] = "torque"
@@ -331,57 +354,3 @@ def _lacking(
                 f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
                 "--mend nan"
             )
-
-
-def increasing(
-    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[str]
-) -> NDArray[np.bool_]:
-    """Rows to keep so that time increases strictly; times may repeat only if the map allows it."""
-    step = np.diff(t)
-    back = np.flatnonzero(step < 0)
-    if back.size:
-        row = back[0] + 1
-        raise ValueError(
-            f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
-            "say --mend order"
-        )
-    same = np.flatnonzero(step == 0)
-    if same.size and "repeat" not in columns.repair:
-        raise ValueError(
-            f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
-            "--mend repeat"
-        )
-    if same.size:
-        notes.append(
-            f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
-        )
-    return np.concatenate([[True], step > 0])
-
-
-def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
-    """Rows to keep so that a recorder's copies of one state are not taken for samples.
-
-    A difference quotient is 0 over a copy and twice the speed after it. A state that really stays
-    is kept at the usual interval of new ones.
-
-    Args:
-        t: times [s], shape (T,).
-        state: all signals, shape (T, columns).
-        keep: rows to consider, shape (T,).
-        notes: a line on the rows left out is appended.
-    """
-    rows = np.flatnonzero(keep)
-    new = np.concatenate([[True], (np.diff(state[rows], axis=0) != 0).any(axis=1)])
-    share = 1 - new.mean()
-    if share < REPEATED or new.sum() < 3:
-        return keep
-    usual = float(np.median(np.diff(t[rows][new])))
-    kept, last = np.zeros_like(keep), -np.inf
-    for row, is_new in zip(rows, new, strict=True):
-        if is_new or t[row] - last > 1.4 * usual:
-            kept[row], last = True, t[row]
-    notes.append(
-        f"{100 * share:.0f} % of the rows repeat the state before: left out, a state comes every "
-        f"{1e3 * usual:.3g} ms"
-    )
-    return kept

@@ -8,6 +8,7 @@ than half a second are milliseconds or less.
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,10 +35,16 @@ _OTHER = re.compile(
     r"gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
 )
 #: Columns of ROS's JointState in a table: the joint's name, then the kind of signal.
-_NAMED = re.compile(r"^(.*?)([^/.]+)[/.](position|velocity|effort)$")
+_NAMED = re.compile(
+    r"^(.*?)(?:([^/.]+)[/.]|(\w+_joint)[_ ])(position|velocity|effort|current|torque)$"
+)
 #: The torques of KUKA's FRI have the opposite sign.
 _FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
+#: The same with the kind of signal behind the number: "joint_1_position", "J1 angle (rad)".
+_WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
+#: A unit behind a name: "time [ms]", "angle (rad)".
+_UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -47,9 +54,13 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
     found: dict[str, list[tuple[int, str]]] = {}
     named: dict[str, list[str]] = {}
     for name in header:
-        if match := _NAMED.match(name):
-            named.setdefault(match.group(1) + match.group(3), []).append(name)
-        elif match := _NUMBER.match(name):
+        plain = _UNIT.sub("", name)
+        if match := _NAMED.match(plain):
+            named.setdefault(match.group(1) + match.group(4), []).append(name)
+        elif match := _WITHIN.match(plain):
+            prefix = f"{match.group(1)}_{match.group(3)}"
+            found.setdefault(prefix, []).append((int(match.group(2)), name))
+        elif match := _NUMBER.match(plain):
             found.setdefault(match.group(1), []).append((int(match.group(2)), name))
     out = {}
     for prefix, columns in found.items():
@@ -79,7 +90,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         header: names of all columns.
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
     """
-    time = next((name for name in header if name.strip().lower() in TIMES), None)
+    time = next((n for n in header if _UNIT.sub("", n).strip(" #").lower() in TIMES), None)
     groups: dict[str, tuple[str, ...]] = {}
     for prefix, columns in grouped(header).items():
         field = _field(prefix)
@@ -127,9 +138,21 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     )
 
 
+def in_units_of(preset: ColumnMap, found: ColumnMap) -> ColumnMap:
+    """A preset with degrees, milliseconds or milliamperes where its columns hold such numbers."""
+    milli = bool(preset.current) and found.current_scale != 1.0
+    return replace(
+        preset,
+        degrees=preset.degrees or found.degrees,
+        time_scale=found.time_scale if preset.time_scale == 1.0 else preset.time_scale,
+        current_scale=found.current_scale if milli else preset.current_scale,
+        repair=preset.repair | found.repair,
+    )
+
+
 def _joints(columns: Sequence[str]) -> tuple[str, ...]:
     """Joint names, where the columns' names hold them."""
-    found = [match.group(2) for name in columns if (match := _NAMED.match(name))]
+    found = [m.group(2) or m.group(3) for n in columns if (m := _NAMED.match(_UNIT.sub("", n)))]
     return tuple(found) if len(found) == len(columns) else ()
 
 

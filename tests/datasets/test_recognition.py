@@ -75,6 +75,65 @@ def test_nothing_is_proposed_where_something_lacks():
     assert recognised(["t", "q1", "q2", "tau1"], table) is None
 
 
+UR_NAMED = [f"{joint}_joint" for joint in ("shoulder_pan", "elbow", "wrist_1", "wrist_2")]
+
+
+@pytest.mark.parametrize(
+    ("names", "joints"),
+    [
+        ([f"J{k} {what}" for what in ("angle (rad)", "speed", "current [A]") for k in (1, 2)], ()),
+        ([f"joint_{k}_{what}" for what in ("pos", "vel", "torque") for k in (1, 2)], ()),
+        ([f"{j}_{w}" for w in ("position", "velocity", "current") for j in UR_NAMED], UR_NAMED),
+    ],
+)
+def test_joints_stand_before_the_kind_of_signal(tmp_path, names, joints):
+    """A UR's wrist_1 and wrist_2 are no arm of two joints."""
+    t, *parts = motion(joints=len(names) // 3)
+    log = read_log(written(tmp_path / "log.csv", ["# time [s]", *names], t, *parts), "auto")
+    for found, given in zip((log.trace.q, log.trace.qd, log.trace.current), parts, strict=True):
+        np.testing.assert_allclose(found, given, atol=1e-8)
+    assert log.trace.joint_names == (tuple(joints) or ("joint_1", "joint_2"))
+
+
+@pytest.mark.parametrize("given", ["auto", None, "ur3"])
+@pytest.mark.parametrize(("separator", "decimal"), [(";", "."), ("\t", "."), (";", ",")])
+def test_separators_and_decimal_commas_are_seen(tmp_path, separator, decimal, given):
+    t, *parts = motion(joints=6)
+    names = ["t", *(f"{name}{k}" for name in ("q", "qd", "tau") for k in range(1, 7))]
+    path = written(tmp_path / "log.csv", names, t, *parts)
+    text = path.read_text().replace(",", separator).replace(".", decimal)
+    path.write_text(text)
+    log = read_log(path, given)
+    np.testing.assert_allclose(log.trace.current, parts[2], atol=1e-8)
+    assert log.trace.meta["columns"] == "ur3"
+
+
+def test_a_preset_s_columns_in_other_units_are_told_by_their_numbers(tmp_path):
+    t, q, qd, i = motion(joints=6)
+    names = ["t", *(f"{name}{k}" for name in ("q", "qd", "i") for k in range(1, 7))]
+    parts = 1e3 * t, np.rad2deg(q), np.rad2deg(qd), 1e3 * i
+    path = written(tmp_path / "log.csv", names, *parts)
+    log = read_log(path, "auto")
+    assert log.notes[0].startswith("read as time t [ms], positions q1 to q6 [deg]")
+    assert log.trace.meta["columns"] == "ur5"
+    np.testing.assert_allclose(log.trace.q, q, atol=1e-8)
+    np.testing.assert_allclose(log.trace.current, i, atol=1e-8)
+    with pytest.raises(ValueError, match="say --mend ms"):
+        read_log(path, mend=("deg", "mA"))
+
+
+def test_a_clock_that_was_set_back_is_no_matter_of_order(tmp_path):
+    t, q, qd, i = motion()
+    t[200:] -= 1.0
+    path = written(tmp_path / "log.csv", ["t", *pairs("q#", "qd#", "current#")], t, q, qd, i)
+    with pytest.raises(ValueError, match=r"line 202: the clock was set back by 0\.99 s: cut"):
+        read_log(path, "auto")
+    rows = np.r_[200:400, 0:200]  # two halves in the wrong order are sorted
+    parts = (x[rows] for x in (0.01 * np.arange(400), q, qd, i))
+    path = written(tmp_path / "halves.csv", ["t", *pairs("q#", "qd#", "current#")], *parts)
+    np.testing.assert_allclose(read_log(path, "auto").trace.q, q, atol=1e-8)
+
+
 @pytest.mark.parametrize("accepted", [False, True])
 def test_units_and_order_are_proposed_and_read_when_accepted(tmp_path, accepted):
     t, q, qd, current = motion()
