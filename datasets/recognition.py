@@ -116,7 +116,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         t = numbers([time])[:, 0]
         steps = np.diff(t[np.isfinite(t)])
         repair |= {"order"} if (steps < 0).any() else set()
-        steps = np.abs(steps[steps != 0])
+        steps = np.diff(np.unique(t[np.isfinite(t)]))  # of rows in order
         usual = float(np.median(steps)) if len(steps) else 0.0
         scale = next(scale for least, scale in CLOCKS if usual >= least)
     elif "qd" not in groups or not (clock := rate_of(numbers(groups["q"]), numbers(groups["qd"]))):
