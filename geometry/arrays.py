@@ -11,6 +11,11 @@ def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArra
         ValueError: the shape differs, an entry is NaN or infinite, or entries are text, complex
             or dates; the message names the argument and the first bad row.
     """
+    return all_finite(name, numbers(name, value, shape))
+
+
+def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """As :func:`finite`, but an entry may be NaN or infinite."""
     try:
         given = np.asarray(value)
         if given.dtype.kind in "cSUVMm":
@@ -18,12 +23,15 @@ def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArra
         array = np.ascontiguousarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name}: not an array of numbers ({error})") from None
-    fits = array.ndim == len(shape) and all(
-        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
+    fits = [want is None or have == want for have, want in zip(array.shape, shape, strict=False)]
+    if array.ndim != len(shape) or not all(fits):
         wanted = ", ".join("N" if want is None else str(want) for want in shape)
         raise ValueError(f"{name}: shape {array.shape}, expected ({wanted})")
+    return array
+
+
+def all_finite(name: str, array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``array``, if every entry is finite; else the error of :func:`finite`."""
     if not np.isfinite(array).all():
         bad = np.argwhere(~np.isfinite(array))[0]
         where = f"row {bad[0]}" if array.ndim > 1 else f"index {bad[0]}"

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.geometry.arrays import finite, indices
+from tauguard.geometry.arrays import all_finite, indices, numbers
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -28,7 +28,7 @@ def frozen_finite(
     name: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
     """As :func:`finite`, but a private copy, so that nothing can change it after the check."""
-    return finite(name, frozen(finite(name, value, shape)), shape)
+    return all_finite(name, frozen(numbers(name, value, shape)))
 
 
 def frozen_indices(

@@ -145,7 +145,6 @@ def solid_parts(
     if not isinstance(core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
         kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
         raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}")
-    largest = max(np.abs(core.packed).max(initial=0.0), radius.max(initial=0.0))
-    if largest > most:
+    if core.largest > most or (radius is not _SHARP and radius.max(initial=0.0) > most):
         raise ValueError(f"{name}: a number beyond {most:g}; scale the scene down".replace("+", ""))
     return core, radius

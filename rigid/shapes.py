@@ -20,8 +20,22 @@ from tauguard.rigid import _rigid
 ORTHONORMAL_TOLERANCE = 1e-6
 
 
+class _Batch(Rebuilt):
+    """A batch of bodies."""
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """Its numbers, for native kernels."""
+        raise NotImplementedError
+
+    @cached_property
+    def largest(self) -> float:
+        """The size of its largest number."""
+        return float(np.abs(self.packed).max(initial=0.0))
+
+
 @dataclass(frozen=True, eq=False)
-class Tetrahedra(Rebuilt):
+class Tetrahedra(_Batch):
     """The convex hulls of four points each, in any order and orientation.
 
     Args:
@@ -46,7 +60,7 @@ class Tetrahedra(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes(Rebuilt):
+class Boxes(_Batch):
     """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
 
     The set is that of the given doubles. A rotation that is orthonormal only up to rounding spans a
@@ -111,7 +125,7 @@ class Boxes(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Parallelepipeds(Rebuilt):
+class Parallelepipeds(_Batch):
     """The sets ``origin + s @ edges``, ``0 <= s <= 1`` per coordinate.
 
     Args:
@@ -142,7 +156,7 @@ class Parallelepipeds(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Hulls(Rebuilt):
+class Hulls(_Batch):
     """The convex hulls of any number of points each.
 
     Body n owns ``vertices[offsets[n]:offsets[n + 1]]``.
@@ -173,7 +187,7 @@ class Hulls(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons(Rebuilt):
+class Polygons(_Batch):
     """Convex polygons in the plane: the hulls of any number of points each, in any order.
 
     They are tested against polygons only. Arguments and errors as for :class:`Hulls`, vertices of
