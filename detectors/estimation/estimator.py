@@ -53,8 +53,8 @@ class Unknowns:
     variance of a correction's noise is so many times ``noise^2``. With 1 the filter takes every
     correction for news."""
     started: float = 0.0
-    """Motion of a joint before its first correction [s]: the friction of a joint that stands may
-    hold any torque. 0: joints at rest correct the unknowns, too."""
+    """Seconds that a joint moves before its first correction, since the friction of a joint that
+    stands may hold any torque. 0: joints at rest correct the unknowns, too."""
     transition: float = 0.0
     """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
     30/s [N m], (transition c_j)^2 is added to ``noise^2`` of a correction."""

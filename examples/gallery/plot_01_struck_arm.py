@@ -22,7 +22,9 @@ print(trace.truth.collisions[0])
 # the arm is friction and model error: a detector has to tell the two apart.
 
 residual = tauguard.residual(trace)
-figure, panels = plt.subplots(2, 1, figsize=(8, 5), sharex=True, sharey=True, layout="constrained")
+figure, panels = plt.subplots(
+    2, 1, figsize=(6.4, 4.4), sharex=True, sharey=True, layout="constrained"
+)
 panels[0].plot(trace.t, trace.truth.tau_ext, linewidth=0.9)
 panels[0].set_ylabel("external torque [N m]")
 panels[1].plot(trace.t, residual, linewidth=0.9)

@@ -52,7 +52,8 @@ for detector in (ResidualChange(), make_detector("moving-thresholds")):
     found = [alarm.detect(trace) for trace in fresh]
     pairs = zip(found, fresh, strict=True)
     metrics = detection_metrics(match_detection(f, t, alarm.settle) for f, t in pairs)
-    print(f"{detector.name:<18}", metrics["sensitivity"], metrics["delay_ms"])
+    part, delay = metrics["sensitivity"], metrics["delay_ms"]["median"]
+    print(f"{detector.name:<17} found {part['value']:.0%} of {part['n']}, median {delay:.0f} ms")
     plt.plot(fresh[0].t, found[0].score / found[0].threshold, linewidth=0.7, label=detector.name)
 for hit in fresh[0].truth.collisions:
     plt.axvspan(hit.onset, hit.end, color="tab:red", alpha=0.4)

@@ -24,7 +24,7 @@ plans = {
     "impact": CollisionPlan("strike", time=5.0, link=3),
     "clamp": CollisionPlan("clamp", time=5.0, link=3, duration=0.8),
 }
-figure, panels = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
+figure, panels = plt.subplots(1, 2, figsize=(7, 3), sharey=True, layout="constrained")
 for panel, (name, plan) in zip(panels, plans.items(), strict=True):
     trace = simulate(Episode(seed=13, seconds=8, collisions=(plan,)))
     found = alarm.detect(trace)

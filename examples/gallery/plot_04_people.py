@@ -31,7 +31,7 @@ for k in np.flatnonzero(worst):
 
 # %%
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7, 3.4), layout="constrained")
 left.imshow(picture)
 left.set_axis_off()
 left.set_title("at the largest force")

@@ -21,7 +21,7 @@ data.qpos[scene.qpos_adr] = scene.home
 mujoco.mj_forward(scene.model, data)
 directions = {"forward": [1, 0, 0], "sideways": [0, 1, 0], "down": [0, 0, -1]}
 
-figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
+figure, axes = plt.subplots(figsize=(6.4, 4), layout="constrained")
 names = [name for name, region in BODY_REGIONS.items() if region.transient]
 for k, (label, direction) in enumerate(directions.items()):
     mass = reflected_mass(scene, scene.home, tool, data.xpos[tool], direction)
@@ -35,4 +35,5 @@ axes.legend(title="the tool moves")
 # The simulated force of an impact agrees with this model within 2 % at a step of 1 ms (``tauguard
 # bench simulation``). A simulated force replaces no measurement, and some limits are unconfirmed:
 
-print({name: BODY_REGIONS[name].unconfirmed for name in names})
+for name in names:
+    print(f"{name}:", ", ".join(BODY_REGIONS[name].unconfirmed) or "confirmed")

@@ -27,7 +27,7 @@ print(*twin.notes, sep="\n")
 
 log = logs[5]
 current = played(twin.arm, twin.drive, log)
-figure, panels = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True, layout="constrained")
+figure, panels = plt.subplots(2, 1, figsize=(6.4, 4.2), sharex=True, layout="constrained")
 for panel, joint in zip(panels, (1, 3), strict=True):
     panel.plot(log.t, log.current[:, joint], linewidth=0.8, label="arm")
     panel.plot(log.t, current[:, joint], linewidth=0.8, label="twin")

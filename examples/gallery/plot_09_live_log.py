@@ -29,13 +29,13 @@ for signal in (q, qd, current):
     signal[frozen] = signal[np.argmax(frozen)]
 answer = detect_with_faults(alarm, replace(trace, q=q, qd=qd, current=current))
 found, faults = answer.detection, answer.faults
-print([f"{one.start:.3f} s" for one in found.alarms])
+print("alarms at", *[f"{one.start:.3f} s" for one in found.alarms])
 for fault in faults:
     print(f"{fault.start:.3f} to {fault.end:.3f} s: {fault.reason}")
 
 # %%
 
-plt.figure(figsize=(8, 3))
+plt.figure(figsize=(6.4, 3))
 plt.plot(trace.t, found.score / found.threshold, linewidth=0.8)
 plt.axhline(1.0, color="black", linewidth=0.8)
 for fault in faults:

@@ -26,8 +26,8 @@ print(f"they touch at {touch.time_of_impact[0]:.6f} of the step, at {touch.point
 
 # %%
 
-figure = plt.figure(figsize=(7, 5))
-axes = figure.add_subplot(projection="3d")
+figure = plt.figure(figsize=(7, 4))
+axes = figure.add_axes((-0.3, -0.6, 1.6, 2.2), projection="3d")  # no room for ticks
 for t, colour in ((0.0, "0.8"), (touch.time_of_impact[0], "tab:blue")):
     turn = Rotation.from_rotvec(t * np.array([0.4, 1.5, 0.3])).as_matrix() @ upright[:3, :3]
     moved = shape.vertices @ turn.T + upright[:3, 3] + t * np.array([-1.0, 0, 0])

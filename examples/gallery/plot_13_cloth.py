@@ -29,9 +29,10 @@ print(f"{np.median(cost):.1f} ms a frame; the earliest contact is at {min(first)
 
 # %%
 
-figure = plt.figure(figsize=(9, 4), layout="constrained")
+figure = plt.figure(figsize=(7, 3.6), layout="constrained")
 left = figure.add_subplot(1, 2, 1, projection="3d")
 left.plot_trisurf(*x_t1.T, triangles=scene.faces, linewidth=0.1, edgecolor="0.4", color="0.8")
+left.set_aspect("equal")
 left.set_axis_off()
 right = figure.add_subplot(1, 2, 2)
 right.plot(counts, label=["vertex-face", "edge-edge"])

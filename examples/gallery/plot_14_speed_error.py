@@ -31,7 +31,7 @@ def frames(scene, method):
     }
 
 
-figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+figure, panels = plt.subplots(1, 2, figsize=(7, 3.4), sharey=True, layout="constrained")
 for panel, (name, size) in zip(
     panels, (("crumpling", 6_000), ("packed_cubes", 1_500)), strict=True
 ):
