@@ -6,7 +6,7 @@ functions scaled by determinants, redundant combinations left out); ``sat`` test
 bounds. Exact arithmetic decides the remaining rows.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Literal, get_args
 
@@ -25,6 +25,13 @@ SweepMethod = Literal["abfme", "sat", "auto"]
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "exact": 4}
 _KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3, Polygons: 4}
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
+
+
+def check_method(method: object, known: Sequence[str]) -> None:
+    """Refuse what is no name of a method, such as a pose given in its place (``ValueError``)."""
+    if not (isinstance(method, str) and method in known):
+        given = repr(method) if isinstance(method, str) else f"a {type(method).__name__}"
+        raise ValueError(f"method: {given}, expected one of {', '.join(known)}")
 
 
 def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
@@ -88,8 +95,7 @@ def sweep(
     count = rows(a, b)
     if isinstance(a, Polygons):
         raise ValueError("a: Polygons, expected bodies in space; give them thickness as Hulls")
-    if method not in get_args(SweepMethod):
-        raise ValueError(f"method: {method!r}, expected one of {', '.join(get_args(SweepMethod))}")
+    check_method(method, get_args(SweepMethod))
     given = np.asarray(displacement)
     moves = frozen_finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
     if len(moves) not in (1, count):

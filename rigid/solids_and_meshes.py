@@ -4,7 +4,7 @@ from typing import Literal, cast, get_args, overload
 
 from tauguard.rigid import mesh_bodies
 from tauguard.rigid.mesh import MeshOverlap, MeshTree
-from tauguard.rigid.queries import sharp_overlap
+from tauguard.rigid.queries import check_method, sharp_overlap
 from tauguard.rigid.results import Distances, MeshDistances, Overlap
 from tauguard.rigid.rounded import Solid
 from tauguard.rigid.shapes import Bodies
@@ -46,10 +46,7 @@ def overlap(
             another method than ``auto`` of rounded bodies or a mesh, two meshes,
             a coordinate beyond 1e100 of rounded bodies (1e30 beside a mesh).
     """
-    if method not in get_args(OverlapMethod):
-        raise ValueError(
-            f"method: {method!r}, expected one of {', '.join(get_args(OverlapMethod))}"
-        )
+    check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
     if special and method != "auto":
         raise ValueError(f"method: {method!r} knows sharp bodies only, {special[0]} is none; auto")

@@ -179,7 +179,10 @@ def learned(
         arm, source = free_arm(robot, numbers, first, columns, gains)
         detector = free_detector(arm, first)
     except ValueError as error:
-        raise ValueError(f"{log}, its first {quiet:g} s (--quiet): {error}") from None
+        raise ValueError(
+            f"{log}, its first {quiet:g} s (--quiet): {error}; `tauguard train --free` has "
+            "--accept for a log that nothing touched"
+        ) from None
     print_notes([f"learned from the first {quiet:g} s; gains: {source}"])
     detector = dataclasses.replace(detector, settle=quiet)
     detector = detector if payload is None else detector.carrying(load)
