@@ -28,7 +28,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"  # fields of data classes: as attributes
 autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 autodoc_member_order = "bysource"
-napoleon_google_docstring = True
+napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 
 
@@ -65,3 +65,13 @@ html_theme_options = {
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
 }
+
+
+def setup(app):
+    """A colon before the text of attributes: napoleon takes "Words: more" for a type."""
+
+    def begin(app, what, name, obj, options, lines):
+        if what in ("attribute", "property", "data") and lines:
+            lines[0] = f": {lines[0]}"
+
+    app.connect("autodoc-process-docstring", begin, priority=400)  # before napoleon
