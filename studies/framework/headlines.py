@@ -71,7 +71,7 @@ def _fast(points: Sequence[Point]) -> str:
 
 def _short(point: Point) -> str:
     """The question without the peer that it names."""
-    return point.question.partition(" beside ")[0]
+    return point.question.partition(" beside ")[0].rstrip(",")
 
 
 def _round(ratio: float) -> str:
@@ -92,15 +92,15 @@ def _right(points: Sequence[Point]) -> str:
         return ""
     ours, peers = max(o.error for o, _ in pairs), max(p.error for _, p in pairs)
     text = (
-        f"<b>Right.</b> At most {100 * ours:.2g} % of tauguard's answers are wrong in any of these "
-        f"questions, and up to {100 * peers:.2g} % of a peer's."
+        f"<b>Right.</b> At most {_round(100 * ours)} % of tauguard's answers are wrong in any of "
+        f"these questions, and up to {_round(100 * peers)} % of a peer's."
     )
 
     def draw(axes: Any) -> None:
         for k, (own, peer) in enumerate(pairs):
             axes.barh(k + 0.05, 100 * own.error, 0.18, color=OURS)
             axes.barh(k - 0.15, 100 * peer.error, 0.18, color=PEER)
-            errors = f"{100 * own.error:.2g} and {100 * peer.error:.2g} %"
+            errors = f"{_round(100 * own.error)} and {_round(100 * peer.error)} %"
             _name(axes, k - 0.1, f"{_short(own)}; {peer.method}: {errors}")
         axes.set(xlim=(0, 100), yticks=[], xlabel="wrong answers [%]: tauguard (blue) and its peer")
 
