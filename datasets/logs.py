@@ -116,7 +116,7 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     )
 
 
-def _form(path: Path) -> dict[str, str]:
+def _form(path: Path) -> dict[str, Any]:
     """Separator and mark of decimals, as the first two lines show them."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         first, second = stream.readline(), stream.readline()
