@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -62,11 +63,15 @@ FILE_TYPES: dict[str, str] = {
 #: Modules of others that the user has named in this process.
 _NAMED: set[str] = set()
 
+#: Names more of them, with commas between, for any command and for processes that others start.
+MODULES = "TAUGUARD_DETECTORS"
+
 
 def make_detector(name: str) -> Detector:
     """The settings of a method by its name, or of another's class as ``module:Class``.
 
-    A module that is named here may also be loaded from model files.
+    A module that is named here may also be loaded from model files, as one that the environment
+    variable ``TAUGUARD_DETECTORS`` names.
 
     Raises:
         ValueError: no such name or class; the message lists the names that there are.
@@ -123,10 +128,12 @@ def file_type(name: str) -> type:
         ours: type = getattr(importlib.import_module(FILE_TYPES[name]), name)
         return ours
     module, _, own = name.partition(":")
+    if module in os.environ.get(MODULES, "").split(","):
+        admit(module)
     if module not in _NAMED:
         raise ValueError(
-            f"holds a {name}, which is not of tauguard: name its module by --detector "
-            f"{module}:CLASS, or call tauguard.detectors.registry.admit({module!r}) first"
+            f"holds a {name}, which is not of tauguard: if you trust its module, name it in the "
+            f"environment, export {MODULES}={module}"
         )
     kind = getattr(importlib.import_module(module), own, None)
     if not isinstance(kind, type):

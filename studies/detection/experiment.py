@@ -78,31 +78,29 @@ class Size:
     training: Training
     calibration_hours: float  #: collision-free, for the thresholds, of each arm
     hours: float  #: collision-free, judged, all speeds and arms together
-    short: float  #: of them, those that all detectors judge; the rest only the thorough ones
     per_stratum: int  #: judged collisions of a stratum at one speed
     faint: int  #: the same below the judged strata
     target: float = 0.25  #: false alarms per hour that the third threshold aims at
     conditions: bool = False  #: also what training did not have
 
 
+#: Those with one front end follow each other, so that it is fitted once and estimates once a trace.
 ALL = (
     "srq-svr",
-    "srq-svr-plain",
-    "current-network",
-    "residual-thresholds",
     "moving-thresholds",
     "window-network",
+    "srq-svr-plain",
+    "residual-thresholds",
+    "current-network",
 )
-#: Those that judge all of the collision-free motion.
-THOROUGH = ("srq-svr",)
-FULL = Size(3, ALL, Training(), 0.75, 10.0, 1.0, 13, 5, conditions=True)
+#: Rates of false alarms are the question of the part ``false_alarms``, on more arms.
+FULL = Size(3, ALL, Training(), 0.75, 2.0, 13, 5, conditions=True)
 #: Collision-free motion of a quick run, to calibrate and again to judge: an episode a speed [h].
 SIX_MINUTES = 0.095
 QUICK = Size(
     1,
     ("srq-svr", "current-network", "residual-thresholds"),
     Training(slices=5, free=4, free_seconds=20.0),
-    SIX_MINUTES,
     SIX_MINUTES,
     SIX_MINUTES,
     1,
@@ -201,12 +199,7 @@ def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tal
     if arm:
         share = 1 / len(SPEEDS) / size.arms
         pool = free_pool(test, speed, (arm,), share * size.hours)
-        early = len(free_pool(test, speed, (arm,), share * size.short))
-        thorough = {name: own for name, own in fleets[arm].items() if name in THOROUGH}
-        return merged(
-            on_free(fleets[arm] if k < early else thorough, simulate(episode))
-            for k, (_, episode) in enumerate(pool)
-        )
+        return merged(on_free(fleets[arm], simulate(episode)) for _, episode in pool)
     pools = [(STRATA, size.per_stratum, FORCES), (FAINT, size.faint, FAINT_FORCES)]
     return merged(
         on_struck(fleets[struck.arm], struck)

@@ -58,10 +58,12 @@ class Operated:
     def sustained(self, trace: Trace) -> dict[str, Array]:
         """Scores as every point's alarm compares them, (T,); -inf until all have settled."""
         score, early = self.detector.scores(trace), trace.t - trace.t[0] < BEGIN
-        levels = {point: alarm.sustained(trace, score) for point, alarm in self.alarms.items()}
-        for level in levels.values():
-            level[early] = -np.inf
-        return levels
+        known: dict[int, Array] = {}  # points differ in their thresholds, seldom in the score
+        for alarm in self.alarms.values():
+            if id(alarm.normalisation) not in known:
+                level = known[id(alarm.normalisation)] = alarm.sustained(trace, score)
+                level[early] = -np.inf
+        return {point: known[id(alarm.normalisation)] for point, alarm in self.alarms.items()}
 
 
 Fleet = Mapping[str, Operated]

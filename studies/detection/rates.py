@@ -69,7 +69,7 @@ class Size:
 
 
 NAMES = ("srq-svr", "moving-thresholds")
-FULL = Size(10, NAMES, (0.25, 1.0, 5.0), Training(), 0.75, 1.4, 1)
+FULL = Size(6, NAMES, (0.25, 1.0, 5.0), Training(), 0.75, 1.0, 1)
 LITTLE = Training(slices=4, free=4, free_seconds=20.0)
 QUICK = Size(1, NAMES, (5.0, 30.0), LITTLE, 0.05, 0.03, 0)
 

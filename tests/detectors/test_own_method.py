@@ -9,7 +9,7 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-from tauguard.detectors import load_model, make_detector, with_rate
+from tauguard.detectors import load_model, make_detector, registry, save_model, with_rate
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own_detector.md"
 
@@ -43,3 +43,17 @@ def test_the_command_line_trains_and_evaluates_it(mypackage, tmp_path, capsys):
     main(["evaluate", "--traces", folder, *own])
     assert "sensitivity from 16 N m up" in capsys.readouterr().out
     assert load_model(model).detector.name == "current-size"
+
+
+def test_the_environment_names_its_module_for_every_command(
+    mypackage, training, arm, tmp_path, monkeypatch
+):
+    path = tmp_path / "own.skops"
+    save_model(
+        with_rate(make_detector("mypackage:CurrentSize").fit(training, arm), training, 10.0), path
+    )
+    monkeypatch.setattr(registry, "_NAMED", set())
+    with pytest.raises(ValueError, match="export TAUGUARD_DETECTORS=mypackage"):
+        load_model(path)
+    monkeypatch.setenv("TAUGUARD_DETECTORS", "another,mypackage")
+    assert load_model(path).detector.name == "current-size"
