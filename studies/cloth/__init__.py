@@ -15,9 +15,6 @@ STUDY = Study(
         ),
         "volumes": Part("cloth.volumes", "kinds of bounding volumes; growth to 10^6 triangles"),
         "queries": Part("cloth.queries", "single queries: candidates of a frame, public labels"),
-        "adversarial": Part(
-            "cloth.adversarial", "queries near every degeneracy, decided again by exact integers"
-        ),
     },
 )
 

@@ -6,20 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from studies.real_arms.arms import (
-    ARMS,
-    available,
-    nominal,
-    recordings,
-    thinned,
-    touched,
-)
+from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned, touched
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import CollisionAlarm, make_detector, train
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
-from tauguard.envs import Episode, simulate
+from tauguard.envs import simulate
 from tauguard.models import Mismatch
 from tauguard.traces.trace import Trace
 
@@ -53,17 +46,6 @@ class ArmLogs:
             for name, trace in self.logs.items()
         }
 
-    @classmethod
-    def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> ArmLogs:
-        """Make the logs from simulated episodes."""
-        logs, contacts = {}, {}
-        for k, episode in enumerate(episodes):
-            trace = simulate(episode)
-            assert trace.truth is not None
-            logs[f"struck_{k}"] = thinned(trace, RATE)
-            contacts[f"struck_{k}"] = [(c.onset, c.end) for c in trace.truth.collisions]
-        return cls(name, alarm, logs, contacts)
-
 
 def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
     """Yield the simulated arm and, unless ``quick``, the real arms whose logs are available."""
@@ -82,7 +64,12 @@ def simulated(quick: bool, seed: int) -> ArmLogs:
     free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
     struck = struck_episodes(500 + seed, 1 if quick else 4, 8, (40.0,), (0.0, 1000.0), drawn)
     alarm = trained([simulate(episode) for episode in free], RATE, 5.0)
-    return ArmLogs.struck("simulated", alarm, struck)
+    arm = ArmLogs("simulated", alarm, {})
+    for k, trace in enumerate(map(simulate, struck)):
+        assert trace.truth is not None
+        arm.logs[f"struck_{k}"] = thinned(trace, RATE)
+        arm.contacts[f"struck_{k}"] = [(c.onset, c.end) for c in trace.truth.collisions]
+    return arm
 
 
 def real(name: str) -> ArmLogs:

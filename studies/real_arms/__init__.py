@@ -17,10 +17,6 @@ STUDY = Study(
             "real_arms.force",
             "force, impulse and time of pushes beside a force sensor, and a twin pushed with it",
         ),
-        "training": Part(
-            "real_arms.training",
-            "how many seconds of training an arm needs, real and simulated",
-        ),
     },
 )
 

@@ -19,6 +19,8 @@ from tauguard.traces.resample import resampled
 
 #: Shortest beginning of a log that counts as free [s].
 SHORTEST = 1.2
+#: A push begins above and ends below these forces of a sensor [N]; time to the next one [s].
+BEGINS, ENDS, APART = 4.0, 2.0, 0.3
 
 
 @dataclass(frozen=True)
@@ -153,21 +155,29 @@ def _labelled(
     return Touched(recording, pushes, max(int(starts[0]) - 20, 0), own)
 
 
+def sensor_spans(t: Array, force: Array) -> list[tuple[int, int]]:
+    """First and last row of each push that a sensor shows: from 4 N on until below 2 N.
+
+    A push begins at least 0.3 s after the end of the one before. ``t`` [s] and the size of the
+    force [N] have shape (T,).
+    """
+    found: list[tuple[int, int]] = []
+    for row in np.flatnonzero((force[1:] > BEGINS) & (force[:-1] <= BEGINS)) + 1:
+        below = np.flatnonzero(force[row:] < ENDS)
+        first, last = int(row), int(row + below[0] if len(below) else len(t) - 1)
+        if last > first and (not found or t[first] >= t[found[-1][1]] + APART):
+            found.append((first, last))
+    return found
+
+
 def _by_sensor(table: np.ndarray) -> tuple[Push, ...]:
-    """The pushes that a force sensor shows; none without one."""
+    """The pushes above 5 N that a force sensor shows; none without one."""
     if "Fx" not in (table.dtype.names or ()):
         return ()
     force = np.sqrt(sum(table[f"F{axis}"] ** 2 for axis in "xyz"))
     t, found = table["t"] - table["t"][0], []
-    starts = np.flatnonzero((force[1:] > 4) & (force[:-1] <= 4)) + 1
-    free_at = -1.0
-    for start in starts:
-        below = np.flatnonzero(force[start:] < 2)
-        end = start + (int(below[0]) if len(below) else len(force) - start - 1)
-        if t[start] < free_at or end <= start:
-            continue
+    for start, end in sensor_spans(t, force):
         peak = start + int(np.argmax(force[start:end]))
-        free_at = t[end] + 0.3
         if force[peak] > 5:
             moving = bool((np.abs(_speeds(table)[start:peak]) > 0.05).any())
             found.append(Push(float(t[start]), float(t[peak]), moving))

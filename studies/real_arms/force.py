@@ -17,7 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.real_arms.arms import ARMS, available, folder, nominal, recordings, touched
+from studies.real_arms.arms import (
+    ARMS,
+    BEGINS,
+    ENDS,
+    available,
+    folder,
+    nominal,
+    recordings,
+    sensor_spans,
+    touched,
+)
 from tauguard.detectors import ArmModel, Diagnoser, Diagnosis
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Load
@@ -33,8 +43,6 @@ Array = NDArray[np.float64]
 
 #: Arm and log with a sensor.
 ARM, LOG = "ur5", "no10_standing_force"
-#: A push begins above, and is over below [N]; the next one begins so much later [s].
-BEGINS, ENDS, APART = 4.0, 2.0, 0.3
 #: The diagnosis looks at this time before and after an alarm [s].
 LOOKED = (0.1, 0.3)
 #: What the medians call a strong push [N].
@@ -65,7 +73,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     surface, _ = arm_surface(folder() / ARM / f"{ARM}.urdf", fitted.arm.robot.joint_names)
     causes = Diagnoser.of(fitted.arm, surface, True).diagnose(trace, found)
     size = np.linalg.norm(force, axis=1)
-    spans = pushes(trace.t, size)
+    spans = sensor_spans(trace.t, size)
     rows = [row for cause in causes if (row := _beside(trace.t, size, cause)) is not None]
     limit = np.full(fitted.arm.robot.joints, np.inf)
     twin = identify_twin(fitted.arm, [r.trace for r in free.values()], limit)
@@ -77,17 +85,6 @@ def sensor() -> Array:
     """Force of the log [N], in the sensor's frame, shape (T, 3)."""
     table = np.genfromtxt(folder() / ARM / "contact" / f"{LOG}.csv", delimiter=",", names=True)
     return np.stack([table[f"F{axis}"] for axis in "xyz"], axis=1)
-
-
-def pushes(t: Array, size: Array) -> list[tuple[int, int]]:
-    """First and last row of every push."""
-    found: list[tuple[int, int]] = []
-    for row in np.flatnonzero((size[1:] > BEGINS) & (size[:-1] <= BEGINS)) + 1:
-        below = np.flatnonzero(size[row:] < ENDS)
-        first, last = int(row), int(row + below[0] if len(below) else len(t) - 1)
-        if last > first and (not found or t[first] > t[found[-1][1]] + APART):
-            found.append((first, last))
-    return found
 
 
 def _beside(t: Array, size: Array, cause: Diagnosis) -> Row | None:

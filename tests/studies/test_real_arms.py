@@ -22,16 +22,6 @@ def test_it_says_so_where_there_are_no_logs(bench):
     assert "no logs: set TAUGUARD_DATA to their folder" in said
 
 
-@pytest.mark.usefixtures("no_logs")
-def test_a_drawn_arm_is_trained_with_minutes_and_says_what_it_promised(bench):
-    file, _ = bench("real_arms-training")
-    (row,) = file["rows"]
-    assert row["seconds"] == 90.0
-    assert row["false alarms: minutes"] > 0
-    assert row["own alarms: minutes"] == pytest.approx(1.0, rel=0.05)
-    assert " to " in row["false alarms: per hour"]
-
-
 @pytest.mark.data
 def test_pushes_of_real_arms_are_found_beside_public_observers(bench, data_dir):
     file, _ = bench("real_arm")
