@@ -35,7 +35,9 @@ class ComparedMeshCCD(MeshCCD):
     ) -> tuple[NDArray[np.int32], Isolated]:
         checked, isolated = super()._checked_parts(faces, edges, points, groups)
         if isolated.points.size and self.method in COMPARATORS:
-            raise ValueError(f"method {self.method!r} has no queries of points")
+            raise ValueError(
+                f"method {self.method!r} has no queries of points; expected ab2pf or exact"
+            )
         return checked, isolated
 
 

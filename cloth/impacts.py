@@ -126,7 +126,7 @@ def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
     """The number of a method; ``ValueError`` with the known names for another name."""
     if not isinstance(method, str) or method not in methods:
         raise ValueError(
-            f"method {method!r}: there are {', '.join(methods)}; the methods that "
+            f"method {method!r}: expected one of {', '.join(methods)}; the methods that "
             "tauguard.cloth.comparators has are for comparison only"
         )
     return methods[method]
@@ -143,7 +143,9 @@ def checked_distance(min_distance: float, method: str) -> float:
     except (ValueError, OverflowError):  # lists of different lengths, a number beyond the doubles
         pass
     if distance > 0 and method != "ab2pf":
-        raise ValueError(f"min_distance: {min_distance} with method {method!r}: only ab2pf has one")
+        raise ValueError(
+            f"min_distance: {min_distance} with method {method!r}: only ab2pf takes one"
+        )
     if not (np.isfinite(distance) and distance >= 0):
         raise ValueError(f"min_distance: {min_distance!r:.40}, expected a finite number >= 0")
     return distance

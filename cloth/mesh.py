@@ -82,7 +82,7 @@ class MeshCCD:
         """Check the faces and number the edges; the first frame builds the hierarchy."""
         self._method_number = method_number(method, self.methods)
         if not isinstance(volume, str) or volume not in VOLUMES:
-            raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
+            raise ValueError(f"volume {volume!r}: expected one of {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
         self._method, self._volume, self._threads = method, volume, thread_count(threads)
         faces, isolated = self._checked_parts(faces, edges, points, groups)

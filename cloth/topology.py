@@ -85,7 +85,7 @@ class Topology:
         if self._vertices is not None and start != self._vertices:
             raise ValueError(
                 f"x_t0: {start} vertices, but the frames before had {self._vertices}; "
-                "update_topology comes first where the mesh changes"
+                "call update_topology first if the mesh has changed"
             )
         if self.groups is not None and start != len(self.groups.ids):
             raise ValueError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")

@@ -279,7 +279,7 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
             ``check``, or whose ``covers`` are no pairs of kinds.
     """
     if name not in _FACTORIES:
-        raise ValueError(f"checker {name!r}: there are {', '.join(_FACTORIES) or 'none'}")
+        raise ValueError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")
     factory = _FACTORIES[name]
     try:
         inspect.signature(factory).bind(model, **options)
@@ -309,7 +309,7 @@ def pair_kind(a: str, b: str) -> tuple[str, str]:
     """
     for kind in (a, b):
         if kind not in KINDS:
-            raise ValueError(f"kind {kind!r}: there are {', '.join(KINDS)}")
+            raise ValueError(f"kind {kind!r}: expected one of {', '.join(KINDS)}")
     return (a, b) if KINDS.index(a) <= KINDS.index(b) else (b, a)
 
 

@@ -67,12 +67,14 @@ def compare(
     if not 0 < duration < np.inf:
         raise ValueError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
-        raise ValueError(f"fine {fine}: expected 1 or more steps in one")
+        raise ValueError(f"fine {fine}: expected 1 or more fine steps in a step")
     if isinstance(checkers, str | mujoco.MjData):
         raise ValueError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
     for name in options or {}:
         if name not in checkers:
-            raise ValueError(f"options of {name!r}: the checkers are {', '.join(checkers)}")
+            raise ValueError(
+                f"options of {name!r}: expected one of the checkers {', '.join(checkers)}"
+            )
     model, data = scene.start(timestep)
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
@@ -93,7 +95,7 @@ def _scene(scene: ContactScene | mujoco.MjModel | str) -> ContactScene:
     """The scene that a name or a model stands for."""
     if isinstance(scene, str):
         if scene not in SCENES:
-            raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
+            raise ValueError(f"scene {scene!r}: expected one of {', '.join(SCENES)}")
         return SCENES[scene]()
     if isinstance(scene, mujoco.MjModel):
         return ContactScene("model", scene, scene.qpos0.copy(), np.zeros(scene.nv))
@@ -177,7 +179,9 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
             "in all entries where it is not known"
         )
     if ((found.geom < 0) == (found.flex < 0)).any():
-        raise ValueError(f"checker {name!r}: each partner is a geom or a flex, the other is -1")
+        raise ValueError(
+            f"checker {name!r}: a partner is either a geom or a flex; the other id must be -1"
+        )
     return found
 
 

@@ -49,7 +49,7 @@ class Pairs:
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:
-            raise ValueError(f"threshold {threshold!r}: there are {', '.join(reach)}")
+            raise ValueError(f"threshold {threshold!r}: expected one of {', '.join(reach)}")
         return np.asarray(np.maximum(reach[threshold], 0.0), dtype=np.float64)
 
 

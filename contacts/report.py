@@ -141,14 +141,14 @@ class Report:
             ValueError: the states were not kept.
         """
         if self.run is None:
-            raise ValueError("the states were not kept: compare(..., keep=True)")
+            raise ValueError("the states were not kept; call compare(..., keep=True)")
         return {**self.run.recording(), "notes": [(d.time, str(d)) for d in self.disagreements]}
 
     def __getitem__(self, checker: str) -> Score:
         for score in self.scores:
             if score.checker == checker:
                 return score
-        raise KeyError(f"{checker!r}: there are {', '.join(s.checker for s in self.scores)}")
+        raise KeyError(f"{checker!r}: expected one of {', '.join(s.checker for s in self.scores)}")
 
     def rows(self) -> list[dict[str, Any]]:
         """One flat dictionary per checker."""

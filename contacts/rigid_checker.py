@@ -61,7 +61,7 @@ class RigidChecker:
     ) -> None:
         """Choose the pairs and copy the shapes."""
         if mesh not in ("hull", "surface"):
-            raise ValueError(f"mesh {mesh!r}: there are hull, surface")
+            raise ValueError(f"mesh {mesh!r}: expected hull or surface")
         kinds = np.array(geom_kinds(model))
         pairs = geom_pairs(model)
         keep = ~(np.isin(kinds[pairs.first], skip) | np.isin(kinds[pairs.second], skip))

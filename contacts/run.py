@@ -45,7 +45,7 @@ class Run:
             ValueError: the states were not kept.
         """
         if len(self.states) != len(self.times):
-            raise ValueError("the states were not kept: compare(..., keep=True)")
+            raise ValueError("the states were not kept; call compare(..., keep=True)")
         count = len(self.times)
         return {
             "model": self.model,

@@ -192,7 +192,7 @@ def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
     found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
     if len(found) != 1:
         there = f"two are called {name!r}" if found else f"no log {name!r}"
-        raise ValueError(f"{flag}: {there}; there are {', '.join(logs)}")
+        raise ValueError(f"{flag}: {there}; expected one of {', '.join(logs)}")
     return found[0]
 
 

@@ -254,8 +254,9 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
     if values["paired"]:
         if values["struck"] != 0.5 or values["picks"] > 0:
             raise ValueError(
-                f"{where}.paired: one of two episodes has collisions, and none a pick; expected "
-                f"struck = 0.5 and picks = 0, found {values['struck']:g} and {values['picks']:g}"
+                f"{where}.paired: one episode of each pair has collisions, and none a pick; "
+                f"expected struck = 0.5 and picks = 0, found {values['struck']:g} and "
+                f"{values['picks']:g}"
             )
         if values["episodes"] % 2 or values["quick_episodes"] % 2:
             counts = values["episodes"], values["quick_episodes"]

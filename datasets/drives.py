@@ -37,5 +37,8 @@ def preset_drive(columns: str | None, logs: Sequence[Trace]) -> tuple[str, Drive
     """
     names = sorted({str(log.meta.get("columns") or columns or "no preset") for log in logs})
     if len(names) > 1 and not DRIVES.keys().isdisjoint(names):
-        raise ValueError(f"logs of {', '.join(names)}: give those of one preset, or --gains")
+        raise ValueError(
+            f"logs of {', '.join(names)}, whose drive gains differ: give logs of one preset, "
+            "or --gains"
+        )
     return (names[0], DRIVES[names[0]]) if names and names[0] in DRIVES else None

@@ -272,7 +272,7 @@ def same_again(
     configuration = configuration_in(folder)
     if robot is not None:
         if line["arm"] not in {one.name for one in configuration.robots}:
-            raise ValueError(f"arm {line['arm']} is the package's own: no file of it is asked for")
+            raise ValueError(f"arm {line['arm']} comes with the package: leave --robot out")
         configuration = configuration.with_source(line["arm"], str(robot))
     check_unchanged(line["arm"], configuration.robots)
     source = configuration.source_of(line["arm"])

@@ -68,8 +68,8 @@ def _timing(trace: Trace, where: Where) -> list[str]:
     if len(steps) >= 20 and len(gaps):
         row = int(gaps[0])
         raise ValueError(
-            f"{where(row + 1)}: nothing for {steps[row]:.3g} s before it, where samples come every "
-            f"{1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there into two"
+            f"{where(row + 1)}: no sample in the {steps[row]:.3g} s before it, but samples come "
+            f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): split the log there"
         )
     late = np.flatnonzero(steps > 2 * usual)
     if len(steps) < 20 or not len(late):

@@ -92,8 +92,9 @@ def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
     if (moved > SAME_PLACE).any() or (turned > SAME_PLACE).any():
         joint = int(np.argmax(np.maximum(moved, turned)))
         raise ValueError(
-            f"{robot} is not the arm that {model} was trained on: {names[joint]} stands "
-            f"{1e3 * moved[joint]:.0f} mm from where it stood; give the robot file of training"
+            f"{robot} is not the arm that {model} was trained on: {names[joint]} is "
+            f"{1e3 * moved[joint]:.0f} mm from its place there; give the robot file of that "
+            "training"
         )
 
 

@@ -76,8 +76,8 @@ def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
             same = _digest(_scene(robot.source)) == robot.sha256
         except FileNotFoundError:
             raise ValueError(
-                f"arm {name}: no file {robot.source} here; `tauguard inspect --episode` takes it "
-                "by --robot, the file that the dataset was begun with"
+                f"arm {name}: its file {robot.source} is not here; give the file that the dataset "
+                "was begun with to `tauguard inspect --episode` by --robot"
             ) from None
         if not same:
             raise ValueError(

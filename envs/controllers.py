@@ -147,7 +147,7 @@ class OperationalSpace:
         """
         names = [f.name for f in model.frames]
         if frame not in names:
-            raise ValueError(f"frame {frame!r}: the model has {', '.join(names)}")
+            raise ValueError(f"frame {frame!r}: no such frame; the model has {', '.join(names)}")
         self.model, self._data = model, model.createData()
         self._frame = model.getFrameId(frame)
         self.stiffness = per_joint(stiffness, 6, "stiffness")

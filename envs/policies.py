@@ -45,8 +45,8 @@ class MlpPolicy:
         seen = np.asarray(observation, dtype=float)
         if seen.shape[-1] != len(self.mean):
             raise ValueError(
-                f"observation of {seen.shape[-1]} numbers: the policy expects {len(self.mean)}, of "
-                f"the environment and keywords that it was trained with {dict(self.environment)}"
+                f"observation of {seen.shape[-1]} numbers: the policy expects {len(self.mean)}; "
+                f"make the environment with the keywords of its training, {dict(self.environment)}"
             )
         x = np.clip((seen - self.mean) / self.deviation, -CLIP, CLIP)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
@@ -93,7 +93,7 @@ class MlpPolicy:
             widths = [len(arrays["mean"]), *map(len, biases)]
             shapes = [(b, a) for a, b in itertools.pairwise(widths)]
             if not count or [w.shape for w in weights] != shapes:
-                raise ValueError("layers that do not fit one another")
+                raise ValueError("layers whose shapes do not fit together")
             return cls(arrays["mean"], arrays["deviation"], weights, biases, environment)
 
     def to_sb3(self, model: Any, normalize: Any) -> None:

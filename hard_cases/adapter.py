@@ -61,7 +61,9 @@ def _installed(place: str) -> Adapter | None:
 def _named(name: str) -> Adapter:
     place = BUILT_IN.get(name, name)
     if ":" not in place:
-        raise ValueError(f"adapter {name!r}: there are {', '.join(BUILT_IN)}, or module:Class")
+        raise ValueError(
+            f"adapter {name!r}: expected one of {', '.join(BUILT_IN)}, or module:Class"
+        )
     try:
         return _make(place)
     except ModuleNotFoundError as error:

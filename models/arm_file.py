@@ -130,7 +130,9 @@ def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> se
         chain = set(ends[-1:])
         while ends[0] not in chain:
             if body is None or body.name == "world":
-                raise ValueError(f"joints {entry!r}: {ends[-1]} does not move with {ends[0]}")
+                raise ValueError(
+                    f"joints {entry!r}: {ends[-1]} is not beyond {ends[0]} in the chain"
+                )
             chain |= {joint.name for joint in body.joints}
             body = body.parent
         kept |= chain

@@ -56,6 +56,6 @@ def rigid_pose(pose: object, name: str = "base_pose") -> NDArray[np.float64]:
         good = good and np.array_equal(matrix[3], [0, 0, 0, 1])
     if not good:
         raise ValueError(
-            f"{name}: expected a homogeneous (4, 4) matrix with a rotation and a translation in it"
+            f"{name}: expected a homogeneous (4, 4) transform: a rotation and a translation"
         )
     return matrix

@@ -270,7 +270,7 @@ class Drive:
         """
         for name in parts:
             if name not in PARTS:
-                raise ValueError(f"part {name!r}: there are {', '.join(PARTS)}")
+                raise ValueError(f"part {name!r}: expected one of {', '.join(PARTS)}")
         friction = None if "friction" in parts else self.friction
         if friction is not None:
             if "stribeck" in parts:

@@ -45,7 +45,7 @@ def drive_of(text: str) -> Drive:
                 values[name] = kind(**_arrays(values[name]))
         return Drive(**_arrays(values))
     except (LookupError, TypeError, AttributeError, RecursionError, json.JSONDecodeError) as error:
-        raise ValueError(f"drive: not the numbers of one ({error})") from None
+        raise ValueError(f"drive: not the numbers of a drive ({error})") from None
 
 
 def _plain(value: object) -> object:

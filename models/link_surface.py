@@ -125,7 +125,7 @@ def arm_surface(
         )
     if file.links[-1] in file.sticks:
         raise ValueError(
-            f"{path}: no shape found of the last link, {file.links[-1]}, or its mesh is not there"
+            f"{path}: the last link, {file.links[-1]}, has no shape, or its mesh is not there"
         )
     return link_surface(file.spec, points), file.sticks
 

@@ -98,7 +98,7 @@ class RobotDrive:
         if self.like not in (None, "cura6"):
             raise ValueError(f'drive.like {self.like!r}: expected "cura6"')
         if self.gain is not None and self.torque_constant is not None:
-            raise ValueError("drive.gain: not beside drive.torque_constant, which gives it too")
+            raise ValueError("drive.gain, drive.torque_constant: give one of them")
         if self.slope is not None:
             rows = tuple(tuple(np.atleast_1d(_numbers(r, "drive.slope"))) for r in self.slope)
             object.__setattr__(self, "slope", rows)

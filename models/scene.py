@@ -233,7 +233,9 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     taken |= {f"link{i + 1}" for i in range(len(arm.links))}
     for obj in spec.objects:
         if obj.name in taken:
-            raise ValueError(f"object {obj.name}: the scene has a part of this name; take another")
+            raise ValueError(
+                f"object {obj.name}: the scene has a part of this name; choose another name"
+            )
         taken.add(obj.name)
         if obj.touchable:
             parts |= {geom.name: obj for geom in add_object(whole, obj)}

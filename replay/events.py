@@ -99,7 +99,7 @@ class EventFolder:
             ValueError: the folder holds something else.
         """
         if folder.exists() and (not folder.is_dir() or not all(map(_own, folder.iterdir()))):
-            raise ValueError(f"{folder}: holds other files; --events takes a folder of its own")
+            raise ValueError(f"{folder}: holds other files; give --events a new folder")
         folder.mkdir(parents=True, exist_ok=True)
         for old in filter(_own, folder.iterdir()):
             old.unlink()

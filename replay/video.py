@@ -56,7 +56,9 @@ def frames(
     end = trace.t[-1] if seconds is None else min(trace.t[-1], start + seconds)
     rows = np.searchsorted(trace.t, np.arange(start, end, 1 / rate))
     if not len(rows) or start < trace.t[0] - 1:
-        raise ValueError(f"nothing from {start:g} s on: it has {trace.t[0]:g} to {trace.t[-1]:g} s")
+        raise ValueError(
+            f"no sample from {start:g} s on: it lasts from {trace.t[0]:g} to {trace.t[-1]:g} s"
+        )
     model = _stage(trace, int(rows[0]))
     model.vis.global_.offheight, model.vis.global_.offwidth = size
     data = mujoco.MjData(model)

@@ -24,7 +24,7 @@ def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Sol
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ValueError(
-            "b: a mesh, as a is; MeshTree.overlap is for two meshes, give convex bodies"
+            "a, b: both are meshes; give convex bodies as one of them, or use MeshTree.overlap"
         )
     if isinstance(a, MeshTree):
         return a, cast(Solid, b), False

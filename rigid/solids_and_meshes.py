@@ -49,7 +49,10 @@ def overlap(
     check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
     if special and method != "auto":
-        raise ValueError(f"method: {method!r} knows sharp bodies only, {special[0]} is none; auto")
+        raise ValueError(
+            f"method: {method!r} takes bodies without a radius only, which {special[0]} is not; "
+            "expected auto"
+        )
     if not special:
         return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
     if beside := mesh_bodies.mesh_beside(a, b):

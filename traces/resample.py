@@ -62,7 +62,9 @@ def averaged(trace: Trace, hz: float) -> Trace:
         ValueError: as :func:`resampled`, or a trace with truth.
     """
     if trace.truth is not None:
-        raise ValueError("a labelled trace: averaged signals would be later than their labels")
+        raise ValueError(
+            "the trace has labels: resampled signals are averages and would lag behind them"
+        )
     thin = resampled(trace, hz)
     names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
     means = {

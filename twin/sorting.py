@@ -44,8 +44,8 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         if side is not None:
             one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
             raise ValueError(
-                f"{one} and {two} do not predict each other: logs of two arms, or a load in some "
-                "that was not told (then give --payload LOG=KG or LOG=unknown of each)"
+                f"{one} and {two} do not predict each other: they are of two arms, or some carry a "
+                "load that was not given (--payload LOG=KG, or LOG=unknown, for each that does)"
             )
     return [told[k] for k in odd]
 

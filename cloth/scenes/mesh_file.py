@@ -83,7 +83,7 @@ def _obj(data: bytes) -> tuple[Points, list[list[int]]]:
                 raise ValueError(f"line {number}: a face of {len(rest)} vertices")
             polygons.append([_index(x, len(points), number) for x in rest])
         elif first and first not in OTHER:
-            raise ValueError(f"line {number}: {first[:20]!r} is no part of an OBJ file")
+            raise ValueError(f"line {number}: {first[:20]!r} is not a statement of OBJ")
     return np.array(points).reshape(-1, 3), polygons
 
 
@@ -142,12 +142,12 @@ def _header(text: str) -> tuple[str, list[_Element]]:
     if names[:2] != ["vertex", "face"] or len(elements[1].columns) == 0:
         raise ValueError(f"elements {', '.join(names)}: expected vertex and face first")
     if any(len(c) == 3 for c in elements[0].columns):
-        raise ValueError("a list in its vertices")
+        raise ValueError("its vertices have a list property, which is not supported")
     if [c[0] for c in elements[0].columns[:3]] != ["x", "y", "z"]:
-        raise ValueError("expected x, y, z first in its vertices")
+        raise ValueError("expected x, y, z as the first properties of its vertices")
     (name, *kinds), *more = elements[1].columns
     if name not in ("vertex_indices", "vertex_index") or len(kinds) != 2 or more:
-        raise ValueError("expected one list, vertex_indices, in its faces")
+        raise ValueError("expected vertex_indices as the only property of its faces")
     return ORDERS[form[0]], elements
 
 
@@ -165,7 +165,7 @@ def _ascii(lines: Sequence[bytes], elements: Sequence[_Element]) -> tuple[Points
             raise ValueError(f"vertex {k}: {len(row)} numbers, expected {width}")
     for k, row in enumerate(faces):
         if len(row) < 4 or int(row[0]) != len(row) - 1:
-            raise ValueError(f"face {k}: {len(row)} numbers, the first their count")
+            raise ValueError(f"face {k}: {len(row)} numbers; expected a count and as many vertices")
     values = np.array([[float(x) for x in row[:3]] for row in points]).reshape(-1, 3)
     return values, [[int(x) for x in row[1:]] for row in faces]
 

@@ -53,7 +53,8 @@ const std::int8_t (*axes_of(int k))[3] {
     case 14:
       return geometry::k_dop_corner_axes;
     default:
-      throw std::invalid_argument("k_dop" + std::to_string(k) + ": k is 6, 14, 16, 18 or 26");
+      throw std::invalid_argument("k_dop" + std::to_string(k) +
+                                  ": expected k = 6, 14, 16, 18 or 26");
   }
 }
 

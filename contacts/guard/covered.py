@@ -126,5 +126,5 @@ def names(covers: Sequence[str]) -> tuple[bool, bool]:
     """
     for one in covers:
         if one not in ("rigid", "cloth"):
-            raise ValueError(f"checker {one!r}: a guard covers rigid and cloth")
+            raise ValueError(f"checker {one!r}: expected rigid or cloth, which a guard covers")
     return "rigid" in covers, "cloth" in covers

@@ -174,8 +174,8 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
     )
     if not all(same):
         raise RuntimeError(
-            f"MuJoCo {mujoco.__version__}: its structs are not laid out as it declares them; "
-            "guarded steps were made for MuJoCo 4.0"
+            f"MuJoCo {mujoco.__version__}: its structs are laid out otherwise than it declares; "
+            "guarded steps need MuJoCo 4.0"
         )
 
 
@@ -196,7 +196,10 @@ def _layout(struct: str, last: str | None = None) -> Any:
     fields = []
     for field in _structs()[struct].fields:
         if not hasattr(field, "type"):
-            raise RuntimeError(f"MuJoCo {mujoco.__version__}: {struct} has a field without a type")
+            raise RuntimeError(
+                f"MuJoCo {mujoco.__version__}: {struct} has a field without a type; guarded steps "
+                "need MuJoCo 4.0"
+            )
         fields.append((field.name, _ctype(field.type)))
         if field.name == last:
             break

@@ -103,8 +103,8 @@ def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
         if (now != before).any():
             row = int(np.argwhere(now != before)[0, 0])
             raise ValueError(
-                f"{name}: row {row} is {now[row].tolist()}, compiled was {before[row].tolist()}; "
-                "change the MjSpec and recompile it"
+                f"{name}: row {row} is {now[row].tolist()}, when compiled it was "
+                f"{before[row].tolist()}; change the MjSpec and recompile it"
             )
 
 

@@ -323,13 +323,17 @@ def _refuse(model: Any, data: Any) -> None:
         raise ValueError(f"timestep {step}: expected a finite number above 0")
     for name, bit in REFUSED.items():
         if model.opt.enableflags & bit:
-            raise ValueError(f"option flag {name}: a guarded step cannot take it back; disable it")
+            raise ValueError(
+                f"option flag {name}: a guarded step cannot be rolled back with it; disable it"
+            )
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ValueError("integrator RK4: expected Euler, implicit, implicitfast or discrete")
     if model.opt.cone not in [int(cone) for cone in mujoco.mjtCone.__members__.values()]:
         raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
-        raise ValueError("mjcb_contactfilter: a guard cannot know the pairs it leaves; remove it")
+        raise ValueError(
+            "mjcb_contactfilter: a guard cannot know which pairs it rejects; remove it"
+        )
     refuse_values(model)
     for name in ("mocap_pos", "mocap_quat"):
         rows = getattr(data, name)

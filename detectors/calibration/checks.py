@@ -48,7 +48,7 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
         if against := [joint for joint, value in pairs if value < AGAINST]:
             raise ValueError(
                 f"{name}: friction would push {', '.join(against)}: the sign of the current or "
-                "torque, or of the velocity, is the other one than the robot file's"
+                "torque, or of the velocity, is opposite to the robot file's"
             )
 
 

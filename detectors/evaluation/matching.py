@@ -49,7 +49,8 @@ def match(
     begin, end = span
     if not (begin <= end and case_seconds > 0):
         raise ValueError(
-            f"span {span} s, case_seconds {case_seconds} s: expected begin <= end, > 0"
+            f"span {span} s, case_seconds {case_seconds} s: expected begin <= end "
+            "and case_seconds > 0"
         )
     inside = [c for c in collisions if begin <= c.onset <= end]
     inner = [a for a in alarms if begin <= a.start <= end]

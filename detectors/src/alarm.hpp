@@ -113,7 +113,8 @@ class Alarm {
     const double plain = floored ? scores_->floor() : 0.0;
     if (!std::isfinite(score) || !std::isfinite(plain))
       throw std::invalid_argument(
-          "the score is not a number: a sample was out of any arm's range; begin anew without it");
+          "the score is not a number: a sample was far out of any arm's range; start a new stream "
+          "without it");
     time_ = time_ < 0 ? 0.0 : time_ + dt;
     if (!set_.levels.speed.empty()) {
       const double now = speed_.step(qd, joints());

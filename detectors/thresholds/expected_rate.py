@@ -54,7 +54,7 @@ class ExpectedRate:
             ValueError: no episodes.
         """
         if not scores:
-            raise ValueError("no collision-free motion to tell a rate of false alarms from")
+            raise ValueError("no collision-free motion to estimate a rate of false alarms from")
         blocks = tuple(np.sort(one.blocks()[0]) for one in scores)
         highest = np.array([one.peak for one in scores])
         hours = np.array([one.seconds for one in scores]) / 3600

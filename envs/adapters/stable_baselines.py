@@ -100,7 +100,9 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         Raises:
             AttributeError: always.
         """
-        raise AttributeError(f"{attr_name}: copies share one scene; give it to the constructor")
+        raise AttributeError(
+            f"{attr_name}: cannot be set, all copies share one scene; give it to the constructor"
+        )
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
         """Call a method of the vector environment, once for each copy asked for."""

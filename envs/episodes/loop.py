@@ -141,8 +141,8 @@ class SimulationLoop:
         )
         if sound < rows:
             raise SimulationDiverged(
-                f"the simulation diverged {sound} steps into a run of {rows} at "
-                f"{self.data.time:.3f} s: a smaller timestep or softer contact would hold"
+                f"the simulation diverged at {self.data.time:.3f} s, after {sound} of {rows} "
+                f"steps: use a smaller timestep or softer contacts"
             )
         return out
 

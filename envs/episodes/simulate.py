@@ -369,5 +369,5 @@ def _known(name: str | Checker) -> str | Checker:
     from tauguard.contacts import registered  # and its room, which takes long to import
 
     if isinstance(name, str) and name not in registered():
-        raise ValueError(f"checker {name!r}: there are {', '.join(registered())}")
+        raise ValueError(f"checker {name!r}: expected one of {', '.join(registered())}")
     return name

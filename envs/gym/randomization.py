@@ -134,7 +134,7 @@ def _distribution(name: str, value: Any) -> Distribution:
         )
     low, high = spread.ends()
     if not low <= high:
-        raise ValueError(f"randomize: {name} from {low} to {high}; expected low up to high")
+        raise ValueError(f"randomize: {name} from {low} to {high}; expected low <= high")
     return spread
 
 
@@ -165,7 +165,9 @@ def check_names(
         if name in _OF_PERSON and not people:
             raise ValueError(f"randomize: {name!r} without a person; add obstacles=('person',)")
         if name == "stature" and checkers:
-            raise ValueError("randomize: 'stature' with checkers: they know one size of the person")
+            raise ValueError(
+                "randomize: 'stature' with checkers, which know one size of the person only"
+            )
 
 
 def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -> None:

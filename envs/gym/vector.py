@@ -134,7 +134,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         values = np.ascontiguousarray(actions, dtype=np.float64)
         if values.shape != self.action_space.shape:
             raise ValueError(
-                f"actions: shape {values.shape}, expected {self.action_space.shape}: a row a copy"
+                f"actions: shape {values.shape}, expected {self.action_space.shape}: "
+                "one row per copy"
             )
         if not self._seeded:
             raise gymnasium.error.ResetNeeded("call reset before step")

@@ -98,7 +98,7 @@ void step_all(const std::vector<Plant*>& plants, Matrix actions,
               int threads) {
   const std::size_t n = plants.size(), width = actions.shape(1);
   if (actions.shape(0) != n || mask.shape(0) != n)
-    throw nb::value_error("actions, mask: a row a plant");
+    throw nb::value_error("actions, mask: expected one row per plant");
   for (std::size_t i = 0; i < n; ++i) {
     if (plants[i]->controls.scale.size() != width) throw nb::value_error("actions: wrong width");
     if (mask.data()[i]) check(actions.data() + i * width, width, i);
@@ -136,7 +136,7 @@ void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
            const std::vector<int>& bodies, const std::vector<int>& joints, Array position,
            Array rotation, Array anchor, Array axis) {
   const std::size_t rows = q.shape(0), n = qpos.size();
-  if (q.shape(1) != n) throw nb::value_error("q: expected a column an address");
+  if (q.shape(1) != n) throw nb::value_error("q: expected one column per address");
   if (position.size() != 3 * rows * bodies.size() || rotation.size() != 3 * position.size() ||
       anchor.size() != 3 * rows * joints.size() || axis.size() != anchor.size())
     throw nb::value_error("poses: tables of other sizes than asked for");
@@ -218,7 +218,8 @@ void bind_plant(nb::module_& m) {
       .def(
           "override",
           [](Plant& p, int kind, Vector speed) {
-            if (speed.shape(0) != p.joints()) throw nb::value_error("speed: one number a joint");
+            if (speed.shape(0) != p.joints())
+              throw nb::value_error("speed: expected one number per joint");
             p.controls.override = static_cast<Override>(kind);
             p.controls.override_speed.assign(speed.data(), speed.data() + speed.shape(0));
           },

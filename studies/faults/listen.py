@@ -116,7 +116,7 @@ def received(pipe: Connection) -> int:
     with contextlib.suppress(EOFError, OSError):
         if pipe.poll(ANSWERS):
             return int(pipe.recv())
-    raise RuntimeError("the process that plays the log says nothing")
+    raise RuntimeError("the process that plays the log does not answer")
 
 
 def heard(folder: Path, rate: float) -> Row:

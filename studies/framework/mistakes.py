@@ -42,7 +42,9 @@ def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
         files = [Path(row["file"]) for row in found["rows"] if row["kind"]]
         found["counts"] = str(found["counts"])
     except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
-        raise ValueError(f"{path}: no list of mistakes of this command; move it away") from None
+        raise ValueError(
+            f"{path}: not a list of mistakes that this command wrote; move it away"
+        ) from None
     if own != {"seed": seed, "build": build()}:
         return {}, "those recorded are of another seed or build"
     if not all((path.with_suffix("") / file.name).is_file() for file in files):

@@ -104,7 +104,7 @@ def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):
         (("--gains", "-8", "-5"), "pull with gravity"),
         (
             ("--model", "m.json", "--quiet", "5", "--gains", "8", "5"),
-            "--quiet, --gains: not beside",
+            "--quiet and --gains cannot be combined",
         ),
     ],
 )

@@ -250,7 +250,7 @@ def test_the_summary_is_json(alarm, struck):
     [
         ({}, "give one of --ur HOST, --play LOG, --stdin and --ros TOPIC"),
         ({"ur": "h", "stdin": True}, "give one of"),
-        ({"ur": "h", "torque": True}, "--torque: not beside --ur"),
+        ({"ur": "h", "torque": True}, "--torque cannot be combined with --ur"),
         ({"stdin": True, "rerun": "a.mp4"}, "expected `view`, or a file that ends with .rrd"),
         ({"stdin": True, "rerun": "no_such/a.rrd"}, "the folder no_such does not exist"),
         ({"stdin": True, "json": "no_such/a.json"}, "the folder no_such does not exist"),

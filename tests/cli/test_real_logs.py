@@ -139,7 +139,7 @@ def test_what_does_not_belong_to_a_model_is_named(folder, calibrated, tmp_path, 
     longer.write_text(XML.replace('body pos=".4 0 0"', 'body pos=".5 0 0"'))
     line = fails(capsys, "detect", log, *flags(folder, longer.name), "--model", model)
     assert "longer.xml is not the arm that" in line
-    assert "c stands 100 mm from where it stood" in line
+    assert "c is 100 mm from its place there" in line
     line = fails(capsys, "detect", log, *robot, "--model", model, "--payload", "heavy")
     assert "--payload heavy: expected KG or KG,X,Y,Z, 0 for nothing" in line
     line = fails(capsys, "detect", str(tmp_path / "none.csv"), *robot, "--model", model)
@@ -269,7 +269,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
     [
         (("--traces", "x", "--torque"), "--torque: with --free only"),
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
-        (("--traces", "x", "--calibration", "x"), "--calibration x: is --traces"),
+        (("--traces", "x", "--calibration", "x"), "--calibration x: the same folder as --traces"),
         (("--free", "x", "--robot", "r", "--confidence", "0.9"), "go with --traces only"),
     ],
 )
@@ -296,9 +296,9 @@ def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
     assert preset_drive(None, own[:1]) == preset_drive("ur10e", own[:1]) == ("ur5", DRIVES["ur5"])
     assert preset_drive("ur10e", [plain]) == ("ur10e", DRIVES["ur10e"])
     assert preset_drive("mine.json", [plain]) is preset_drive(None, [plain, plain]) is None
-    with pytest.raises(ValueError, match="logs of ur10e, ur5: give those of one preset"):
+    with pytest.raises(ValueError, match="logs of ur10e, ur5, whose drive gains differ"):
         preset_drive(None, own)
-    with pytest.raises(ValueError, match="logs of no preset, ur5: give those of one preset"):
+    with pytest.raises(ValueError, match="logs of no preset, ur5, whose drive gains differ"):
         preset_drive(None, [own[0], plain])
 
 

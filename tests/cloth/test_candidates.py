@@ -337,9 +337,9 @@ class TestBadInput:
 
     @pytest.mark.parametrize("name", [["ab2pf"], {}, None, 0])
     def test_names_that_are_no_text(self, name):
-        with pytest.raises(ValueError, match=r"method .*: there are ab2pf, "):
+        with pytest.raises(ValueError, match=r"method .*: expected one of ab2pf, "):
             MeshCCD(self.faces, method=name)
-        with pytest.raises(ValueError, match=r"volume .*: there are k_dop6, "):
+        with pytest.raises(ValueError, match=r"volume .*: expected one of k_dop6, "):
             MeshCCD(self.faces, volume=name)
 
     def test_numbers_beyond_the_doubles(self):
@@ -353,7 +353,7 @@ class TestBadInput:
         assert MeshCCD(self.faces, threads=np.int64(2)).threads == 2
 
     def test_volume(self):
-        with pytest.raises(ValueError, match="volume 'sphere': there are k_dop6, "):
+        with pytest.raises(ValueError, match="volume 'sphere': expected one of k_dop6, "):
             MeshCCD(self.faces, volume="sphere")
 
 

@@ -199,7 +199,7 @@ def test_answers_that_are_kept_stay_though_memory_of_others_is_used_again():
 
 
 def test_method_is_named():
-    with pytest.raises(ValueError, match="method 'magic': there are "):
+    with pytest.raises(ValueError, match="method 'magic': expected one of "):
         MeshCCD([[0, 1, 2]], "magic")
 
 

@@ -78,7 +78,7 @@ def test_a_minimum_distance_is_conservative(kind):
 @pytest.mark.parametrize("query", [point_edge, point_point])
 def test_other_methods_and_bad_shapes_are_refused(query):
     n = 3 if query is point_edge else 2
-    with pytest.raises(ValueError, match="there are ab2pf, exact"):
+    with pytest.raises(ValueError, match="expected one of ab2pf, exact"):
         query(np.zeros((1, n, 3)), np.zeros((1, n, 3)), method="vcd")
     with pytest.raises(ValueError, match="x_t0: shape"):
         query(np.zeros((1, 4, 3)), np.zeros((1, 4, 3)))
@@ -188,7 +188,7 @@ def test_groups_keep_isolated_parts_apart():
         ({"edges": [[0, 1, 2]]}, "edges: shape"),
         ({"points": [[1]]}, "points: shape"),
         ({"points": [0.5]}, "points: dtype"),
-        ({"points": [7], "method": "vcd"}, "method 'vcd': there are ab2pf, exact"),
+        ({"points": [7], "method": "vcd"}, "method 'vcd': expected one of ab2pf, exact"),
     ],
 )
 def test_bad_isolated_parts_are_named(kw, message):
@@ -236,8 +236,8 @@ def test_an_obj_with_vertices_of_no_face_is_named(tmp_path):
 
 
 def test_comparators_have_no_queries_of_points():
-    with pytest.raises(ValueError, match="method 'vcd' has no queries of points"):
+    with pytest.raises(ValueError, match="'vcd' has no queries of points; expected ab2pf"):
         ComparedMeshCCD([[0, 1, 2]], "vcd", points=[7])
     ccd = ComparedMeshCCD([[0, 1, 2]], "vcd")
-    with pytest.raises(ValueError, match="method 'vcd' has no queries of points"):
+    with pytest.raises(ValueError, match="'vcd' has no queries of points; expected ab2pf"):
         ccd.update_topology([[0, 1, 2]], points=[7])

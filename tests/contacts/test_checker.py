@@ -126,11 +126,11 @@ def test_a_checker_that_returns_no_contacts_is_named():
 def test_bad_names_say_what_there_is():
     register("nothing", Nothing)
     model = mujoco.MjModel.from_xml_string(SCENE)
-    with pytest.raises(ValueError, match=r"'nothin': there are .*nothing"):
+    with pytest.raises(ValueError, match=r"'nothin': expected one of .*nothing"):
         checker("nothin", model)
     with pytest.raises(ValueError, match="name: empty"):
         register("", Nothing)
     with pytest.raises(ValueError, match="cannot be called"):
         register("x", 3)
-    with pytest.raises(ValueError, match="'ball': there are plane"):
+    with pytest.raises(ValueError, match="'ball': expected one of plane"):
         pair_kind("ball", "box")

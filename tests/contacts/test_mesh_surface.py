@@ -71,5 +71,5 @@ def test_far_from_the_cup_nothing_is_tested():
 
 def test_an_unknown_meaning_is_named():
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    with pytest.raises(ValueError, match="mesh 'solid': there are hull, surface"):
+    with pytest.raises(ValueError, match="mesh 'solid': expected hull or surface"):
         checker("rigid", model, mesh="solid")

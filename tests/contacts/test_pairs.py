@@ -55,7 +55,7 @@ def test_reach_is_never_negative_and_has_names():
     assert pairs.reach("margin").min() == 0
     np.testing.assert_array_equal(pairs.reach("surface"), 0)
     assert pairs.reach("gap").max() == pytest.approx(0.4)
-    with pytest.raises(ValueError, match="'far': there are surface, margin, gap"):
+    with pytest.raises(ValueError, match="'far': expected one of surface, margin, gap"):
         pairs.reach("far")
 
 

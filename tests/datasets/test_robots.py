@@ -68,7 +68,7 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     assert same
     with pytest.raises(ValueError, match=r"arm other: no file other\.toml here; .* by --robot"):
         inspection.same_again(tmp_path / "1", line)
-    with pytest.raises(ValueError, match="arm cura6 is the package's own"):
+    with pytest.raises(ValueError, match="arm cura6 comes with the package"):
         inspection.same_again(tmp_path / "1", line | {"arm": "cura6"}, own)
 
     (described.parent / "robots" / "arm.xml").write_text(random_arm(SEED + 1))

@@ -52,7 +52,7 @@ def test_the_rest_of_the_trace_does_not_change(trace):
 
 
 def test_an_unknown_checker_is_named_before_anything_runs():
-    with pytest.raises(ValueError, match=r"checker 'rigit': there are .*rigid"):
+    with pytest.raises(ValueError, match=r"checker 'rigit': expected one of .*rigid"):
         simulate(Episode(seed=1, seconds=3600), checkers=["rigit"])
 
 

@@ -131,7 +131,7 @@ def test_a_taller_person_is_taller():
     ("keywords", "words"),
     [
         ({"randomize": {"colour": (0, 1)}}, "'colour'; expected some of mass, "),
-        ({"randomize": {"mass": (1.2, 0.8)}}, "low up to high"),
+        ({"randomize": {"mass": (1.2, 0.8)}}, "expected low <= high"),
         ({"randomize": {"mass": (0.0, 1.0)}}, "0.1 to 10"),
         ({"randomize": {"mass": "heavy"}}, "mass 'heavy'"),
         ({"randomize": {"stature": 1.7}, "obstacles": ()}, "without a person"),

@@ -97,5 +97,5 @@ def test_parts_are_left_out_by_name():
     assert drive.without("friction").friction is None
     warm = replace(drive, friction=replace(drive.friction, temperature=60.0))
     assert warm.without("warmth").friction.temperature == warm.friction.reference_temperature
-    with pytest.raises(ValueError, match="'gears': there are friction"):
+    with pytest.raises(ValueError, match="'gears': expected one of friction"):
         drive.without("gears")

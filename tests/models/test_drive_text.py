@@ -34,10 +34,10 @@ def test_the_same_numbers_come_back(kind, tmp_path):
     ("change", "message"),
     [
         (lambda v: v | {"version": 2}, "of version 2; this tauguard reads 1"),
-        (lambda v: v | {"torque": 1}, "not the numbers of one"),
-        (lambda v: {k: x for k, x in v.items() if k != "gain"}, "not the numbers of one"),
+        (lambda v: v | {"torque": 1}, "not the numbers of a drive"),
+        (lambda v: {k: x for k, x in v.items() if k != "gain"}, "not the numbers of a drive"),
         (lambda v: v | {"gear": [1.0]}, "gear"),
-        (lambda v: [v], "not the numbers of one"),
+        (lambda v: [v], "not the numbers of a drive"),
     ],
 )
 def test_other_text_is_refused(change, message):

@@ -104,7 +104,7 @@ def test_joints_that_the_surface_is_not_of_are_named(tmp_path):
     assert set(one.link) == {0}
     assert sticks == ()
     (tmp_path / "bare.urdf").write_text(re.sub(r"<collision>.*?</collision>", "", URDF))
-    with pytest.raises(ValueError, match="no shape found of the last link, b"):
+    with pytest.raises(ValueError, match="the last link, b, has no shape"):
         arm_surface(tmp_path / "bare.urdf", ("j1", "j2"))
     with pytest.raises(ValueError, match="no joint 'j3'"):
         arm_surface(tmp_path / "arm.urdf", ("j1", "j3"))

@@ -244,7 +244,10 @@ left_over = "left.csv"
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("gain = 1.0\ntorque_constant = 0.1", "not beside drive.torque_constant"),
+        (
+            "gain = 1.0\ntorque_constant = 0.1",
+            "drive.torque_constant: give one of them",
+        ),
         ("[drive.ripple]\ncycles = [1.0]", "drive.ripple: missing"),
         ("[drive.sensors]\nlag = 1.0", "drive.sensors: no key 'lag'"),
         ("[drive.sensors]\ncurrent_noise = -1.0", "expected 0 or more"),

@@ -361,7 +361,7 @@ def test_a_list_of_mistakes_of_somebody_else_is_named_and_kept(checkout, text):
     path.write_text(text)
     done, _ = mistakes(checkout)
     assert done.returncode == 1
-    assert "no list of mistakes" in done.stderr
+    assert "not a list of mistakes" in done.stderr
     assert path.read_text() == text
 
 

@@ -78,7 +78,7 @@ def command(
     beside = robot if robot.exists() else Path(robot.name)  # of an arm by name: the working folder
     robot = bodies_file(robot)
     if gains and scale in ("masses", "payload"):
-        raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
+        raise ValueError(f"--gains cannot be combined with --scale {scale}, which finds the gains")
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
     names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
     traces = [recording.trace for recording in recordings]

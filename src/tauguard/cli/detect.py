@@ -87,7 +87,7 @@ def command(
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
-        raise ValueError("--quiet, --gains: not beside --model, which brings its own")
+        raise ValueError("--quiet and --gains cannot be combined with --model, which has its own")
     robot = bodies_file(robot)
     read = read_one(log, columns, torque, reading)
     print_notes(read.notes)

@@ -156,5 +156,7 @@ def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]
         if accept is None:
             raise
         if name not in accept:
-            raise ValueError(f"{error}; if that is to be, say --accept {name}") from None
+            raise ValueError(
+                f"{error}; to use the logs all the same, add --accept {name}"
+            ) from None
         print_notes([f"accepted as --accept {name} says: {error}"])

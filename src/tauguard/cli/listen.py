@@ -75,7 +75,7 @@ def command(
     if sum(sources) != 1:
         raise ValueError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")
     if ur is not None and torque:
-        raise ValueError("--torque: not beside --ur, whose controller sends currents")
+        raise ValueError("--torque cannot be combined with --ur, whose controller sends currents")
     shown = None if rerun in (None, "view") else Path(str(rerun))
     if shown is not None and shown.suffix != ".rrd":
         raise ValueError(f"--rerun {rerun}: expected `view`, or a file that ends with .rrd")
@@ -87,7 +87,7 @@ def command(
     expect("--port", port, 1, 65535)
     alarm = with_load(load_model(model), model, payload, torque)
     if alarm.inputs is None:
-        raise ValueError(f"{model}: does not say what samples look like; train the detector anew")
+        raise ValueError(f"{model}: has no limits of usual samples; train the detector anew")
     check_robot(robot, alarm.detector.arm.robot, model)
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)

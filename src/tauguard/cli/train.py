@@ -158,7 +158,9 @@ def labelled_motion(
     # First: what cannot be used, or cannot be guaranteed, is better named before training.
     method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
-        raise ValueError(f"--calibration {calibration}: is --traces; give recordings not in it")
+        raise ValueError(
+            f"--calibration {calibration}: the same folder as --traces; give other recordings"
+        )
     free = labelled(calibration) if calibration is not None else []
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)

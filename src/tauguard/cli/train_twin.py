@@ -67,7 +67,8 @@ def twin_contacts(
     for name, trace in read.traces.items():
         if not same_rate(trace.dt, 1 / sensors.rate):
             raise ValueError(
-                f"{name}: {1 / trace.dt:.4g} samples a second, the twin has {sensors.rate:.4g}"
+                f"{name}: {1 / trace.dt:.4g} samples a second, the twin has "
+                f"{sensors.rate:.4g}; expected logs of that rate, or --resample {sensors.rate:.4g}"
             )
     names, logs = arm.robot.joint_names, list(read.traces.values())
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]

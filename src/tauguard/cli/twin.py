@@ -148,7 +148,7 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     found = identify(given.arm, used, scale=given.scale)
     bare = [r.trace for r in used if _unloaded(r)]
     if not bare:
-        raise ValueError("all logs carry a load: a twin needs one without, at least")
+        raise ValueError("all logs carry a load: a twin needs at least one without")
     twin = identify_twin(found.arm, bare, limit / abs(found.arm.drive_gain))
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 
