@@ -81,7 +81,7 @@ def shards(configuration: Configuration) -> Iterator[tuple[str, int]]:
             yield split.name, number
 
 
-def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[str, Any]]:
+def lines(folder: Path) -> Iterator[dict[str, Any]]:
     """The manifest's lines, one per episode, split by split; missing shards are skipped.
 
     Raises:
@@ -89,7 +89,7 @@ def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[
     """
     for split, number in shards(configuration_in(folder)):
         path = folder / manifest_path(split, number)
-        if (splits is None or split in splits) and path.is_file():
+        if path.is_file():
             yield from read_lines(path)
 
 

@@ -140,10 +140,9 @@ def free_episodes(
     speeds: Sequence[float],
     payloads: Sequence[float] = (0.0,),
     mismatch: Mismatch | None = None,
-    picks: bool = False,
     robot: str = "cura6",
 ) -> list[Episode]:
-    """Collision-free episodes; with ``picks`` the arm takes its payload up half-way through."""
+    """Collision-free episodes."""
     children = np.random.SeedSequence([seed, 2]).spawn(count)
     episodes = []
     for i, child in enumerate(children):
@@ -158,9 +157,6 @@ def free_episodes(
             temperature=float(rng.uniform(25, 45)),
             arm=robot,
         )
-        if picks and payload:
-            change = PayloadPick(seconds / 2, payload)
-            episode = replace(episode, payload_g=0.0, picks=(change,))
         episodes.append(episode)
     return episodes
 

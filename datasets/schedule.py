@@ -9,7 +9,7 @@ import hashlib
 import math
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeVar
@@ -90,13 +90,6 @@ def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
     if split.paired:
         return number // 2, bool(number % 2)
     return number, dealt(_fraction(split.struck), [*seed, 5], number)
-
-
-def all_planned(configuration: Configuration) -> Iterator[Planned]:
-    """Every episode, split by split."""
-    for split in configuration.splits:
-        for number in range(split.episodes):
-            yield planned(configuration, split, number)
 
 
 def dealt(values: Sequence[T], seed: list[int], number: int) -> T:

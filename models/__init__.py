@@ -11,7 +11,7 @@ from tauguard.models.known_robots import ROBOTS
 from tauguard.models.left_over import LeftOver
 from tauguard.models.link_surface import LinkSurface, arm_surface, link_surface
 from tauguard.models.mismatch import Mismatch
-from tauguard.models.nominal import add_payload, compiled, pin_model
+from tauguard.models.nominal import compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
 from tauguard.models.payload import set_payload
 from tauguard.models.person import STATURES, Person
@@ -45,7 +45,6 @@ __all__ = [
     "Shape",
     "Striker",
     "Table",
-    "add_payload",
     "arm_surface",
     "blow_velocity",
     "body_region",

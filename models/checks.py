@@ -42,7 +42,7 @@ def shaped(owner: object, shape: tuple[int, ...], meaning: str, *names: str) -> 
             )
 
 
-def rigid_pose(pose: object, name: str = "base_pose") -> NDArray[np.float64]:
+def rigid_pose(pose: object) -> NDArray[np.float64]:
     """``pose`` as an array.
 
     Raises:
@@ -56,6 +56,6 @@ def rigid_pose(pose: object, name: str = "base_pose") -> NDArray[np.float64]:
         good = good and np.array_equal(matrix[3], [0, 0, 0, 1])
     if not good:
         raise ValueError(
-            f"{name}: expected a homogeneous (4, 4) transform: a rotation and a translation"
+            "base_pose: expected a homogeneous (4, 4) transform: a rotation and a translation"
         )
     return matrix

@@ -184,34 +184,3 @@ def _vector(value: ArrayLike, name: str) -> Array:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise ValueError(f"{name} {value!r}: expected three finite numbers")
     return vector
-
-
-def add_payload(
-    model: pin.Model, mass: float, com: ArrayLike, inertia: ArrayLike = 0.0
-) -> pin.Model:
-    """A copy of ``model`` that carries a payload on its last joint.
-
-    Args:
-        model: model of an arm.
-        mass: [kg].
-        com: in the last joint's frame [m], (3,).
-        inertia: about the payload's centre of mass [kg m^2], a number or (3, 3).
-
-    Raises:
-        ValueError: a physically impossible mass or inertia, or a ``com`` that is no vector.
-    """
-    if not (np.isfinite(mass) and mass >= 0):
-        raise ValueError(f"payload mass {mass} kg: expected 0 or more")
-    tensor = np.asarray(inertia, dtype=float)
-    tensor = np.eye(3) * tensor if tensor.ndim == 0 else tensor
-    if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
-        raise ValueError("payload inertia: expected a number or a symmetric (3, 3) matrix")
-    moments = np.linalg.eigvalsh(tensor)
-    if moments[0] < 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
-        raise ValueError(f"payload inertia: no body has the principal moments {moments}")
-    loaded = model.copy()
-    last = loaded.njoints - 1
-    loaded.appendBodyToJoint(
-        last, pin.Inertia(mass, _vector(com, "payload com"), tensor), pin.SE3.Identity()
-    )
-    return loaded

@@ -137,11 +137,6 @@ class SceneObject:
                 raise ValueError(f"object {self.name}: path: expected times that grow from 0 on")
             object.__setattr__(self, "position", path[0][1:])
 
-    @classmethod
-    def from_spec(cls, name: str, spec: mujoco.MjSpec, **keywords: Any) -> SceneObject:
-        """An object from a ``mujoco.MjSpec``; keywords are those of the class."""
-        return cls(name, mjcf=spec, **keywords)
-
     @property
     def moves(self) -> bool:
         """Whether its position changes."""

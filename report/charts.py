@@ -26,26 +26,16 @@ STYLE: dict[str, Any] = {
 }
 
 
-def errorbars(
-    axes: Any,
-    at: ArrayLike,
-    figures: Iterable[Mapping[str, Any]],
-    across: bool = False,
-    **style: Any,
-) -> None:
+def errorbars(axes: Any, at: ArrayLike, figures: Iterable[Mapping[str, Any]], **style: Any) -> None:
     """Draw values with their intervals: ``value`` or ``median``, ``low`` and ``high`` of each.
 
     Args:
         axes: matplotlib axes to draw on.
-        at: position of each value on the other axis.
+        at: position of each value along x.
         figures: the values with their intervals, at least one.
-        across: draw values along x instead of y.
         style: keywords of matplotlib's ``errorbar``.
     """
     rows = [(f["value"] if "value" in f else f["median"], f["low"], f["high"]) for f in figures]
     middle, low, high = np.array(rows, dtype=np.float64).reshape(-1, 3).T
     spread = np.stack([middle - low, high - middle])
-    if across:
-        axes.errorbar(middle, at, xerr=spread, **style)
-    else:
-        axes.errorbar(at, middle, yerr=spread, **style)
+    axes.errorbar(at, middle, yerr=spread, **style)

@@ -9,6 +9,7 @@ checked.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,7 +157,29 @@ class Parallelepipeds(_Batch):
 
 
 @dataclass(frozen=True, eq=False)
-class Hulls(_Batch):
+class PointSets(_Batch):
+    """Bodies given by any number of points each; :class:`Hulls` and :class:`Polygons`."""
+
+    vertices: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+
+    dimensions: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        vertices = frozen_finite("vertices", self.vertices, (None, self.dimensions))
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """The vertices of all bodies. Shape (M, 2) or (M, 3)."""
+        return self.vertices
+
+
+class Hulls(PointSets):
     """The convex hulls of any number of points each.
 
     Body n owns ``vertices[offsets[n]:offsets[n + 1]]``.
@@ -170,44 +193,17 @@ class Hulls(_Batch):
             vertices, or an empty hull (named with its row).
     """
 
-    vertices: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 3)))
-        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
-
-    def __len__(self) -> int:
-        return len(self.offsets) - 1
-
-    @property
-    def packed(self) -> NDArray[np.float64]:
-        """The vertices of all bodies. Shape (M, 3)."""
-        return self.vertices
+    dimensions = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Polygons(_Batch):
+class Polygons(PointSets):
     """Convex polygons in the plane: the hulls of any number of points each, in any order.
 
     They are tested against polygons only. Arguments and errors as for :class:`Hulls`, vertices of
     shape (M, 2).
     """
 
-    vertices: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 2)))
-        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
-
-    def __len__(self) -> int:
-        return len(self.offsets) - 1
-
-    @property
-    def packed(self) -> NDArray[np.float64]:
-        """The vertices of all bodies. Shape (M, 2)."""
-        return self.vertices
+    dimensions = 2
 
 
 def _partition(given: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -64,7 +64,7 @@ Bernstein<a + b> operator*(const Bernstein<a>& x, const Bernstein<b>& y) {
   return r;
 }
 
-// The sign at time t 2^-52: 52 bits more a degree.
+// The sign at time t 2^-52: 52 bits more per degree.
 template <int degree>
 int sign_at(const Bernstein<degree>& f, std::int64_t t) {
   using Wide = FixedInt<3 * degree>;
@@ -97,7 +97,7 @@ constexpr int unknown_sign = 2;
 // A root: exactly lo, or the only root of `of` in the open interval (lo, hi), a simple one.
 template <int degree>
 struct BernsteinRoot {
-  std::int64_t lo, hi;  // in 2^-52
+  std::int64_t lo, hi;  // in units of 2^-52
   const Bernstein<degree>* of = nullptr;
 };
 

@@ -15,7 +15,7 @@ namespace tauguard::rigid {
 namespace {
 
 // A limit on the number of steps for a resting gap; the time is still never late. Bodies that pass
-// close by each other take a few steps a radian, so the turning of both counts.
+// close by each other take a few steps per radian, so the rotation of both counts.
 constexpr int most_steps = 20000, steps_a_radian = 64;
 // For rotations below this [rad] a whole turn is not considered.
 constexpr double little_turn = 4;

@@ -66,7 +66,7 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
   for (const Vec3& p : points) {
     for (const double x : p) extent.magnitude = std::max(extent.magnitude, std::fabs(x) + rounding);
     extent.radius = std::max(extent.radius, norm(p - extent.centre) + rounding);
-    // The axes are orthonormal to the rounding of a float, and the centre is where it is.
+    // About the centre as computed, along axes that are orthonormal to the rounding of a float.
     for (int i = 0; i < 3; ++i) {
       const Vec3 n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
       half[i] = std::max(half[i], std::fabs(dot(n, p - extent.centre)));

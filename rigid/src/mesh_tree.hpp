@@ -17,7 +17,7 @@ namespace tauguard::rigid {
 
 inline constexpr int width = 8;       // children of a node: one AVX register of floats
 inline constexpr int leaf_size = 4;   // most triangles in a leaf
-inline constexpr int small_leaf = 2;  // so few triangles are not split if their node has room
+inline constexpr int small_leaf = 2;  // at most so many are not split if their node has room
 
 // A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first +
 // count).

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.datasets.configuration import NAMED, Configuration, load, parse
-from tauguard.datasets.schedule import all_planned, dealt, planned, stated_balance
+from tauguard.datasets.schedule import dealt, planned, stated_balance
 
 GOOD = """
 name = "a"
@@ -122,6 +122,10 @@ def test_a_deck_deals_every_value_equally_often(values, seed, count):
 
 def test_hashes_of_published_descriptions_stay():
     assert load("tauguard-collisions-v1").sha256.startswith("ba6ceca843d9d137")
+
+
+def all_planned(configuration):
+    return [planned(configuration, s, k) for s in configuration.splits for k in range(s.episodes)]
 
 
 def test_a_pair_has_one_motion_and_the_second_has_the_collisions():

@@ -117,7 +117,7 @@ def test_fragments_specs_and_meshes(tmp_path):
     for obj in (
         SceneObject("a", mjcf=fragment, **far),
         SceneObject("a", mjcf=str(file), **far),
-        SceneObject.from_spec("a", spec, **far),
+        SceneObject("a", mjcf=spec, **far),
         SceneObject("a", (Shape("mesh", file=str(mesh), position=(0, 0, 0.1)),), **far),
     ):
         scene = compose(SceneSpec(objects=(obj,)))

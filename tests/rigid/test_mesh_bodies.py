@@ -116,7 +116,7 @@ def test_inside_a_closed_mesh_the_surface_counts():
 def test_mesh_queries_refuse_what_they_cannot_answer():
     tree = MeshTree(np.eye(3), [[0, 1, 2]])
     ball = Spheres(np.zeros((2, 3)), 1.0)
-    with pytest.raises(ValueError, match=r"MeshTree\.overlap is for two meshes"):
+    with pytest.raises(ValueError, match=r"or use MeshTree\.overlap"):
         overlap(tree, tree)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="a, b: both are meshes"):
         distance(tree, tree)  # type: ignore[call-overload]
