@@ -108,7 +108,7 @@ class Layout:
         """Field arrays of messages ``data``, shape (rows, size): copies, in native byte order.
 
         Raises:
-            ValueError: the constant bytes differ: other strings or lengths than this layout's.
+            ValueError: the constant bytes (strings and lengths) differ from this layout's.
         """
         for offset, expected in self._constants:
             found = data[:, offset : offset + len(expected)]

@@ -142,7 +142,7 @@ class Walk {
     return row > 0 && !meets(up) ? row : 0;
   }
 
-  // Checks for Ctrl-C, and for the size that all chunks together have reached.
+  // Checks for Ctrl-C, and whether all chunks together exceed the limit.
   void look_up() {
     geometry::poll_interrupt();
     total_.add(cut.size() - counted_);

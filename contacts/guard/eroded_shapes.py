@@ -41,7 +41,7 @@ class ErodedShapes:
         return self._hull(geom).radius if kind == "mesh" else 0.0
 
     def add(self, geom: int, layer: float) -> int:
-        """The number of the shape of ``geom`` eroded by a layer [m] thinner than its radius."""
+        """Erode ``geom`` by ``layer`` [m], less than its radius; return the shape's number."""
         key = (geom, layer)
         if key not in self._added:
             self._added[key] = self._new(geom, layer)
