@@ -2,9 +2,7 @@
 
 Table ``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
 ``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its start
-varies over the distance that it travels in one step. ``cost`` has a large cloth. MuJoCo treats a
-moving ball on cloth with ordinary contacts also under its flags ``speculative`` and ``ipc``, so
-those rows equal the plain ones.
+varies over the distance that it travels in one step. ``cost`` has a large cloth.
 """
 
 from collections.abc import Sequence
@@ -45,9 +43,8 @@ def measure(quick: bool, seed: int) -> list[Row]:
         seconds = QUICK_SECONDS.get(name) if quick else None
         rows += _scene(name, timestep, seconds, 10 if quick else 50)
     speeds = (10.0, 50.0) if quick else (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-    modes = ("plain",) if quick else ("plain", "speculative", "ipc")
-    for mode, timestep, speed in product(modes, timesteps, speeds):
-        rows.append(_crossing(speed, timestep, mode, 5 if quick else 20))
+    for timestep, speed in product(timesteps, speeds):
+        rows.append(_crossing(speed, timestep, 5 if quick else 20))
     return rows + _cost(quick)
 
 
@@ -80,11 +77,11 @@ def _times(score: Score, report: Report) -> Row:
     return {"us_per_step": time, "mj_step_us": report.step_us, "over_mj_step": score.over_mj_step}
 
 
-def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
+def _crossing(speed: float, timestep: float, offsets: int) -> Row:
     """A row on balls that fly to each impact point from evenly spaced starts."""
     starts = np.arange(offsets) / offsets * speed * timestep
     flights = [
-        _fly(speed, timestep, mode, impact, float(start))
+        _fly(speed, timestep, impact, float(start))
         for impact, start in product(IMPACT_POINTS, starts)
     ]
     generated, held, errors = (np.array(column) for column in zip(*flights, strict=True))
@@ -93,7 +90,6 @@ def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
         "study": "crossing",
         "timestep_ms": 1e3 * timestep,
         "speed": speed,
-        "mode": mode,
         "mujoco_generates": rate(int(generated.sum()), len(flights)),
         "mujoco_holds": rate(int(held.sum()), len(flights)),
         "cloth_recall": rate(int(seen.sum()), len(flights)),
@@ -101,15 +97,13 @@ def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
     }
 
 
-def _fly(
-    speed: float, timestep: float, mode: str, impact: str, offset: float
-) -> tuple[bool, bool, float]:
+def _fly(speed: float, timestep: float, impact: str, offset: float) -> tuple[bool, bool, float]:
     """Whether MuJoCo lists and holds the contact, and the error of the checker's time [s].
 
     Until the first contact the ball moves uniformly and the cloth rests. The time of impact is
     therefore their distance divided by the speed.
     """
-    scene = ball_cloth(speed=speed, offset=offset, impact=impact, mode=mode)
+    scene = ball_cloth(speed=speed, offset=offset, impact=impact)
     model, data = scene.start(timestep)
     scratch, check = mujoco.MjData(model), checker("cloth", model)
     before, ball = State.of(model, data, scratch), int(model.geom_bodyid[0])
