@@ -223,7 +223,7 @@ def test_bad_input_is_named():
         compare("moon")
     with pytest.raises(ValueError, match=r"checker 'eye': expected one of .*mujoco"):
         compare(bounce(1.0), ["eye"])
-    with pytest.raises(ValueError, match=r"options of 'rigd': the checkers are rigid"):
+    with pytest.raises(ValueError, match=r"options of 'rigd': expected one of the checkers rigid"):
         compare("arm_boxes", ["rigid"], options={"rigd": {}})
     with pytest.raises(ValueError, match=r"'rigid': .*'bad'; its options are threshold, skip, me"):
         compare("arm_boxes", ["rigid"], options={"rigid": {"bad": 1}})

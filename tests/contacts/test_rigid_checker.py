@@ -205,7 +205,7 @@ def test_what_cannot_be_handled_is_named_at_construction():
     with pytest.raises(ValueError, match=r"geom 'hills' is a hfield; this checker handles plane"):
         checker("rigid", model)
     assert len(checker("rigid", model, skip=("hfield",)).pairs) == 0
-    with pytest.raises(ValueError, match="'far': there are"):
+    with pytest.raises(ValueError, match="'far': expected one of"):
         checker("rigid", model, threshold="far", skip=("hfield",))
 
 
