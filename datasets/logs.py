@@ -88,7 +88,7 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     """The given map, the preset of the given name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
-    form = _form(path)
+    form: dict[str, Any] = _form(path)
     if columns is not None and columns != "auto":
         if columns not in PRESETS:
             raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
