@@ -201,7 +201,7 @@ def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
     asked = ["train", "--free", *logs, *flags(folder, calibrated.name), "--model", str(model)]
     line = refused_until_accepted(capsys, asked, model)
     assert "in bursts, as contacts do" in line
-    assert "say --accept alarms" in line
+    assert "add --accept alarms" in line
     for rate, refused in (("10", True), ("1000", False)):
         main([*asked, "--accept", "alarms", "--false-alarms-per-hour", rate])
         assert ("an hour where 10 are accepted" in capsys.readouterr().out) == refused
@@ -215,7 +215,7 @@ def test_a_joint_that_the_other_logs_do_not_predict_is_refused_unless_accepted(f
     asked = ["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", str(out)]
     line = fails(capsys, *asked)
     assert "predicted by the other logs, c in odd.csv " in line
-    assert "say --accept error" in line
+    assert "add --accept error" in line
     assert not out.exists()
     main([*asked, "--accept", "error"])
     assert out.exists()

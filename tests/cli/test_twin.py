@@ -155,7 +155,7 @@ def test_clipped_currents_and_gaps_are_named(folder, tmp_path, capsys):
     write(tmp_path / "gap.csv", gapped)
     with pytest.raises(SystemExit):
         run(folder, "twin", tmp_path / "gap.csv", folder / "free" / "log0.csv", *flags)
-    assert "nothing for 3.01 s before it" in capsys.readouterr().err
+    assert "no sample in the 3.01 s before it" in capsys.readouterr().err
 
 
 def test_a_load_that_was_not_told_is_named_and_left_out(folder, tmp_path, capsys):
@@ -202,7 +202,7 @@ def test_a_log_that_is_touched_all_along_is_refused_unless_accepted(folder, tmp_
     line = capsys.readouterr().err
     assert "touched.csv: " in line
     assert "in bursts, as contacts do" in line
-    assert "say --accept alarms" in line
+    assert "add --accept alarms" in line
     assert not out.exists()
     run(folder, "twin", *flags, "--accept", "alarms")
     assert out.exists()
