@@ -148,7 +148,11 @@ def initial_arm(
     """
     if is_torque(recordings[0].trace):
         if gains:
-            raise ValueError("--gains: the logs hold joint torques, which need none")
+            raise ValueError(
+                "--gains: the logs hold joint torques by their columns' names, which need none; if "
+                "they are motor currents, say so with a JSON file for --columns whose `current` "
+                "lists these columns"
+            )
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     traces = [r.trace for r in recordings]
     preset = None if gains else preset_drive(columns, traces)
