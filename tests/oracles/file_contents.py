@@ -48,10 +48,16 @@ def as_text(path: Path, found: Any, intact: Any) -> str:
 
 
 def as_lines(path: Path, found: Any, intact: Any) -> str:
-    """The numbers of the lines that end, read one by one."""
-    text = path.read_bytes()
-    lines = text.split(b"\n")[:-1]
-    wanted = [[float(cell) for cell in line.split(b",")] for line in lines]
+    """The numbers of the lines that end, read one by one; NaN where a line is no sample."""
+
+    def numbers(line: bytes) -> list[float]:
+        try:
+            row = [float(cell) for cell in line.split(b",")]
+        except ValueError:
+            row = []
+        return row if len(row) == len(intact[0]) else [float("nan")] * len(intact[0])
+
+    wanted = [numbers(line) for line in path.read_bytes().split(b"\n")[:-1]]
     return "" if repr(wanted) == repr([list(map(float, row)) for row in found]) else "other numbers"
 
 

@@ -92,8 +92,9 @@ def lines(path: Path) -> Any:
         try:
             while (sample := source.read(1.0)) is not None:
                 found.append([sample.t, *sample.q, *sample.qd, *sample.current])
-        except StreamClosed:
-            pass
+        except StreamClosed as closed:
+            if closed.lost:  # a line without an end
+                raise ValueError(str(closed)) from None
     return found
 
 
