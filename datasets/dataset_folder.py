@@ -181,6 +181,14 @@ def arm_xml(folder: Path, arm: str) -> str:
     return arm_texts(folder, arm)["arm.xml"]
 
 
+def arm_checksums(head: dict[str, Any]) -> dict[str, str]:
+    """SHA-256 of each file of ``arms``, by its name, as ``dataset.json`` states it."""
+    wanted: dict[str, str] = head.get("arms_sha256", {})
+    if head["format"] == 1:  # had no drives of arms that are not the package's own
+        wanted = {f"{name}.xml": digest for name, digest in wanted.items()}
+    return wanted
+
+
 def arm_texts(folder: Path, arm: str) -> dict[str, str]:
     """The attachments of every trace of an arm (``Scene.nominal_texts``), read from the folder.
 
@@ -188,10 +196,7 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
         ValueError: a file is missing or not the one that was written.
     """
     head = read_head(folder)
-    wanted = head.get("arms_sha256", {})
-    if head["format"] == 1:  # had no drives of arms that are not the package's own
-        wanted = {f"{name}.xml": digest for name, digest in wanted.items()}
-    found = {}
+    wanted, found = arm_checksums(head), {}
     for name, ending in _ENDINGS.items():
         path = folder / "arms" / f"{arm}{ending}"
         if path.name not in wanted and name != "arm.xml":

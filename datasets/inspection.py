@@ -15,6 +15,7 @@ from tauguard.datasets.dataset_folder import (
     CROISSANT,
     HEAD,
     SUMS,
+    arm_checksums,
     arm_texts,
     arms_of,
     changed,
@@ -175,8 +176,7 @@ def foreign(folder: Path) -> list[str]:
         for split, number in shards(configuration_in(folder))
         for path in (data_path, manifest_path)
     }
-    arms = read_head(folder).get("arms_sha256", {})
-    known |= {f"arms/{name if '.' in name else f'{name}.xml'}" for name in arms}
+    known |= {f"arms/{name}" for name in arm_checksums(read_head(folder))}
     there = (path for name in ("data", "manifest", "arms") for path in folder.glob(f"{name}/*"))
     names = (path.relative_to(folder).as_posix() for path in there if not path.name.startswith("."))
     return sorted(set(names) - known)

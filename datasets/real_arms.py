@@ -14,7 +14,7 @@ from tauguard.detectors.calibration.assessment import (
     OUTLYING,
     OUTLYING_IN_DOUBT,
     UNEXPLAINED_LADEN,
-    LeftOver,
+    Unexplained,
     explained,
     outlier,
     start_gains,
@@ -209,7 +209,7 @@ def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
 
 def calibration_notes(
     joints: Sequence[str],
-    left: Mapping[str, LeftOver],
+    left: Mapping[str, Unexplained],
     logs: Mapping[str, Recording],
     held: Sequence[Any],
 ) -> list[str]:

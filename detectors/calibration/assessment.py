@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.identification import RATE, REAL_FRICTION, identify
+from tauguard.detectors.calibration.identification import RATE, filtered_logs, identify
 from tauguard.detectors.calibration.recording import (
     Load,
     Recording,
@@ -17,7 +17,7 @@ from tauguard.detectors.calibration.recording import (
     moves,
     moving_span,
 )
-from tauguard.detectors.calibration.regression import Filtered, filtered
+from tauguard.detectors.calibration.regression import Filtered
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import intervals, low_pass
@@ -70,16 +70,16 @@ def residual_rms(arm: ArmModel, trace: Trace) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOver:
+class Unexplained:
     """What a calibration leaves of a log's torque; rows are samples."""
 
-    t: Array  #: [s], shape (T,)
+    trace: Trace
     left: Array  #: not explained [N m], shape (T, n)
     torque: Array  #: [N m], shape (T, n)
     moves: Bools  #: where a joint is fast enough to be judged, shape (T, n)
 
 
-def left_over(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, LeftOver]:
+def unexplained(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, Unexplained]:
     """What a calibration leaves of the torques of each log in which some joint moves.
 
     A load that is not known is tracked, so only what no load explains is left.
@@ -88,10 +88,10 @@ def left_over(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, L
         arm: identified.
         recordings: collision-free, by name.
     """
-    return {n: _left_over(arm, r) for n, r in recordings.items() if moves(r.trace)}
+    return {n: _unexplained(arm, r) for n, r in recordings.items() if moves(r.trace)}
 
 
-def _left_over(arm: ArmModel, recording: Recording) -> LeftOver:
+def _unexplained(arm: ArmModel, recording: Recording) -> Unexplained:
     trace = recording.trace
     arm, load = laden(arm, recording.load)
     unknowns = Unknowns.none()
@@ -101,7 +101,7 @@ def _left_over(arm: ArmModel, recording: Recording) -> LeftOver:
     estimator = Estimator(arm, RATE, trace.dt, unknowns)
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
     fast = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
-    return LeftOver(trace.t, left, trace.current * arm.drive_gain, fast)
+    return Unexplained(trace, left, trace.current * arm.drive_gain, fast)
 
 
 def _size(values: Array, rows: Bools) -> Array:
@@ -109,24 +109,24 @@ def _size(values: Array, rows: Bools) -> Array:
     return np.asarray(np.sqrt((np.where(rows, values, 0.0) ** 2).sum(axis=0)))
 
 
-def check_bursts(joints: Sequence[str], logs: Mapping[str, LeftOver]) -> None:
+def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None:
     """Refuse logs whose unexplained torque comes in bursts, as that of contacts does.
 
     Friction, loads and wrong numbers leave an error all along; contacts leave little between them.
 
     Args:
         joints: names.
-        logs: by name, under a calibration from them, see :func:`left_over`.
+        logs: by name, under a calibration from them, see :func:`unexplained`.
 
     Raises:
         ValueError: names each such log and the seconds.
     """
     found = []
     for name, log in logs.items():
-        t, left, rows = log.t, log.left, log.moves
+        t, left, rows = log.trace.t, log.left, log.moves
         whole = _size(log.torque, rows)
         fraction = _size(left, rows) / np.maximum(whole, FAINT * whole.max() + 1e-12)
-        judged = rows.sum(axis=0) * float(np.median(np.diff(t))) > ENOUGH
+        judged = rows.sum(axis=0) * log.trace.dt > ENOUGH
         burst, level = np.zeros(len(joints)), np.full(len(joints), np.inf)
         for j in np.flatnonzero(judged):
             usual, level[j] = np.quantile(np.abs(left[rows[:, j], j]), (0.5, 0.99))
@@ -149,13 +149,13 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, LeftOver]) -> None:
 
 
 def explained(
-    joints: Sequence[str], logs: Sequence[LeftOver], limit: float = UNEXPLAINED
+    joints: Sequence[str], logs: Sequence[Unexplained], limit: float = UNEXPLAINED
 ) -> tuple[str, ...]:
     """Notes on joints of whose torque in motion a calibration leaves much unexplained.
 
     Args:
         joints: names.
-        logs: what the calibration leaves of them, see :func:`left_over`.
+        logs: what the calibration leaves of them, see :func:`unexplained`.
         limit: fraction of a joint's torque that may be left.
 
     Raises:
@@ -198,11 +198,6 @@ def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float]
     k = int(np.argmax(level))
     times = float(level[k] / max(float(np.median(np.delete(level, k))), 1e-12))
     return (k, times) if times > least else None
-
-
-def filtered_logs(arm: ArmModel, recordings: Sequence[Recording]) -> list[Filtered]:
-    """What :func:`identify` takes as ``data``, for several calls with the same gains."""
-    return [filtered(r, arm.robot, arm.drive_gain, REAL_FRICTION, RATE) for r in recordings]
 
 
 def check_loads(

@@ -176,6 +176,15 @@ def identify(
         return _identify_scale(arm, recordings, scale, friction)
 
 
+def filtered_logs(
+    arm: ArmModel, recordings: Sequence[Recording], friction: FrictionModel = REAL_FRICTION
+) -> list[Filtered]:
+    """What :func:`identify` takes as ``data``, for several calls with the same gains."""
+    return [
+        filtered(r, arm.robot, arm.drive_gain, friction, RATE, BELIEFS.rest) for r in recordings
+    ]
+
+
 class Subsets:
     """Calibrations from some of the recordings, whose columns are filtered once; gains hold."""
 
@@ -183,10 +192,7 @@ class Subsets:
         """Take what is believed, with the friction to use if it has one, and all recordings."""
         self._arm, self._recordings = arm, recordings
         self._friction = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-        self._data = [
-            filtered(r, arm.robot, arm.drive_gain, self._friction, RATE, BELIEFS.rest)
-            for r in recordings
-        ]
+        self._data = filtered_logs(arm, recordings, self._friction)
 
     def __call__(self, use: Sequence[int]) -> ArmModel:
         """The arm that the recordings of these numbers show.

@@ -67,9 +67,9 @@ def command(
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown
     from tauguard.detectors.calibration.arm_file import save_arm
-    from tauguard.detectors.calibration.assessment import check_loads, filtered_logs, left_out
+    from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
-    from tauguard.detectors.calibration.identification import identify
+    from tauguard.detectors.calibration.identification import filtered_logs, identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.detectors.evaluation.acceptance import check_held_out
     from tauguard.models.robot import bodies_file

@@ -129,9 +129,9 @@ def explain(
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.real_arms import calibration_notes
-    from tauguard.detectors.calibration.assessment import check_bursts, left_over
+    from tauguard.detectors.calibration.assessment import check_bursts, unexplained
 
-    joints, left = arm.robot.joint_names, left_over(arm, recordings)
+    joints, left = arm.robot.joint_names, unexplained(arm, recordings)
     notes = calibration_notes(joints, left, recordings, held)
     print_notes(notes)
     vouched = set(accept or ())

@@ -11,9 +11,9 @@ from tauguard.detectors.calibration.assessment import (
     check_bursts,
     explained,
     left_out,
-    left_over,
     residual_rms,
     start_gains,
+    unexplained,
 )
 from tauguard.detectors.calibration.identification import identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
@@ -67,7 +67,7 @@ def test_a_log_it_has_not_seen(found):
 
 
 def looked(arm, recordings):
-    left = left_over(arm, {str(k): r for k, r in enumerate(recordings)})
+    left = unexplained(arm, {str(k): r for k, r in enumerate(recordings)})
     return explained(arm.robot.joint_names, list(left.values()))
 
 
@@ -105,7 +105,7 @@ def test_logs_that_are_touched_all_along_are_named_with_their_seconds(logs, othe
     names = ["touched", "a", "b"][: len(given)]
     arm = identify(ArmModel(nominal(), GAIN), given).arm
     with pytest.raises(ValueError, match="bursts, as contacts do, at") as caught:
-        check_bursts(arm.robot.joint_names, left_over(arm, dict(zip(names, given, strict=True))))
+        check_bursts(arm.robot.joint_names, unexplained(arm, dict(zip(names, given, strict=True))))
     line = str(caught.value)
     seconds = [float(s) for s in line.split("do, at ")[1].split(" s ")[0].split(", ")[:-1]]
     assert len(seconds) > 4
@@ -117,7 +117,7 @@ def test_logs_that_are_touched_all_along_are_named_with_their_seconds(logs, othe
 def test_free_logs_and_untold_loads_have_no_bursts(logs, found):
     given = {name: Recording(log) for name, log in zip("abc", logs, strict=True)}
     given["heavy"] = Recording(record(20, load=3.0))
-    check_bursts(found.arm.robot.joint_names, left_over(found.arm, given))
+    check_bursts(found.arm.robot.joint_names, unexplained(found.arm, given))
 
 
 def test_each_log_left_out_once(logs, found):
