@@ -1,6 +1,7 @@
-"""A robot's controller that speaks RTDE and then does as a test says."""
+"""Peers of a stream: an RTDE controller that does as a test says, and a pipe."""
 
 import contextlib
+import os
 import socket
 import struct
 import threading
@@ -64,3 +65,9 @@ class Peer:
     def __exit__(self, *_):
         self._over.set()
         self._listener.close()
+
+
+def piped():
+    """A pipe: the file to read, and the descriptor to write to."""
+    out, into = os.pipe()
+    return open(out), into

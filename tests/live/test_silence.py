@@ -16,7 +16,7 @@ from tauguard.live import LineStream, PlayedStream, Sample, StreamClosed, UrStre
 from tauguard.live.ros import RosStream
 from tauguard.live.session import listen
 from tauguard.traces import Trace
-from tests.live.peer import RATE, Peer
+from tests.live.peer import RATE, Peer, piped
 
 #: A thread of a busy machine may wait so long for its turn [s].
 BUSY = 0.25
@@ -216,11 +216,6 @@ def test_a_closed_stream_stays_closed_while_it_is_opened_again():
             stream.read(0.1)
 
 
-def piped():
-    out, into = os.pipe()
-    return open(out), into
-
-
 @pytest.mark.parametrize("drip", [False, True])
 def test_a_pipe_without_samples_is_a_fault_from_the_beginning(drip):
     text, into = piped()
@@ -389,44 +384,6 @@ def test_a_report_that_fails_during_silence_ends_the_session_with_its_error():
     text, into = piped()
     with pytest.raises(KeyError, match="told"):
         listen(LineStream(text, ("a",), RATE), AlwaysFree(), 5.0, report)
-    os.close(into)
-    text.close()
-
-
-def test_an_input_that_does_not_block_has_not_ended():
-    """As a shell leaves it that shares its terminal: a read finds nothing although it was ready."""
-    text, into = piped()
-    os.set_blocking(text.fileno(), False)
-    with LineStream(text, ("a",), RATE) as stream:
-        stream._ready = SimpleNamespace(select=lambda timeout: [1], close=lambda: None)
-        assert stream.read(0.01) is None
-        os.write(into, b"1,2,3,4\n5,6,7,8.")
-        assert stream.read(1.0).t == 1
-        os.close(into)
-        with pytest.raises(StreamClosed, match="the input has ended"):
-            stream.read(1.0)
-        assert stream.events == ["line 2 has no end and was left out"]
-    text.close()
-
-
-def test_a_line_that_is_no_sample_is_a_fault_and_ends_nothing():
-    text, into = piped()
-    os.write(into, b"1,0,0,0\n1.008,0,oops\n1.016,0,0,0\n")
-    os.close(into)
-    with LineStream(text, ("a",), RATE) as stream:
-        samples = [stream.read(1.0) for _ in range(3)]
-    assert [sample.t for sample in samples] == pytest.approx([1, np.nan, 1.016], nan_ok=True)
-    assert np.isnan(samples[1].q).all()
-    (said,) = stream.events
-    assert said.startswith("line 2: expected 4 numbers")
-    text.close()
-
-
-def test_a_first_line_that_is_no_sample_is_refused():
-    text, into = piped()
-    os.write(into, b"t,q1,qd1,i1\n")
-    with LineStream(text, ("a",), RATE) as stream, pytest.raises(ValueError, match="line 1: exp"):
-        stream.read(1.0)
     os.close(into)
     text.close()
 
