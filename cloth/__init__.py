@@ -6,15 +6,6 @@ from tauguard.cloth.impacts import METHODS, Impacts, edge_edge, point_edge, poin
 from tauguard.cloth.mesh import VOLUMES, MeshCCD
 
 __all__ = [
-    "METHODS",
-    "VOLUMES",
-    "Frame",
-    "FrameStats",
-    "Groups",
-    "Impacts",
-    "MeshCCD",
-    "edge_edge",
-    "point_edge",
-    "point_point",
-    "vertex_face",
-]
+    "METHODS", "VOLUMES", "Frame", "FrameStats", "Groups", "Impacts", "MeshCCD", "edge_edge",
+    "point_edge", "point_point", "vertex_face",
+]  # fmt: skip

@@ -23,24 +23,9 @@ if TYPE_CHECKING:
     from tauguard.datasets.recordings import simulate_all, write_dataset
 
 __all__ = [
-    "PRESETS",
-    "SPEEDS",
-    "TRAINING_PAYLOADS",
-    "ColumnMap",
-    "Configuration",
-    "DemoPlan",
-    "Log",
-    "Split",
-    "collision_plans",
-    "demo_plan",
-    "free_episodes",
-    "generate_dataset",
-    "load_configuration",
-    "read",
-    "read_log",
-    "simulate_all",
-    "struck_episodes",
-    "write_dataset",
-]
+    "PRESETS", "SPEEDS", "TRAINING_PAYLOADS", "ColumnMap", "Configuration", "DemoPlan", "Log",
+    "Split", "collision_plans", "demo_plan", "free_episodes", "generate_dataset",
+    "load_configuration", "read", "read_log", "simulate_all", "struck_episodes", "write_dataset",
+]  # fmt: skip
 
 __getattr__ = on_demand(__name__)

@@ -14,20 +14,10 @@ from tauguard.envs.episodes.simulate import Simulation, simulate
 from tauguard.envs.plant import Gains
 
 __all__ = [
-    "CollisionPlan",
-    "Episode",
-    "Gains",
-    "Motion",
-    "PayloadPick",
-    "Rollout",
-    "Simulation",
-    "SimulationDiverged",
-    "SimulationLoop",
-    "Workspace",
-    "point_to_point",
-    "random_motion",
+    "CollisionPlan", "Episode", "Gains", "Motion", "PayloadPick", "Rollout", "Simulation",
+    "SimulationDiverged", "SimulationLoop", "Workspace", "point_to_point", "random_motion",
     "simulate",
-]
+]  # fmt: skip
 
 #: Modules that are loaded at their first use.
 _MODULES = ("controllers", "policies", "wrappers")

@@ -7,13 +7,6 @@ from tauguard.envs.adapters.recording import RecordMcap
 from tauguard.envs.adapters.separation import SpeedAndSeparation
 
 __all__ = [
-    "REACTIONS",
-    "TRIGGERS",
-    "CameraObservation",
-    "CostBudget",
-    "CostStep",
-    "DetectorObservation",
-    "Reaction",
-    "RecordMcap",
-    "SpeedAndSeparation",
-]
+    "REACTIONS", "TRIGGERS", "CameraObservation", "CostBudget", "CostStep", "DetectorObservation",
+    "Reaction", "RecordMcap", "SpeedAndSeparation",
+]  # fmt: skip

@@ -6,14 +6,6 @@ from tauguard.geometry.predicates import orient2d, orient3d
 from tauguard.geometry.threads import thread_count
 
 __all__ = [
-    "Rebuilt",
-    "finite",
-    "frozen",
-    "frozen_finite",
-    "frozen_indices",
-    "indices",
-    "orient2d",
-    "orient3d",
-    "sealed",
-    "thread_count",
-]
+    "Rebuilt", "finite", "frozen", "frozen_finite", "frozen_indices", "indices", "orient2d",
+    "orient3d", "sealed", "thread_count",
+]  # fmt: skip

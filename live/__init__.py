@@ -7,11 +7,5 @@ from tauguard.live.ur import UrStream
 from tauguard.live.ur_server import UrServer
 
 __all__ = [
-    "LineStream",
-    "PlayedStream",
-    "RobotStream",
-    "Sample",
-    "StreamClosed",
-    "UrServer",
-    "UrStream",
-]
+    "LineStream", "PlayedStream", "RobotStream", "Sample", "StreamClosed", "UrServer", "UrStream",
+]  # fmt: skip

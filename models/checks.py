@@ -1,5 +1,9 @@
 """Argument checks that name what is wrong and what would work."""
 
+import dataclasses
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,6 +44,14 @@ def shaped(owner: object, shape: tuple[int, ...], meaning: str, *names: str) -> 
             raise ValueError(
                 f"{type(owner).__name__}.{name}: shape {found}, expected {shape}: {meaning}"
             )
+
+
+def check_keys(found: Iterable[str], kind: Any, where: str = "") -> None:
+    """Raise ``ValueError`` if a key is not a field of the dataclass ``kind``."""
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in found:
+        if key not in known:
+            raise ValueError(f"{where}no key {key!r}; expected some of {', '.join(known)}")
 
 
 def rigid_pose(pose: object) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.models.checks import check_keys
 from tauguard.untrusted_input import read_text, reading
 
 Numbers = tuple[float, ...]
@@ -200,9 +201,8 @@ class Robot:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Robot:
         """The robot that a TOML table describes."""
-        known = [field.name for field in fields(cls)]
         parts = dict(values)
-        _check_keys(parts, known, "robot")
+        check_keys(parts, cls, "robot: ")
         drive = parts.pop("drive", {})
         if not isinstance(drive, RobotDrive):
             drive = _drive(drive)
@@ -212,7 +212,7 @@ class Robot:
 def _drive(values: Mapping[str, Any]) -> RobotDrive:
     """The drive that the TOML table ``drive`` describes."""
     parts = dict(values)
-    _check_keys(parts, [field.name for field in fields(RobotDrive)], "drive")
+    check_keys(parts, RobotDrive, "drive: ")
     if "ripple" in parts:
         parts["ripple"] = _part(RobotRipple, parts["ripple"], "drive.ripple")
     if "sensors" in parts:
@@ -222,7 +222,7 @@ def _drive(values: Mapping[str, Any]) -> RobotDrive:
 
 
 def _part(kind: type, values: Mapping[str, Any], where: str) -> Any:
-    _check_keys(values, [field.name for field in fields(kind)], where)
+    check_keys(values, kind, f"{where}: ")
     try:
         return kind(**values)
     except TypeError as error:
@@ -246,12 +246,6 @@ def bodies_file(path: Path) -> Path:
     if not bodies.is_file():
         raise ValueError(f"{path}: file {str(bodies)!r}: no such file")
     return bodies
-
-
-def _check_keys(found: Mapping[str, Any], known: list[str], where: str) -> None:
-    for key in found:
-        if key not in known:
-            raise ValueError(f"{where}: no key {key!r}; expected some of {', '.join(known)}")
 
 
 def _numbers(value: Any, name: str) -> float | Numbers:

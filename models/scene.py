@@ -321,11 +321,6 @@ def _add_label(
     sensor.intprm = [sum(1 << int(field) for field in fields), netforce, 1]
 
 
-def with_drive(scene: Scene, drive: Drive) -> Scene:
-    """A copy of the scene with other drives."""
-    return replace(scene, drive=drive)
-
-
 def without_losses(scene: Scene) -> Scene:
     """The scene with ideal drives: no friction (also not the file's), ripple, lag or noise.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array, in_a_line
-from tauguard.models.checks import above_zero, not_negative, vector
+from tauguard.models.checks import above_zero, check_keys, not_negative, vector
 from tauguard.models.mjcf import inline_meshes, xml_text
 from tauguard.untrusted_input import read_text, reading
 
@@ -204,22 +204,15 @@ def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
 
 def _from_mapping(row: Mapping[str, Any], folder: Path) -> SceneObject:
     values = dict(row)
-    _check_keys(values, SceneObject)
+    check_keys(values, SceneObject)
     shapes = []
     for part in values.pop("shapes", ()):
-        _check_keys(part, Shape)
+        check_keys(part, Shape)
         beside = folder / part["file"] if "file" in part else None
         shapes.append(Shape(**part | ({"file": str(beside)} if beside else {})))
     if "mjcf" in values and (folder / values["mjcf"]).is_file():
         values["mjcf"] = str(folder / values["mjcf"])
     return SceneObject(shapes=tuple(shapes), **values)
-
-
-def _check_keys(found: Mapping[str, Any], kind: type[SceneObject] | type[Shape]) -> None:
-    known = [field.name for field in fields(kind)]
-    for key in found:
-        if key not in known:
-            raise ValueError(f"no key {key!r}; expected some of {', '.join(known)}")
 
 
 def hold(

@@ -7,15 +7,6 @@ from tauguard.report.rates import poisson_rate, rate
 from tauguard.report.table import WIDTH, Row, cell, table
 
 __all__ = [
-    "WIDTH",
-    "Row",
-    "cell",
-    "machine",
-    "measured",
-    "poisson_rate",
-    "rate",
-    "table",
-    "two_digits",
-    "versions",
-    "write_json",
-]
+    "WIDTH", "Row", "cell", "machine", "measured", "poisson_rate", "rate", "table", "two_digits",
+    "versions", "write_json",
+]  # fmt: skip

@@ -18,27 +18,8 @@ from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetra
 from tauguard.rigid.solids_and_meshes import distance, overlap
 
 __all__ = [
-    "Boxes",
-    "Capsules",
-    "Distances",
-    "Hulls",
-    "Impacts",
-    "MeshContacts",
-    "MeshDistances",
-    "MeshImpacts",
-    "MeshOverlap",
-    "MeshTree",
-    "Motion",
-    "Overlap",
-    "Parallelepipeds",
-    "PlaneCache",
-    "Polygons",
-    "Rounded",
-    "Spheres",
-    "Tetrahedra",
-    "Witness",
-    "distance",
-    "overlap",
-    "sweep",
+    "Boxes", "Capsules", "Distances", "Hulls", "Impacts", "MeshContacts", "MeshDistances",
+    "MeshImpacts", "MeshOverlap", "MeshTree", "Motion", "Overlap", "Parallelepipeds", "PlaneCache",
+    "Polygons", "Rounded", "Spheres", "Tetrahedra", "Witness", "distance", "overlap", "sweep",
     "time_of_impact",
-]
+]  # fmt: skip

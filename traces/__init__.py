@@ -12,19 +12,8 @@ if TYPE_CHECKING:
     from tauguard.traces.trace import KINDS, TARGETS, Alarm, Collision, Detection, Trace, Truth
 
 __all__ = [
-    "KINDS",
-    "STRATA",
-    "TARGETS",
-    "Alarm",
-    "CheckedContacts",
-    "Collision",
-    "Detection",
-    "Trace",
-    "Truth",
-    "read_mcap",
-    "resampled",
-    "stratum",
-    "write_mcap",
-]
+    "KINDS", "STRATA", "TARGETS", "Alarm", "CheckedContacts", "Collision", "Detection", "Trace",
+    "Truth", "read_mcap", "resampled", "stratum", "write_mcap",
+]  # fmt: skip
 
 __getattr__ = on_demand(__name__)

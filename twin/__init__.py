@@ -5,11 +5,5 @@ from tauguard.twin.judge import Likeness, compare, with_alarms
 from tauguard.twin.play import played
 
 __all__ = [
-    "Likeness",
-    "Twin",
-    "compare",
-    "identify_twin",
-    "played",
-    "with_alarms",
-    "with_intervals",
-]
+    "Likeness", "Twin", "compare", "identify_twin", "played", "with_alarms", "with_intervals",
+]  # fmt: skip

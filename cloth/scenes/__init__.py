@@ -1,6 +1,6 @@
-"""Deforming meshes for tests and timings: generators of any size, and a loader of recordings.
+"""Deforming meshes for tests and timings, generated in any size.
 
-The generated motions are prescribed by smooth formulas of time, not simulated. Their
+The motions are prescribed by smooth formulas of time, not simulated. Their
 surfaces fold, touch and pass through themselves, so that queries find collisions. Each
 builder takes the number of triangles to aim for and a seed; the same arguments give the same
 bytes.
@@ -13,7 +13,6 @@ from tauguard.cloth.scenes.crumple import crumpling
 from tauguard.cloth.scenes.cubes import cubes_on_cloth, packed_cubes
 from tauguard.cloth.scenes.mats import twisting_mats
 from tauguard.cloth.scenes.pleats import pleats
-from tauguard.cloth.scenes.recorded import MeshSequence, load_sequence
 from tauguard.cloth.scenes.rod import twisting_rod
 from tauguard.cloth.scenes.rollers import rollers
 from tauguard.cloth.scenes.scene import Scene
@@ -32,4 +31,4 @@ SCENES: dict[str, Callable[[int, int], Scene]] = {
     "twisting_rod": twisting_rod,
 }
 
-__all__ = ["SCENES", "MeshSequence", "Scene", "load_sequence"]
+__all__ = ["SCENES", "Scene"]

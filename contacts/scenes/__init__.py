@@ -24,15 +24,6 @@ SCENES: dict[str, Callable[..., ContactScene]] = {
 }
 
 __all__ = [
-    "SCENES",
-    "ContactScene",
-    "Control",
-    "arm_boxes",
-    "arm_cloth",
-    "ball_cloth",
-    "bunny_table",
-    "garment_chest",
-    "sleeve_arm",
-    "sphere_plate",
-    "two_arms",
-]
+    "SCENES", "ContactScene", "Control", "arm_boxes", "arm_cloth", "ball_cloth", "bunny_table",
+    "garment_chest", "sleeve_arm", "sphere_plate", "two_arms",
+]  # fmt: skip

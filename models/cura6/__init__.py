@@ -14,16 +14,9 @@ from tauguard.models.cura6.design import (
 from tauguard.models.cura6.sizes import SIZES, flange, links
 
 __all__ = [
-    "FLANGE",
-    "HOME",
-    "JOINTS",
-    "MAX_ACCELERATION",
-    "MAX_SPEED",
-    "NAMES",
-    "SIZES",
-    "arm_xml",
+    "FLANGE", "HOME", "JOINTS", "MAX_ACCELERATION", "MAX_SPEED", "NAMES", "SIZES", "arm_xml",
     "max_speed",
-]
+]  # fmt: skip
 
 #: The arm and its other sizes, by name.
 NAMES = ("cura6", *SIZES)

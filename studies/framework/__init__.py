@@ -14,17 +14,6 @@ from studies.framework.rows import (
 from studies.framework.study import Part, Study
 
 __all__ = [
-    "Each",
-    "Incomplete",
-    "JobCache",
-    "Part",
-    "Point",
-    "Study",
-    "Workers",
-    "answer",
-    "groups",
-    "number",
-    "table_rows",
-    "time_in_turn",
-    "timed",
-]
+    "Each", "Incomplete", "JobCache", "Part", "Point", "Study", "Workers", "answer", "groups",
+    "number", "table_rows", "time_in_turn", "timed",
+]  # fmt: skip

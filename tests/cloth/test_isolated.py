@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from oracles.point_contact import point_edge_time, point_point_time
 from tauguard.cloth import Groups, MeshCCD, edge_edge, point_edge, point_point, vertex_face
 from tauguard.cloth.comparators import ComparedMeshCCD
-from tauguard.cloth.scenes.recorded import read_mesh
 
 KINDS = {"pe": (point_edge, 3, point_edge_time), "pp": (point_point, 2, point_point_time)}
 
@@ -225,14 +224,6 @@ def test_a_safe_step_meets_nothing_and_is_not_timid(numbers, fraction):
 def test_a_fraction_outside_0_1_is_refused(fraction):
     with pytest.raises(ValueError, match="fraction: "):
         MeshCCD([[0, 1, 2]]).safe_step(np.zeros((3, 3)), np.zeros((3, 3)), fraction=fraction)
-
-
-def test_an_obj_with_vertices_of_no_face_is_named(tmp_path):
-    file = tmp_path / "isolated.obj"
-    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\n")
-    with pytest.warns(UserWarning, match="1 of 4 vertices belong to no face"):
-        vertices, _ = read_mesh(file)
-    assert len(vertices) == 4
 
 
 def test_comparators_have_no_queries_of_points():

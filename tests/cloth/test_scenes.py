@@ -1,11 +1,11 @@
-"""Generated and recorded motions: sizes, determinism, coherence, file formats and their order."""
+"""Generated motions: sizes, determinism, coherence."""
 
 import numpy as np
 import pytest
 
 from tauguard.cloth import MeshCCD
 from tauguard.cloth.comparators import ComparedMeshCCD
-from tauguard.cloth.scenes import SCENES, load_sequence
+from tauguard.cloth.scenes import SCENES
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -49,83 +49,6 @@ class TestGenerated:
         last = sum(map(len, ccd.candidates(*steps[-1])))
         assert last > 2_000
         assert last > 2 * first
-
-
-def write_ply(path, x, faces, big_endian):
-    order = ">" if big_endian else "<"
-    head = (
-        f"ply\nformat binary_{'big' if big_endian else 'little'}_endian 1.0\n"
-        f"element vertex {len(x)}\nproperty float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    rows = np.empty(len(faces), dtype=[("n", "u1"), ("v", order + "i4", 3)])
-    rows["n"], rows["v"] = 3, faces
-    path.write_bytes(head.encode() + x.astype(order + "f4").tobytes() + rows.tobytes())
-
-
-def write_obj(path, x, faces):
-    lines = [f"v {a!r} {b!r} {c!r}" for a, b, c in x.tolist()]
-    lines += ["f " + " ".join(f"{v + 1}//1" for v in face) for face in faces.tolist()]
-    path.write_text("vn 0 0 1\n" + "\n".join(lines) + "\n")
-
-
-class TestRecorded:
-    faces = np.array([[0, 1, 2], [2, 1, 3]])
-
-    def frame(self, i):
-        # Vertices 0 and 4 coincide and 4 has no face: neither may be merged or dropped.
-        x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 0]]) + 0.125 * i
-        return x.astype(float)
-
-    @pytest.mark.parametrize("kind", ["big", "little", "obj"])
-    def test_frames_in_order_of_their_number(self, tmp_path, kind):
-        for i in (9, 10, 11, 100):
-            path = tmp_path / f"cloth_{i}.{'obj' if kind == 'obj' else 'ply'}"
-            if kind == "obj":
-                write_obj(path, self.frame(i), self.faces)
-            else:
-                write_ply(path, self.frame(i), self.faces, kind == "big")
-        sequence = load_sequence(tmp_path)
-        assert len(sequence) == 4
-        assert np.array_equal(sequence.faces, self.faces)
-        for frame, i in enumerate((9, 10, 11, 100)):
-            assert np.array_equal(sequence.positions(frame), self.frame(i))
-        for (start, end), (i, j) in zip(
-            sequence.steps(), ((9, 10), (10, 11), (11, 100)), strict=True
-        ):
-            assert np.array_equal(start, self.frame(i))
-            assert np.array_equal(end, self.frame(j))
-
-    def test_faces_that_change_are_named(self, tmp_path):
-        write_obj(tmp_path / "a1.obj", self.frame(1), self.faces)
-        write_obj(tmp_path / "a2.obj", self.frame(2), self.faces[::-1])
-        with pytest.raises(ValueError, match=r"a2\.obj: its faces differ from .*a1\.obj"):
-            list(load_sequence(tmp_path).steps())
-
-    def test_frames_that_differ_in_size_are_named(self, tmp_path):
-        write_obj(tmp_path / "a1.obj", self.frame(1), self.faces)
-        write_obj(tmp_path / "a2.obj", self.frame(2)[:4], self.faces)
-        with pytest.raises(ValueError, match=r"a2\.obj: 4 vertices, .*a1\.obj has 5"):
-            list(load_sequence(tmp_path).steps())
-
-    def test_nothing_to_read(self, tmp_path):
-        with pytest.raises(ValueError, match=r"no \.ply or \.obj file matches 'x\*'"):
-            load_sequence(tmp_path, "x*")
-        (tmp_path / "x1.ply").write_bytes(b"ply\nnonsense")
-        with pytest.raises(ValueError, match=r"x1\.ply: "):
-            load_sequence(tmp_path, "x*")
-
-
-@pytest.mark.data
-@pytest.mark.parametrize(
-    ("name", "pattern"), [("cloth-ball", "cloth_ball*"), ("cloth-funnel", "*")]
-)
-def test_real_recordings(data_dir, name, pattern):
-    sequence = load_sequence(data_dir / "ccd" / name / "frames", pattern)
-    sizes = {"cloth-ball": (46_598, 92_230), "cloth-funnel": (9_450, 18_484)}
-    ((x_t0, x_t1),) = sequence.steps()
-    assert (len(x_t0), len(sequence.faces)) == sizes[name]
-    assert len(x_t1) == len(x_t0)
 
 
 def test_faces_that_slide_on_each_other_are_all_found():

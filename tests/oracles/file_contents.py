@@ -6,7 +6,6 @@ A judge takes the path, the answer, and the answer of the intact file; it return
 
 from __future__ import annotations
 
-import io
 import json
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -122,28 +121,6 @@ def as_xml(path: Path, found: Any, intact: Any) -> str:
         return f"{joints} joints, the text has {len(moving)}"
     wrong = np.isfinite(masses).all() and abs(mass - sum(masses)) > 1e-9 * max(1.0, abs(mass))
     return f"a mass of {mass}, the text's is {sum(masses)}" if wrong or not mass >= 0 else ""
-
-
-def as_obj(path: Path, found: Any, intact: Any) -> str:
-    """The vertices and faces of the text."""
-    rows = [line.split() for line in path.read_bytes().splitlines()]
-    points = [[float(x) for x in row[1:4]] for row in rows if row[:1] == [b"v"]]
-    corners = [[int(x.split(b"/")[0]) - 1 for x in row[1:]] for row in rows if row[:1] == [b"f"]]
-    faces = [[f[0], f[k], f[k + 1]] for f in corners for k in range(1, len(f) - 1)]
-    same = np.array_equal(found[0], np.array(points)) and np.array_equal(found[1], np.array(faces))
-    return "" if same else "another mesh than the text's"
-
-
-def as_ply(path: Path, found: Any, intact: Any) -> str:
-    """The vertices and faces of the text."""
-    head, _, body = path.read_bytes().partition(b"end_header\n")
-    counts = [int(line.split()[2]) for line in head.splitlines() if line[:8] == b"element "]
-    rows = [line.split() for line in io.BytesIO(body)]
-    points = np.array([[float(x) for x in row] for row in rows[: counts[0]]])
-    corners = [[int(x) for x in row[1:]] for row in rows[counts[0] : sum(counts)]]
-    faces = np.array([[f[0], f[k], f[k + 1]] for f in corners for k in range(1, len(f) - 1)])
-    same = np.array_equal(found[0], points) and np.array_equal(found[1], faces)
-    return "" if same else "another mesh than the text's"
 
 
 def as_rtde(path: Path, found: Any, intact: Any) -> str:

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from oracles.all_pairs import edges_of
-from tauguard.cloth.scenes import load_sequence
 
 #: By recorded frame: pattern of its two files, and the number of its lists.
 FRAMES = {"cloth-funnel": ("*", "227"), "cloth-ball": ("cloth_ball*", "92")}
@@ -52,9 +52,13 @@ def load_frame(data: Path, name: str) -> RecordedFrame:
     """The frame ``name`` of :data:`FRAMES` in the folder ``data``."""
     folder = data / "ccd" / name
     pattern, number = FRAMES[name]
-    sequence = load_sequence(folder / "frames", pattern)
-    ((x_t0, x_t1),) = sequence.steps()
-    edges = edges_of(sequence.faces)
+    files = sorted((folder / "frames").glob(f"{pattern}.ply"))
+    # Without processing trimesh keeps the file's vertices and their order.
+    first, last = (trimesh.load_mesh(file, process=False) for file in files)
+    assert np.array_equal(first.faces, last.faces)
+    faces = np.asarray(first.faces, dtype=np.int32)
+    x_t0, x_t1 = (np.array(mesh.vertices, dtype=np.float64) for mesh in (first, last))
+    edges = edges_of(faces)
     # Boxes are numbered vertices first, then edges ordered by (larger, smaller) vertex, then faces.
     theirs = np.lexsort((edges[:, 0], edges[:, 1]))
 
@@ -67,7 +71,7 @@ def load_frame(data: Path, name: str) -> RecordedFrame:
     vf = np.sort(listed("vf"), axis=1) - np.array([0, len(x_t0) + len(edges)], dtype=np.int64)
     ee = np.sort(theirs[listed("ee") - len(x_t0)], axis=1).astype(np.int64)
     order = [np.argsort(keys(pairs), kind="stable") for pairs in (vf, ee)]
-    return RecordedFrame(sequence.faces, edges, x_t0, x_t1, (vf[order[0]], ee[order[1]]))
+    return RecordedFrame(faces, edges, x_t0, x_t1, (vf[order[0]], ee[order[1]]))
 
 
 def load_queries(folder: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -38,8 +38,6 @@ FORMATS: dict[str, Format] = {
     "head": Format("json", readers.dataset, judges.unchanged, "the intact dataset"),
     "dataset's arm": Format("xml", readers.dataset, judges.unchanged, "the intact dataset"),
     "rtde": Format("rtde", readers.rtde, judges.as_rtde, "a second parser of the bytes"),
-    "obj": Format("obj", readers.mesh, judges.as_obj, "a second parser of the text"),
-    "ply": Format("ply", readers.mesh, judges.as_ply, "a second parser of the text"),
 }
 
 

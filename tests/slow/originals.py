@@ -129,24 +129,6 @@ def _write_part(kind: str, path: Path) -> None:
     shutil.copy(made / PLACES[kind], path)
 
 
-def _write_mesh(path: Path) -> None:
-    from tauguard.cloth.scenes import SCENES
-
-    scene = SCENES["pleats"](60, 0)
-    (x, _), *_ = scene.steps(1)
-    points = [" ".join(repr(float(v)) for v in row) for row in x]
-    if path.suffix == ".obj":
-        lines = [f"v {p}" for p in points] + [
-            f"f {a + 1} {b + 1} {c + 1}" for a, b, c in scene.faces
-        ]
-    else:
-        properties = [f"property double {axis}" for axis in "xyz"]
-        lines = ["ply", "format ascii 1.0", f"element vertex {len(x)}", *properties]
-        lines += [f"element face {len(scene.faces)}", "property list uchar int vertex_indices"]
-        lines += ["end_header", *points, *(f"3 {a} {b} {c}" for a, b, c in scene.faces)]
-    path.write_text("\n".join(lines) + "\n")
-
-
 def _write_rtde(path: Path) -> None:
     """What a controller sends: the answers of the handshake, a text message, then data."""
     from tauguard.live import rtde
@@ -177,6 +159,4 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "model": _write_model,
     **{kind: partial(_write_part, kind) for kind in PLACES},
     "rtde": _write_rtde,
-    "obj": _write_mesh,
-    "ply": _write_mesh,
 }

@@ -75,13 +75,6 @@ def model(path: Path) -> Any:
     return load_model(path)
 
 
-def mesh(path: Path) -> Any:
-    """Vertices and faces."""
-    from tauguard.cloth.scenes.recorded import read_mesh
-
-    return read_mesh(path)
-
-
 def lines(path: Path) -> Any:
     """Samples of the standard input."""
     from tauguard.live.lines import LineStream
