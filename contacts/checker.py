@@ -274,9 +274,9 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
     """The checker ``name`` for ``model``.
 
     Raises:
-        ValueError: no such checker or option (the message lists those there are), a geom in the
-            model that this checker cannot handle, or a checker without ``name``, ``covers`` or
-            ``check``, or whose ``covers`` are no pairs of kinds.
+        ValueError: no such checker or option (the message lists those there are), or a geom in the
+            model that this checker cannot handle. Also a checker that lacks ``name``, ``covers`` or
+            ``check``, or whose ``covers`` has something else than pairs of kinds.
     """
     if name not in _FACTORIES:
         raise ValueError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")

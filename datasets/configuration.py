@@ -206,7 +206,7 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
 
 TABLES = ("mismatch", "episodes", "splits")
-#: Total time before the first slot of a collision and after the last one [s].
+#: Time before the first slot of a collision plus time after the last one [s].
 MARGIN = 3.5
 
 

@@ -39,6 +39,13 @@ ACHIEVED = ("kind", "link", "severity")
 SLACK, SLACK_COUNT = 0.25, 10
 
 
+#: Fields of :class:`SplitSummary` that a report shows.
+SHOWN = (
+    "episodes", "hours", "rows", "megabytes", "planned_collisions", "collisions", "outcomes",
+    "planned", "achieved",
+)  # fmt: skip
+
+
 @dataclass
 class SplitSummary:
     """Counts of one split."""
@@ -170,7 +177,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def foreign(folder: Path) -> list[str]:
-    """What lies among shards and arms and is neither: who reads all of ``data`` reads it too."""
+    """Foreign files among shards and arms; who reads all of ``data`` would read them, too."""
     known = {
         path(split, number)
         for split, number in shards(configuration_in(folder))
@@ -203,12 +210,6 @@ def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
     return lines
 
 
-def class_order(value: str) -> tuple[float, str]:
-    """Sort key: numbers and ranges by size, words by alphabet."""
-    head = value.split("-")[0]
-    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
-
-
 def report(folder: Path) -> dict[str, Any]:
     """All results that `tauguard inspect` shows, as plain values."""
     head = read_head(folder)
@@ -226,15 +227,7 @@ def report(folder: Path) -> dict[str, Any]:
         "leaks": leaks(configuration, found),
         "splits": {
             name: {
-                "episodes": one.episodes,
-                "hours": one.hours,
-                "rows": one.rows,
-                "megabytes": one.megabytes,
-                "planned_collisions": one.planned_collisions,
-                "collisions": one.collisions,
-                "outcomes": dict(one.outcomes),
-                "planned": {k: dict(v) for k, v in one.planned.items()},
-                "achieved": {k: dict(v) for k, v in one.achieved.items()},
+                **{key: value for key, value in vars(one).items() if key in SHOWN},
                 "off_balance": [] if absent else off_balance(head["planned"][name], one),
             }
             for name, one in found.items()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.atomic_write import atomic_file
-from tauguard.datasets.inspection import class_order
+from tauguard.datasets.schedule import class_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,8 +1,8 @@
 """The episodes of a configuration, each a pure function of the configuration and its number.
 
-Each property (arm, individual, speed, payload, with or without collisions; kind, link and
-severity of a collision) is dealt from a separate deck, which is shuffled every round. So any
-part of a split is balanced to within one round, and no two properties are correlated.
+Each property of an episode (arm, individual, speed, payload, collisions or none) and of a
+collision (kind, link, severity) is dealt from its own deck of cards, which is shuffled in every
+round. So any part of a split is balanced to within one round, and properties are not correlated.
 """
 
 import hashlib
@@ -93,7 +93,7 @@ def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
 
 
 def dealt(values: Sequence[T], seed: list[int], number: int) -> T:
-    """The ``number``-th card of a deck of ``values`` that is shuffled anew every round."""
+    """Card ``number`` of a deck of ``values`` that is shuffled anew in every round."""
     round_, place = divmod(number, len(values))
     order = np.random.default_rng([*seed, round_]).permutation(len(values))
     return values[int(order[place])]
@@ -155,7 +155,10 @@ def _stated(configuration: Configuration, split: Split) -> Balance:
         ("severity", levels, 9),
     ):
         found[name] = _dealt_counts(values, [*seed, card], struck * split.collisions)
-    return {name: dict(sorted(c.items(), key=_order)) for name, c in found.items()}
+    return {
+        name: {value: counts[value] for value in sorted(counts, key=class_order)}
+        for name, counts in found.items()
+    }
 
 
 def _dealt_counts(values: Sequence[T], seed: list[int], count: int) -> Counter[T]:
@@ -172,8 +175,7 @@ def _level(low: float, high: float) -> str:
     return stratum(math.sqrt(low * high))
 
 
-def _order(item: tuple[str, int]) -> tuple[float, str]:
-    try:
-        return float(item[0].split("-")[0]), item[0]
-    except ValueError:
-        return 0.0, item[0]
+def class_order(value: str) -> tuple[float, str]:
+    """Sort key: numbers and ranges by size, words by alphabet."""
+    head = value.split("-")[0]
+    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)

@@ -9,7 +9,7 @@ from tauguard.models import Friction
 
 __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "friction_torque"]
 
-#: The Coulomb part rises over this speed [rad/s].
+#: Speed over which the Coulomb part rises [rad/s].
 SMOOTHING = 0.02
 #: A direction whose mobility is below this fraction of the largest one is nearly singular. In such
 #: a direction the tool's stiffness is reduced, so that torques stay bounded. Other directions are
@@ -115,7 +115,7 @@ class OperationalSpace:
     """tau = J^T L (K e + D (v_des - v) + I sum e) + h + N^T (Kn (q_rest - q) - Dn qd).
 
     L = (J M^-1 J^T)^-1. The tool's error e decays as if every direction had the same unit mass
-    (Khatib 1987); In the null space, which does not move the tool, the arm is held near a rest
+    (Khatib 1987). In the null space, which does not move the tool, the arm is held near a rest
     pose. The integral overcomes static friction.
     """
 

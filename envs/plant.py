@@ -24,8 +24,8 @@ class Gains:
     def for_scene(cls, scene: Scene) -> Gains:
         """Critically damped gains for the largest inertia that each joint has over its range.
 
-        The natural frequency is the arm's ``bandwidth``; one that nobody stated is lowered where
-        the time step asks for it. (The CURA6-like arm's gains are those of its home pose.)
+        The natural frequency is the arm's ``bandwidth``; a default one is lowered if the time
+        step is too long for it. (The CURA6-like arm's gains are those of its home pose.)
 
         Raises:
             ValueError: the time step is too long for the stated bandwidth; the message names the
@@ -51,7 +51,7 @@ class Gains:
 
 
 def _home_inertia(scene: Scene) -> Array:
-    """Of each joint in the model's first keyframe [kg m^2], shape (n,)."""
+    """Inertia of each joint in the model's first keyframe [kg m^2], shape (n,)."""
     data = mujoco.MjData(scene.model)
     if scene.model.nkey:
         mujoco.mj_resetDataKeyframe(scene.model, data, 0)

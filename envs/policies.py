@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.untrusted_input import reading
 
-#: Observations are normalised and cut to this many standard deviations, as VecNormalize does.
+#: Observations are normalised and clipped to this many standard deviations, as VecNormalize does.
 CLIP = 10.0
-#: A policy's statistics of observations count as this many when learning goes on.
+#: Number of observations that a loaded policy's statistics stand for when training continues.
 SEEN = 1e5
 
 
@@ -56,7 +56,7 @@ class MlpPolicy:
         return np.clip(x, -1.0, 1.0)
 
     def __repr__(self) -> str:
-        """Its sizes."""
+        """The sizes of its layers."""
         sizes = [len(self.mean), *(len(bias) for bias in self.biases)]
         return f"MlpPolicy({' -> '.join(map(str, sizes))})"
 

@@ -286,7 +286,7 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
 
 
 class _Said:
-    """Reads the user's description, and notes the source of each part."""
+    """Reads the user's description and records the source of each number."""
 
     def __init__(self, robot: Robot, sources: dict[str, str], joints: int) -> None:
         self.robot, self.joints, self.sources = robot, joints, dict(sources)

@@ -60,12 +60,14 @@ def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str])
 
 
 def friction_rows(friction: dict[str, Any]) -> dict[str, Any]:
-    """Keywords of :class:`RobotDrive` whose friction is nearest to an identified one.
+    """Keywords of :class:`RobotDrive` that approximate an identified friction model.
+
+    The identified model may have negative weights, and the simulated law may not. Sliding friction
+    is therefore fitted at :data:`SPEEDS` by non-negative least squares. Ripple, and offsets that
+    differ by direction, are left out.
 
     Args:
-        friction: the fields of :class:`tauguard.detectors.FrictionModel`. Its weights have either
-            sign; the simulated law has levels of 0 or more, so sliding friction is fitted at
-            :data:`SPEEDS`. Offsets of one direction and ripple are left out.
+        friction: the fields of :class:`tauguard.detectors.FrictionModel`.
     """
     from scipy.optimize import nnls
 

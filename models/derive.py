@@ -20,7 +20,8 @@ HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
 #: Panda, xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1. A ratio outside this
 #: range is reported.
 PLAUSIBLE = (1.0, 8.0)
-#: If the largest gravity torque over the arm's weight is below this [m], gravity turns no hinge.
+#: Least lever of gravity [m]: largest gravity torque over the arm's weight. Below it gravity loads
+#: no hinge.
 SHORTEST_LEVER = 0.02
 #: Joint speed of an arm whose file states none [rad/s], and acceleration of every such arm.
 DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
@@ -81,7 +82,7 @@ def inertia_matrices(model: mujoco.MjModel, joints: tuple[str, ...], poses: Arra
 
 
 def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    """Largest torque that gravity needs over the random poses [N m], shape (n,)."""
+    """Largest gravity torque of each joint over the random poses [N m], shape (n,)."""
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]
     data, most, torque = mujoco.MjData(model), np.zeros(len(at)), np.zeros(model.nv)

@@ -91,8 +91,8 @@ class RobotDrive:
     ripple: RobotRipple | None = None
     sensors: RobotSensors | None = None
     like: str | None = None
-    """``"cura6"``: all joints get that arm's ripple, lag and sensor noise. Joints whose friction
-    neither this nor the file states also get its losses (:mod:`tauguard.models.arm_drive`)."""
+    """``"cura6"``: all joints get that arm's ripple, lag and sensor noise. A joint whose friction
+    is stated nowhere also gets that arm's friction (:mod:`tauguard.models.arm_drive`)."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""

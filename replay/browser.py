@@ -25,8 +25,8 @@ from urllib.parse import quote, unquote
 HOST, PATIENCE = "127.0.0.1", 20.0
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
-#: Content policy: a page runs no script, which could lead to another host with what it has read,
-#: and loads from and sends to no other host. Our own script runs only in pages opened as files.
+#: Content policy: a page runs no script, and neither loads from nor sends to another host. A script
+#: could carry what it has read to another host. Our own script runs only in pages opened as files.
 POLICY = (
     "default-src 'self' data:; script-src 'none'; style-src 'unsafe-inline'; form-action 'none'; "
     "base-uri 'none'"

@@ -66,7 +66,7 @@ class SpareMemory {
   std::vector<Block> blocks_;
 };
 
-// An array of numbers in such memory, which its last owner gives back.
+// An array of numbers in such memory. Its last owner returns the memory for reuse.
 template <class T>
 class SpareArray {
  public:

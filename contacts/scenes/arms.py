@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from tauguard.contacts.scenes.drives import follow, sway
+from tauguard.contacts.scenes.drives import driven, sway
 from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import SceneSpec, Table, compose, load_arm
 from tauguard.models.scene import INTEGRATORS
@@ -72,14 +72,7 @@ def _swinging(
 ) -> ContactScene:
     """The scene ``spec`` in which every arm sways its first three joints about its home pose."""
     spec.option.integrator = INTEGRATORS["implicitfast"]
-    model = spec.compile()
     arm = load_arm("cura6")
-    qpos, qvel, arms = model.qpos0.copy(), np.zeros(model.nv), []
-    for prefix in prefixes:
-        joints = [model.joint(prefix + joint) for joint in arm.joints]
-        places = np.array([joint.qposadr[0] for joint in joints])
-        dofs = np.array([joint.dofadr[0] for joint in joints])
-        reference = sway(arm.home, np.arange(3), np.array(amplitude), period)
-        qpos[places], qvel[dofs] = reference(0.0)
-        arms.append((places, dofs, reference))
-    return ContactScene(name, model, qpos, qvel, 2 * period, follow(model, qpos, arms))
+    reference = sway(arm.home, np.arange(3), np.array(amplitude), period)
+    arms = [(tuple(prefix + joint for joint in arm.joints), reference) for prefix in prefixes]
+    return driven(name, spec.compile(), 2 * period, arms)

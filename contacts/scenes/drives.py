@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.contacts.scenes.scene import Control
+from tauguard.contacts.scenes.scene import ContactScene, Control
 
 #: Reference positions and velocities at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
 Reference = Callable[[float], tuple[Array, Array]]
@@ -40,6 +40,23 @@ def sway(home: Array, joints: NDArray[Any], amplitude: Array, period: float) -> 
         return q, qd
 
     return reference
+
+
+def driven(
+    name: str,
+    model: mujoco.MjModel,
+    seconds: float,
+    moves: list[tuple[tuple[str, ...], Reference]],
+) -> ContactScene:
+    """The contact scene of ``model`` in which the named joints of each arm follow a reference."""
+    qpos, qvel, arms = model.qpos0.copy(), np.zeros(model.nv), []
+    for names, reference in moves:
+        joints = [model.joint(joint) for joint in names]
+        places = np.array([joint.qposadr[0] for joint in joints])
+        dofs = np.array([joint.dofadr[0] for joint in joints])
+        qpos[places], qvel[dofs] = reference(0.0)
+        arms.append((places, dofs, reference))
+    return ContactScene(name, model, qpos, qvel, seconds, follow(model, qpos, arms))
 
 
 def follow(

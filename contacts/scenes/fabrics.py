@@ -5,9 +5,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.contacts.scenes.drives import Reference, follow, sway, turn
+from tauguard.contacts.scenes.drives import driven, sway, turn
 from tauguard.contacts.scenes.scene import ContactScene
-from tauguard.models import BodyProxy, Cloth, Scene, SceneSpec, compose
+from tauguard.models import BodyProxy, Cloth, SceneSpec, compose
 from tauguard.models.cloth import add_sheet
 
 #: Young's modulus of the fabrics: 400 N/m over their width, a soft knit [Pa].
@@ -30,7 +30,8 @@ def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
         young=FABRIC_YOUNG,
     )
     scene = compose(SceneSpec(labels=False, cloth=cloth, integrator="discrete"))
-    return _moving("arm_cloth", scene, scene.model, 0.6, turn(scene.home, 0, speed, 0.7))
+    moves = [(scene.joint_names, turn(scene.home, 0, speed, 0.7))]
+    return driven("arm_cloth", scene.model, 0.6, moves)
 
 
 def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> ContactScene:
@@ -54,7 +55,8 @@ def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> Contact
     spec = mujoco.MjSpec.from_string(scene.xml)
     add_sheet(spec, points, faces, mass=0.08, radius=1e-3, young=FABRIC_YOUNG)
     reference = sway(scene.home, np.array([0, 2]), np.array([0.15, 0.12]), 0.8 / speed)
-    return _moving("sleeve_arm", scene, spec.compile(), 0.8 / speed, reference)
+    moves = [(scene.joint_names, reference)]
+    return driven("sleeve_arm", spec.compile(), 0.8 / speed, moves)
 
 
 def tube(around: int, along: int, radius: float, length: float) -> tuple[Array, NDArray[np.int32]]:
@@ -92,17 +94,5 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
     worn.contype, worn.conaffinity = 4, 6  # meets the cloth; the arm meets it by contact pairs
     for flex in spec.flexes:
         flex.contype, flex.conaffinity = 6, 5
-    return _moving("garment_chest", scene, spec.compile(), 0.7, turn(scene.home, 0, speed, 0.6))
-
-
-def _moving(
-    name: str, scene: Scene, model: mujoco.MjModel, seconds: float, reference: Reference
-) -> ContactScene:
-    """The contact scene of ``model``, in which the arm of ``scene`` follows ``reference``."""
-    joints = [model.joint(joint) for joint in scene.joint_names]
-    places = np.array([joint.qposadr[0] for joint in joints])
-    dofs = np.array([joint.dofadr[0] for joint in joints])
-    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
-    qpos[places], qvel[dofs] = reference(0.0)
-    control = follow(model, qpos, [(places, dofs, reference)])
-    return ContactScene(name, model, qpos, qvel, seconds, control)
+    moves = [(scene.joint_names, turn(scene.home, 0, speed, 0.6))]
+    return driven("garment_chest", spec.compile(), 0.7, moves)

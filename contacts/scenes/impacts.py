@@ -57,10 +57,7 @@ def ball_cloth(
     """
     if impact not in IMPACT_POINTS:
         raise ValueError(f"impact {impact!r}: expected one of {', '.join(IMPACT_POINTS)}")
-    if mode not in MODES:
-        raise ValueError(f"mode {mode!r}: expected one of {', '.join(MODES)}")
-    if not 0 < speed < np.inf:
-        raise ValueError(f"speed {speed} m/s: expected above 0")
+    spec = _spec("discrete", speed, mode, tuple(MODES))
     cloth = Cloth(
         count=count,
         size=0.3,
@@ -71,10 +68,6 @@ def ball_cloth(
         young=CLOTH_YOUNG,
         solref=STIFF[0] if stiff else (0.003, 1.0),
     )
-    spec = mujoco.MjSpec()
-    spec.option.gravity = [0, 0, 0]
-    spec.option.integrator = INTEGRATORS["discrete"]
-    spec.option.enableflags = MODES[mode]
     add_cloth(spec, cloth)
     ball = spec.worldbody.add_body(name="ball")
     ball.add_freejoint()
@@ -117,14 +110,7 @@ def sphere_plate(
     Raises:
         ValueError: another mode, a speed that is not above 0.
     """
-    if mode not in ("plain", "speculative"):
-        raise ValueError(f"mode {mode!r}: expected plain or speculative")
-    if not 0 < speed < np.inf:
-        raise ValueError(f"speed {speed} m/s: expected above 0")
-    spec = mujoco.MjSpec()
-    spec.option.gravity = [0, 0, 0]
-    spec.option.integrator = INTEGRATORS["implicitfast"]
-    spec.option.enableflags = MODES[mode]
+    spec = _spec("implicitfast", speed, mode, ("plain", "speculative"))
     plate = spec.worldbody.add_geom(
         name="plate", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, PLATE_HALF_THICKNESS]
     )
@@ -138,3 +124,16 @@ def sphere_plate(
     qpos[:3] = [0.013, 0.007, PLATE_HALF_THICKNESS + BALL_RADIUS + BALL_GAP + offset]
     qvel[2] = -speed
     return ContactScene("sphere_plate", model, qpos, qvel, (BALL_GAP + offset) / speed + 0.03)
+
+
+def _spec(integrator: str, speed: float, mode: str, known: tuple[str, ...]) -> mujoco.MjSpec:
+    """An empty scene without gravity; ``ValueError`` for a bad speed or mode."""
+    if mode not in known:
+        raise ValueError(f"mode {mode!r}: expected one of {', '.join(known)}")
+    if not 0 < speed < np.inf:
+        raise ValueError(f"speed {speed} m/s: expected above 0")
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    spec.option.integrator = INTEGRATORS[integrator]
+    spec.option.enableflags = MODES[mode]
+    return spec

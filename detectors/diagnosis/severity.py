@@ -40,7 +40,7 @@ def force_draws(
     probability: Array,
     count: int = DRAWS,
 ) -> Array:
-    """Forces on the arm that a residual may come from, world frame [N], shape (count, 3).
+    """Draw forces on the arm that explain a residual, world frame [N], shape (count, 3).
 
     Args:
         robot: the arm.
@@ -48,7 +48,7 @@ def force_draws(
         q: positions [rad], shape (n,).
         residual: estimate of tau_ext [N m], shape (n,).
         noise: its standard deviation [N m], shape (n,).
-        probability: of a contact at each of the surface's points, shape (K,).
+        probability: probability of a contact at each point of the surface, shape (K,).
         count: number of draws.
     """
     rng = np.random.default_rng(SEED)
@@ -60,7 +60,7 @@ def force_draws(
     point = poses.origin[link] + np.einsum("kij,kj->ki", turn, surface.point[chosen])
     inward = -np.einsum("kij,kj->ki", turn, surface.normal[chosen])
     columns = point_jacobians(robot, poses, link, point).transpose(0, 2, 1) / noise[:, None]
-    # A standardised force is the same length in all likely directions.
+    # Tangential parts are scaled by the friction, so that all forces in the cone are alike.
     along = np.einsum("knj,kj->kn", columns, inward)
     columns = FRICTION * columns + (1 - FRICTION) * along[:, :, None] * inward[:, None]
     force = _drawn(columns, residual / noise, inward, rng)

@@ -276,15 +276,16 @@ def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
 
 
 def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
-    """How far the logs' largest signals are from the bounds, as :attr:`Bound.scale`, (3, n).
+    """Ratio of the logs' largest signals to the bounds, as :attr:`Bound.scale`, shape (3, n).
 
-    The second largest of pieces of 2 s counts, so that one contact in the logs does not, as far as
-    the logs are long: seconds against :data:`SCALE_WORTH`.
+    It takes the second largest peak of pieces of 2 s, so that a single contact in the logs has no
+    effect. The longer the logs, the more the ratio counts against 1, see
+    :data:`SCALE_WORTH`.
 
     Args:
-        prior: under which the logs were judged.
-        bound: with the quantiles and the noise that the logs show.
-        judged: left-out logs.
+        prior: the bound with which the logs were judged.
+        bound: the bound with the logs' own quantiles and noise.
+        judged: the left-out logs.
     """
     n = len(prior.friction)
     peaks: list[list[Array]] = [[], [], []]

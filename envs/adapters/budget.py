@@ -22,7 +22,7 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
 
         Args:
             env: an environment of tauguard.
-            limit: the sum of ``info["cost"]`` that an episode may reach [N s]; 0 allows none.
+            limit: largest sum of ``info["cost"]`` in an episode [N s]; 0 allows no cost.
 
         Raises:
             ValueError: below 0 or not finite.
@@ -37,12 +37,12 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode with the whole budget."""
+        """Begin an episode with the full budget."""
         observation, info = self.env.reset(seed=seed, options=options)
         return observation, info | {"cost_left": self._limit}
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act; terminated where the budget is spent."""
+        """Act; the episode is terminated once the budget is exceeded."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         left = self._limit - info["cost_sum"]
         return observation, reward, terminated or left < 0, truncated, info | {"cost_left": left}
@@ -60,7 +60,7 @@ class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
 
         Args:
             env: an environment whose ``info`` has a cost.
-            scale: [1/(N s)] the cost is multiplied by this.
+            scale: factor on the cost [1/(N s)].
 
         Raises:
             ValueError: a scale that is not above 0.

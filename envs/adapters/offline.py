@@ -28,15 +28,15 @@ def record_policy(
         name: name of the environment, such as "tauguard/Reach-v0".
         policy: from an observation to an action.
         dataset: Minari's id, ``namespace/name-v0``.
-        episodes: how many; episode i has the seed ``seed + i``.
+        episodes: number of episodes; episode i has the seed ``seed + i``.
         seed: seed of the first episode.
-        **keywords: of the environment; ``max_episode_steps`` as well.
+        **keywords: keywords of the environment, and ``max_episode_steps``.
 
     Returns:
         How many episodes there were.
 
     Raises:
-        ValueError: Minari is not installed, has a dataset of that name already, or no episodes.
+        ValueError: Minari is not installed or has a dataset of that name, or ``episodes`` is 0.
     """
     try:
         import minari

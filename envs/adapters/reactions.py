@@ -14,19 +14,19 @@ from tauguard.envs.gym.settings import one_of
 
 #: The reactions, by name.
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
-#: What starts a reaction: the detector's alarm, or the contact itself (which no real robot knows).
+#: Trigger of a reaction: the detector's alarm, or the contact itself, which no real robot knows.
 TRIGGERS = ("alarm", "contact")
-#: Brakes hold this long after power-off [s] (assumed; data sheets say 10 to 50 ms).
+#: Delay from power-off until the brakes hold [s] (assumed; data sheets say 10 to 50 ms).
 BRAKE_DELAY = 0.02
-#: A retraction goes back along the path at this fraction of the arm's speed before. It ends this
-#: long [s] after it has passed the point where the reaction began.
+#: A retraction goes back along the path at this fraction of the arm's former speed. It ends this
+#: time [s] after it has passed the point where the reaction began.
 RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
 #: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
 ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
 
 
 class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """The policy acts until the trigger. From then on the reaction acts, to the end of the episode.
+    """Let the policy act until the trigger, and the reaction from then to the end of the episode.
 
     * ``continue``: nothing happens.
     * ``stop0``: category 0 of IEC 60204-1: power off at once, brakes after :data:`BRAKE_DELAY`.
@@ -40,7 +40,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     * ``admittance``: the arm yields to the residual beyond the detector's thresholds (to the true
       external torque where the trigger is the contact): ``M dv/dt = tau - D v`` in every joint.
 
-    ``info["reacting"]`` says whether it has begun.
+    ``info["reacting"]`` states whether the reaction has begun.
     """
 
     def __init__(
@@ -56,10 +56,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             env: an environment of tauguard; with trigger "alarm" it needs a detector.
             reaction: one of :data:`REACTIONS`.
             trigger: one of :data:`TRIGGERS`.
-            deceleration: of every joint [rad/s^2] (default: the arm's own limits).
+            deceleration: deceleration of every joint [rad/s^2] (default: the arm's own limits).
 
         Raises:
-            ValueError: no such reaction or trigger, or no detector to wait for.
+            ValueError: no such reaction or trigger, or trigger "alarm" without a detector.
         """
         RecordConstructorArgs.__init__(
             self, reaction=reaction, trigger=trigger, deceleration=deceleration
@@ -152,7 +152,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return Override.VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
-        """Slow all joints together, so that the arm stays on its path; say whether it stands.
+        """Slow all joints together, so that the arm stays on its path; True once it stands.
 
         If the person has already slowed the arm down, the stop continues from that speed: a ramp
         over time alone would push.
@@ -169,7 +169,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return False
 
     def _back(self) -> Array:
-        """Velocity backwards along the stored path; zero when the time is over."""
+        """Velocity backwards along the stored path; zero after the end of the retraction."""
         if self._returning is None:
             rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
             assert self._since is not None

@@ -32,20 +32,20 @@ class _Rows:
     region: list[NDArray[np.void]] = field(default_factory=list)
     residual: list[Array] = field(default_factory=list)
     alarm: list[NDArray[np.bool_]] = field(default_factory=list)
-    targets: list[tuple[float, Any]] = field(default_factory=list)  #: from when on [s], places [m]
+    targets: list[tuple[float, Any]] = field(default_factory=list)  #: start time [s], places [m]
 
 
 class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
     """Writes ``FOLDER/episode_00000.mcap`` and so on, each when its episode ends.
 
-    A recording has a row for every physics step: measured (where the drive has sensors and a
-    detector or noise is on) or true positions, velocities and currents, and the truth: external
-    torque, contact force, link and point, collisions, where the body regions and targets were.
-    With a detector its residual and alarms are in it. ``tauguard replay`` shows it.
+    A recording has a row for every physics step. It holds positions, velocities and currents; they
+    are measured ones if the environment has a detector or noise, else true ones. Its truth holds
+    external torque, contact force, link and point, collisions, and the places of body regions and
+    targets. With a detector it also holds residual and alarms. ``tauguard replay`` shows it.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], folder: str | Path) -> None:
-        """Choose the folder; it is made if it is not there."""
+        """Choose the folder, which is created if it does not exist."""
         RecordConstructorArgs.__init__(self, folder=folder)
         gymnasium.Wrapper.__init__(self, env)
         self._arm: ArmEnv = arm_env(env)

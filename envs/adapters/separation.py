@@ -46,7 +46,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
             reaction_time: T_r of sensor and controller [s].
             intrusion: C, how far a body part reaches before it is sensed [m].
             uncertainty: Z, of both positions [m].
-            hysteresis: above the protective distance before the arm moves on [m].
+            hysteresis: distance above the protective one at which the arm moves on [m].
 
         Raises:
             ValueError: a number below 0, or an environment without body regions.
@@ -122,7 +122,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         return float(distance), self._speed(int(model.geom_bodyid[geom]), ends[:3])
 
     def _speed(self, body: int, point: Array) -> float:
-        """Of a point of a link [m/s], from the joints' axes as they are now."""
+        """Speed of a point of a link [m/s], from the present joint axes and velocities."""
         compiled, data = self._arm.compiled, self._arm.batch.datas[0]
         model, total = compiled.scene.model, np.zeros(3)
         for joint, dof, link in zip(

@@ -31,9 +31,9 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
 
         Args:
             name: as of ``gymnasium.make_vec``, such as "tauguard/Reach-v0".
-            num_envs: how many copies.
-            keys: what of ``info`` each copy's dictionary has.
-            **keywords: of the environment; ``threads`` and ``max_episode_steps`` as well.
+            num_envs: number of copies.
+            keys: keys of ``info`` that each copy's dictionary has.
+            **keywords: keywords of the environment, ``threads`` and ``max_episode_steps``.
 
         Raises:
             ValueError: not an environment of tauguard, or as the environment itself.
@@ -67,7 +67,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Act: observations, rewards, whether episodes are over, and a dictionary a copy."""
+        """Apply the actions: observations, rewards, ends of episodes, a dictionary per copy."""
         assert self._actions is not None
         observation, reward, terminated, truncated, infos = self.envs.step(self._actions)
         over = terminated | truncated
@@ -86,12 +86,12 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         self.envs.close()
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """A picture of the first copy; the others are not drawn."""
+        """A picture of the first copy, and None for the others."""
         picture = self.envs.render()
         return [None if picture is None else picture[0]] + [None] * (self.num_envs - 1)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The vector environment's, for each copy asked for."""
+        """The attribute of the vector environment, once for each chosen copy."""
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -105,7 +105,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         )
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Call a method of the vector environment, once for each copy asked for."""
+        """Call a method of the vector environment, once for each chosen copy."""
         method = getattr(self.envs, method_name)
         return [method(*args, **kwargs) for _ in self._get_indices(indices)]
 

@@ -1,4 +1,4 @@
-"""How a planned collision is carried out: its target, and the obstacle or wrench that causes it."""
+"""The target of a planned collision, and the obstacle or wrench that causes it."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,15 @@ from tauguard.envs.episodes.motions import Motion
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.models import Scene
 
-#: A clamp needs a link that moves at least this fast [m/s] to run into it.
+#: Least speed of a link that runs into a clamp [m/s].
 CLAMP_SPEED = 0.005
-#: The link's surface travels at least and at most this far after it meets a clamp [m].
+#: Least and largest travel of the link's surface after it meets a clamp [m].
 CLAMP_TRAVEL = (0.002, 0.06)
-#: A clamp stands for its duration and this long [s].
+#: A clamp stays for its duration plus this time [s].
 CLAMP_HOLD = 0.1
 #: Interval at which targets along a motion are sought [s], and number of rays at each time.
 STRIDE, CASTS = 0.02, 8
-#: An obstacle is in place this long before it touches [s].
+#: An obstacle is in place this time before it touches [s].
 LEAD = 0.15
 
 
@@ -49,7 +49,7 @@ class _LinkPath:
     spin: Array  #: of the link [rad/s], shape (R, 3)
 
     def velocity(self, number: int, points: Array) -> Array:
-        """Of points of the link, shape (..., 3), at the ``number``-th row [m/s]."""
+        """Velocity of points of the link, shape (..., 3), at the ``number``-th row [m/s]."""
         arm = points - self.position[number]
         return np.asarray(self.speed[number] + cross(self.spin[number], arm))
 
@@ -58,7 +58,7 @@ class Aim:
     """Finds surface points of a scene's links by ray casting along a motion."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
-        """For the scene's collision geometry and the motion's references."""
+        """Prepare the scene's collision geometry and the motion's references."""
         self._scene, self._motion = scene, motion
         self._data, self._poses = mujoco.MjData(scene.model), Poses(scene)
         self._dt = float(motion.t[1] - motion.t[0])

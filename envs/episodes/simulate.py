@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from tauguard.contacts import Checker
 
 
-#: Poses are drawn this far around the CURA6-like arm's home [rad].
+#: Range of drawn poses around the CURA6-like arm's home [rad].
 OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)
-#: The Coulomb part of the compensation rises over this speed [rad/s], as in the native servo.
+#: Speed over which the Coulomb part of the compensation rises [rad/s], as in the native servo.
 FRICTION_SMOOTHING = 0.02
-#: Links stay this high above the floor and this far from the base's axis [m].
+#: Least height of links above the floor, and least distance from the base's axis [m].
 CLEARANCE = (0.15, 0.22)
 
 
@@ -64,8 +64,7 @@ def workspace(scene: Scene) -> Workspace:
         near = min((float(np.hypot(*data.xpos[b][:2])) for b in links[1:]), default=np.inf)
         return low, near
 
-    # If an arm's home pose is nearer to the floor or the base than that, its links may come half as
-    # near as in that pose.
+    # If the home pose is closer to floor or base than that, half of the pose's clearance is enough.
     at_home = (np.inf, np.inf) if own else clearance(facts.home)
     least = [min(*pair) for pair in zip(CLEARANCE, np.multiply(at_home, 0.5), strict=True)]
 
@@ -162,7 +161,7 @@ class Simulation:
         self.striking = Striking(self.scene, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
-        #: Planned collisions that did not come about, and why; filled by :meth:`run`.
+        #: Planned collisions that did not occur, and why; filled by :meth:`run`.
         self.missed: list[str] = []
 
     def run(self) -> Trace:
@@ -310,7 +309,7 @@ def sampled(trace: Trace, rows: NDArray[np.intp]) -> Trace:
 
 
 def _rows_of(values: Trace | Truth, rows: NDArray[np.intp], count: int) -> dict[str, Any]:
-    """The arrays of ``count`` rows, at some of them."""
+    """The chosen rows of the arrays that have ``count`` rows."""
     return {
         name: value[rows]
         for name, value in vars(values).items()

@@ -1,4 +1,4 @@
-"""Carrying out a planned collision: find a target, search the strength, run its window."""
+"""Inject a planned collision: find a target, search the strength, simulate its window."""
 
 from dataclasses import dataclass, replace
 
@@ -23,15 +23,14 @@ from tauguard.models import Scene
 
 #: Where an obstacle waits while it is not used, far from the arm [m].
 PARKED = np.array([0.0, 0.0, 50.0])
-#: Targets to try for one collision, and strengths to try on each.
+#: Number of targets tried for one collision, and of strengths tried on each.
 TARGETS, TRIES = 16, 10
-#: Largest force of a collision that is still worth detecting [N]; a target that needs more is given
-#: up.
+#: Largest force of a collision [N]; a target that needs more is given up.
 FORCE_LIMIT = 400.0
 #: An obstacle that touches the arm sooner than this [s] overlapped it from the start.
 CLEAR = 0.01
-#: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
-#: the strength less this, and may be negative where another part of the link reaches further.
+#: Offset of a clamp's strength [m]: its depth is the strength minus this. The depth may be below 0
+#: where another part of the link reaches further than the planned point.
 CLAMP_OFFSET = 0.03
 #: First guesses: strike speed [m/s], clamp depth from the offset [m], pulse force [N].
 STRENGTH = {"strike": 0.5, "clamp": CLAMP_OFFSET, "pulse": 80.0}
@@ -53,7 +52,7 @@ class Window:
 
 
 class Striking:
-    """Carries the planned collisions of one simulation out."""
+    """Injects the planned collisions of one simulation."""
 
     def __init__(
         self,
@@ -61,7 +60,7 @@ class Striking:
         follow: AlongMotion,
         rng: np.random.Generator,
     ) -> None:
-        """For one scene and its motion; ``rng`` draws where and from where it is hit.
+        """Prepare for one scene and motion; ``rng`` draws points and directions.
 
         It has no reference to the simulation that uses it. Such a cycle would keep megabytes of
         native memory for each simulation until Python next collects cycles.
@@ -107,7 +106,7 @@ class Striking:
         )
 
     def _why(self, plan: CollisionPlan, tried: int, room: float) -> str:
-        """Why a plan did not come about, after ``tried`` targets in so many seconds."""
+        """Why a plan failed after ``tried`` targets within ``room`` seconds."""
         if room < STRIDE:
             return "no time is left before the next collision or the end of the episode"
         if not tried:
@@ -119,9 +118,9 @@ class Striking:
         )
 
     def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
-        """The plan as asked, then weaker plans for motions that cannot offer it.
+        """The plan as given; after some attempts an easier one.
 
-        A dwell may be missing, or no link may move towards a place for a clamp.
+        A motion may have no dwell, or no link that moves towards a clamp.
         """
         if attempt < TARGETS // 4:
             return plan

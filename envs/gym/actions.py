@@ -9,12 +9,11 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.compiled import CompiledScene
 
-#: Largest Cartesian increment: at this speed [m/s] and turning at this speed [rad/s].
+#: Largest Cartesian speed [m/s] and angular speed [rad/s]; they limit the increment of an action.
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5
-#: In position mode an action reaches this far to both sides of home [rad], within the joint's
-#: range.
+#: Range of an action in position mode to both sides of home [rad], within the joint's range.
 POSITION_REACH = 2.0
-#: A joint that has no torque limit takes an action of 1 as this position error of its servo [rad].
+#: For a joint without torque limit an action of 1 is the torque of this servo error [rad].
 SOFT_LIMIT = 0.1
 #: Bounds of the observation: speed [rad/s], torque where none is known [N m], distance [m].
 SPEED_BOUND, TORQUE_BOUND, DISTANCE_BOUND = 100.0, 1e4, 100.0

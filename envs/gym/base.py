@@ -31,27 +31,31 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     """One arm scene as a Gymnasium environment; subclasses name their task.
 
     The keywords are those of :class:`tauguard.envs.gym.settings.Settings` and of the task.
+    Every ``info`` has the same keys and shapes. A peak is the largest value over the physics steps
+    of one action. Links and regions are counted from 1; 0 means none.
 
-    Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
-    ``success``, ``force`` (peak on a link [N]), ``cost`` (impulse of forces on body regions beyond
-    their limits, and of two arms on one another [N s]; of a force no more than the arm would exert
-    if nobody else moved), ``cost_sum`` (of the episode [N s]), ``pressure``
-    (peak mean pressure [N/cm^2], where the keyword ``contact_area`` says the area; else it is 0),
-    ``limit_ratio`` (peak force over the region's transient limit, or its quasi-static one after 0.5
-    s of contact or where the region cannot move), ``region`` (of that ratio, 1-based, 0 for none;
-    names in :attr:`regions`), ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the
-    detector (what is wrong with its samples, "" for nothing), ``onset`` (a collision began in this
-    step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
-    0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
-    collision [s] (-1: no alarm, or none yet), ``reason``, why the episode was terminated or cut
-    short ("" where it goes on, or its steps are over), and ``reward_NAME`` of each term of the
-    reward, whose sum is the reward. Peaks are over the physics steps of the action.
+    | key | meaning |
+    |---|---|
+    | time, distance, success | time [s], distance to the target [m], goal reached |
+    | force, link | peak contact force on a link [N], and which link |
+    | cost | impulse beyond the limits of body regions, and between two arms [N s] |
+    | cost_sum | sum of the costs of the episode [N s] |
+    | limit_ratio, region | peak of force over limit, and of which region |
+    | pressure | peak mean pressure [N/cm^2]; 0 without the keyword ``contact_area`` |
+    | tau_ext, tau_ext_peak | external torque by joint, last and peak [N m] |
+    | residual, alarm, fault | of the detector; fault: what is wrong with its samples, or "" |
+    | onset, onset_time | a collision began; time of the latest one [s], -1 for none |
+    | alarm_delay | delay of the latest collision's alarm [s]; -1 without an alarm |
+    | reason | why the episode was terminated or cut short, or "" |
+    | reward_NAME | a term of the reward; the reward is their sum |
+    | region_force, region_pressure | peaks of each of the k regions, shape (k,) [N, N/cm^2] |
+    | region_point, region_direction | where [m], and the force's direction, shape (k, 3) |
+    | contacts | with checkers: number of pairs that each reported |
 
-    Of each of the k body regions in :attr:`regions`, at its peak: ``region_force`` [N],
-    ``region_pressure`` [N/cm^2], ``region_point`` [m] and ``region_direction`` of the force on the
-    person, shapes (k,), (k,), (k, 3), (k, 3), zero where nothing touched; without ``contact_area``
-    the pressure is an estimate, :attr:`tauguard.envs.gym.regions.RegionInfo.least_pressure`. With
-    checkers, ``contacts`` has the pairs that each reported.
+    The limit is the transient one; it is the quasi-static one after 0.5 s of contact, or if the
+    region cannot move. In the cost a force counts at most as much as the arm would exert on a
+    person who stands still. Without ``contact_area`` the regions' pressures are estimates, see
+    :attr:`tauguard.envs.gym.regions.RegionInfo.least_pressure`.
 
     The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
     ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
@@ -68,7 +72,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             **keywords: see :class:`tauguard.envs.gym.settings.Settings`.
 
         Raises:
-            ValueError: an unknown keyword or a value that cannot be; the message says what would
+            ValueError: an unknown keyword or a value out of range; the message says what would
                 work.
             FileNotFoundError: no such robot file.
         """
@@ -79,7 +83,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.metadata = frame_rate(self.compiled)
         self.action_space, self.observation_space = make_spaces(self.batch)
         self._shape, self._area = self.action_space.shape, self.compiled.settings.contact_area
-        #: The only copy's rows, views.
+        #: Views of the rows of the only copy.
         self._seen, self._row = self.batch.observation[0], self.batch.numbers[0]
         self._arrays = {name: rows[0] for name, rows in shown_arrays(self.batch).items()}
         self._reward_keys = {name: f"reward_{name}" for name in self.task.terms}
@@ -88,7 +92,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = False
 
     def __repr__(self) -> str:
-        """As of the batch that is stepped."""
+        """The description of the batch, under this class's name."""
         return type(self).__name__ + repr(self.batch).removeprefix("Batch")
 
     @property
@@ -108,7 +112,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     @property
     def drawn(self) -> dict[str, Array]:
-        """What the keyword ``randomize`` gave this episode, by name."""
+        """The values that ``randomize`` drew for this episode, by name."""
         return dict(self.batch.drawn[0])
 
     @property
@@ -122,13 +126,11 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """Begin an episode.
 
         Args:
-            seed: of everything that is random.
-            options: values for this episode of what the keyword ``randomize`` names, instead of a
-                draw.
+            seed: seed of all random draws.
+            options: values by name that replace this episode's draws of ``randomize``.
 
         Raises:
-            ValueError: ``options`` that the keyword ``randomize`` does not name, or values that
-                cannot be.
+            ValueError: ``options`` has a name that ``randomize`` lacks, or a value out of range.
         """
         check_options(options or {}, self.compiled.settings.randomize or {})
         super().reset(seed=seed)
@@ -276,7 +278,7 @@ def divergence(compiled: CompiledScene, kind: float) -> str:
 
 
 def shown_arrays(batch: Batch) -> dict[str, Array]:
-    """The arrays of ``info``, a row a copy."""
+    """The arrays of ``info``, one row per copy."""
     found = {
         "tau_ext": batch.tau_ext,
         "residual": batch.residual,
@@ -287,13 +289,13 @@ def shown_arrays(batch: Batch) -> dict[str, Array]:
 
 
 def frame_rate(compiled: CompiledScene) -> dict[str, Any]:
-    """The metadata of an environment: a picture shows one action."""
+    """Metadata of an environment, with one frame per action."""
     rate = max(1, round(compiled.settings.control_rate))
     return {"render_modes": list(RENDER_MODES), "render_fps": rate}
 
 
 def make_spaces(batch: Batch) -> tuple[Any, Any]:
-    """Of one environment's actions and observations."""
+    """Spaces of the actions and observations of one environment."""
     low = np.array([entry.low for entry in batch.observations])
     high = np.array([entry.high for entry in batch.observations])
     action = spaces.Box(-1.0, 1.0, (len(batch.actions),), np.float32)

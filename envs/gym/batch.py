@@ -33,15 +33,15 @@ class StepMetrics(NamedTuple):
     """
 
     time: Any  #: since the episode began [s]
-    distance: Any  #: of the tool, of several the farthest, from its target [m]
+    distance: Any  #: of the tool from its target, of two tools the larger one [m]
     force: Any  #: largest force on a link [N]
     cost: Any  #: impulse of the arm beyond the limits of the body regions [N s]
     limit_ratio: Any  #: largest force on a body region divided by its limit
     region_force: Any  #: largest force on a body region [N]
     onset: Any  #: a collision began
     onset_time: Any  #: of the latest collision [s]; -1: none yet
-    link: Any  #: of the largest force, 1-based; 0: none
-    region: Any  #: of the largest ratio, 1-based; 0: none
+    link: Any  #: link with the largest force, 1-based; 0: none
+    region: Any  #: region with the largest ratio, 1-based; 0: none
     diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
     speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
     cost_sum: Any  #: of the costs of the episode's actions so far [N s]
@@ -52,7 +52,7 @@ METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
 #: At a physics step: net force on the arm [N]; link (1-based, 0: none), point [m] and force [N] of
 #: the largest force on a link.
 CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
-#: Where a body is [m]; its orientation as w, x, y, z.
+#: Position of a body [m], and its orientation as w, x, y, z.
 POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
 assert METRICS.itemsize == 8 * _plant.METRICS
 assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
@@ -67,10 +67,10 @@ class Override(IntEnum):
     BRAKE = 3  #: no power, and brakes
 
 
-#: What an action did to each body region, names of :class:`Batch`'s arrays and of ``info``.
+#: Arrays of the peak contact on each body region; names in :class:`Batch` and in ``info``.
 TOUCHES = ("region_force", "region_pressure", "region_point", "region_direction")
-#: A snapshot holds, among its keys, MuJoCo's integration state, derived fields that are read before
-#: the next physics step, and the rows of a copy.
+#: A snapshot holds MuJoCo's integration state, derived fields that are read before the next physics
+#: step, and the rows of one copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 KEYS = {"scene", "physics", "derived", "plant", "rows", "detector", "drawn"}
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
@@ -94,26 +94,26 @@ class Batch:
 
     Attributes:
         observation: shape (rows, size).
-        numbers: of the last action, a column for each field of :class:`StepMetrics`.
+        numbers: results of the last action, one column per field of :class:`StepMetrics`.
         metrics: the same by name, shape (rows,).
         tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
-        tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
-        target: of the tools [m], shape (rows, arms, 3).
-        residual: of the detector [N m], shape (rows, n); zero without one.
-        alarm: of the detector, shape (rows,).
-        alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
+        tau_peak: largest external torque of each joint in the last action [N m], (rows, n).
+        target: positions of the tools' targets [m], shape (rows, arms, 3).
+        residual: residual of the detector [N m], shape (rows, n); zero without a detector.
+        alarm: alarm of the detector, shape (rows,).
+        alarm_delay: delay of the latest collision's alarm [s], -1 without one, shape (rows,).
         contacts: pairs that each checker reported during the last action, shape (rows, checkers).
         q, qd, current, tau: positions, velocities, motor currents [A] and external torque [N m] at
             every physics step of the last action, shape (rows, substeps, n).
-        contact: what touched the arm at every physics step, by the names of :data:`CONTACT`, shape
+        contact: contacts of the arm at every physics step, by the names of :data:`CONTACT`, shape
             (rows, substeps).
-        region: where the body regions were, by the names of :data:`POSE`, shape (rows, substeps,
+        region: poses of the body regions, by the names of :data:`POSE`, shape (rows, substeps,
             regions).
-        region_force, region_pressure, region_point, region_direction: of each body region at its
-            peak over the action [N, N/cm^2, m], shapes (rows, regions) and (rows, regions, 3).
-        reaches, walks: what people do, person after person, see
+        region_force, region_pressure, region_point, region_direction: the peak contact on each
+            region in the last action [N, N/cm^2, m], shapes (rows, regions), (rows, regions, 3).
+        reaches, walks: motions of people, person after person, see
             :func:`tauguard.envs.gym.people.draw_script`.
-        drawn: what differs from the scene in each copy's episode, by name.
+        drawn: values that ``randomize`` drew for each copy, by name.
     """
 
     def __init__(self, compiled: CompiledScene, rows: int) -> None:
@@ -153,7 +153,7 @@ class Batch:
         self._scene = _identity(compiled.scene.model)
 
     def __repr__(self) -> str:
-        """The arm, the sizes of the tables, and what may be touched."""
+        """The arm, the sizes of the tables, and the body regions."""
         regions = [region.name for region in self.compiled.regions]
         named = ": " * bool(regions) + ", ".join(regions[:2]) + ", ..." * (len(regions) > 2)
         return (
@@ -169,7 +169,7 @@ class Batch:
         self.residual[:], self.alarm[:] = 0.0, False
 
     def model(self, i: int) -> mujoco.MjModel:
-        """What copy ``i`` simulates."""
+        """The model of copy ``i``."""
         variant = self._variants[i]
         return self.compiled.scene.model if variant is None else variant.model
 
@@ -179,7 +179,7 @@ class Batch:
         return self.compiled.people if variant is None else variant.people
 
     def draw(self, i: int, rng: np.random.Generator, stated: Mapping[str, Any]) -> None:
-        """Draw what the setting ``randomize`` names for the next episode of copy ``i``."""
+        """Draw the quantities of ``randomize`` for the next episode of copy ``i``."""
         known = self.compiled.settings.randomize
         if known:
             self._become(i, draw(known, self.compiled, rng, stated))
@@ -202,7 +202,7 @@ class Batch:
         data.qpos[self.compiled.scene.qpos_adr] = q
 
     def send_people(self, i: int, rng: np.random.Generator) -> None:
-        """Draw what the people of copy ``i`` do in the next episode."""
+        """Draw the motions of the people of copy ``i`` for the next episode."""
         for p, person in enumerate(self.people(i)):
             reaches, walks = draw_script(person, rng, self.compiled.blocked)
             self.reaches[i, 2 * p : 2 * p + 2] = reaches
@@ -242,11 +242,11 @@ class Batch:
         }
 
     def set_state(self, i: int, state: dict[str, Any]) -> None:
-        """Go back to what :meth:`get_state` gave.
+        """Restore what :meth:`get_state` returned.
 
         Raises:
-            ValueError: a state of another scene, or none that :meth:`get_state` gave. Nothing is
-                changed, unless its arrays are damaged.
+            ValueError: a state of another scene, or not one of :meth:`get_state`. Nothing is
+                changed then, unless its arrays are damaged.
         """
         if not isinstance(state, dict) or not state.keys() >= KEYS:
             raise ValueError("state: expected what get_state() gave")
@@ -273,7 +273,7 @@ class Batch:
                 listener.set_state(state["detector"])
 
     def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
-        """One action of copy ``i``, shape (m,)."""
+        """Apply an action to copy ``i``, shape (m,)."""
         if self.checks:
             self._checked_step(i, action)
         else:
@@ -284,7 +284,7 @@ class Batch:
     def step_all(
         self, actions: Array, mask: NDArray[np.bool_], rngs: list[np.random.Generator], threads: int
     ) -> None:
-        """One action of every copy that ``mask`` chooses, shape (rows, m), on a thread pool."""
+        """Apply actions, shape (rows, m), to the copies in ``mask`` on a thread pool."""
         if self.checks:
             for i in np.flatnonzero(mask):
                 self._checked_step(int(i), actions[i])
@@ -311,7 +311,7 @@ class Batch:
             sensing.show(self.observation[i], *measured)
 
     def faults(self) -> list[str]:
-        """What is wrong with each copy's samples of the last action, "" for nothing."""
+        """The fault of each copy's samples in the last action; "" if there is none."""
         return [one.fault for one in self.sensing] if self.sensing else [""] * self.rows
 
     def _time_alarm(self, i: int, before: bool) -> None:

@@ -16,7 +16,7 @@ from tauguard.models import Cloth
 #: A sheet of 8 x 8 vertices that hangs across the workspace, held along its upper edge.
 SHEET = Cloth(count=8, size=0.5, mass=0.1, position=(0.55, 0.0, 0.55))
 
-#: A target of ClothReach-v1 is at least this far from the sheet [m].
+#: Least distance of a target of ClothReach-v1 from the sheet [m].
 ASIDE = 0.12
 
 
@@ -26,7 +26,7 @@ class ClothReach(CarefulReach):
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
-        """Beyond the sheet as seen from the tool, within its width."""
+        """Whether the place is beyond the sheet as seen from the tool, within its width."""
         compiled = self.batch.compiled
         sheet = compiled.scene.spec.cloth
         if sheet is None:

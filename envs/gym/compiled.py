@@ -32,12 +32,12 @@ from tauguard.models import (
     without_losses,
 )
 
-#: A tool pose to reach lies at least this high and this far from the base's axis [m], of a short
-#: arm nearer [reach].
+#: Least height of a target and least distance from the base's axis [m]; for a short arm both as
+#: fractions of the reach.
 LOWEST, NEAREST, SHORT = 0.12, 0.2, (0.25, 0.4)
-#: No arm reaches less far than this [m].
+#: Least reach of an arm [m].
 LEAST_REACH = 0.02
-#: At which the conjugate gradients of a cloth's edges stop; forces differ by a ten-thousandth.
+#: Tolerance of the conjugate gradients for a cloth's edges; it changes forces by 1e-4.
 CLOTH_TOLERANCE = 1e-6
 
 
@@ -45,8 +45,9 @@ CLOTH_TOLERANCE = 1e-6
 class ForceBound:
     """Largest force [N] of an arm against a contact of stiffness k, from the energy E in it.
 
-    F^2 / (2 k) = E: of the arm in motion at its largest speeds (a faster arm has more), and of its
-    drives, its load and what meets it. See :func:`tauguard.models.derive.largest_energy`.
+    F^2 / (2 k) = E. ``moving`` comes from the arm's kinetic energy at its largest speeds; a faster
+    arm has more. ``driven`` comes from its drives, its load, and the body that runs into it. See
+    :func:`tauguard.models.derive.largest_energy`.
     """
 
     moving: float
@@ -73,7 +74,7 @@ class CompiledScene:
     joint_range: Array  #: [rad], infinite where free, shape (n, 2)
     torque_limit: Array  #: [N m], shape (n,)
     max_speed: Array  #: [rad/s], shape (n,)
-    tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
+    tools: tuple[tuple[int, int, int], ...]  #: for each arm: site or -1, body, first joint
     regions: tuple[RegionInfo, ...]
     people: tuple[Person, ...]
     blocked: Array  #: what they walk round, see :func:`tauguard.envs.gym.placing.blocked_ground`
@@ -82,7 +83,7 @@ class CompiledScene:
 
     @property
     def arms(self) -> int:
-        """How many arms there are."""
+        """Number of arms."""
         return len(self.tools)
 
     @property
@@ -263,7 +264,7 @@ def tool_position(compiled: CompiledScene, data: mujoco.MjData, arm: int = 0) ->
 def arm_reach(scene: Scene) -> float:
     """Largest distance from the first joint to the last link over 200 fixed random poses [m].
 
-    Where that link turns in place, the size of its shapes.
+    If that link only turns in place, the reach is the size of its shapes.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     rng = np.random.default_rng(0)

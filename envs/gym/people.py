@@ -1,4 +1,4 @@
-"""A person in an environment: what they do in an episode, drawn once and then played natively."""
+"""The motions of a person in an episode; native code plays them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PAUSE, HOLD = (0.2, 1.5), (0.2, 1.0)
 #: Time at work and away [s]; distance of the other place, to the side and behind [m].
 STAY, AWAY = (3.0, 8.0), (1.0, 3.0)
 ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
-#: A walk keeps this distance from tables and objects, or that of the place at work [m]; it is drawn
-#: so often, and then left out. A person may step back so far [m].
+#: Least distance of a walk from tables and objects (or that of the work place, if smaller) [m];
+#: number of draws after which a walk is left out; longest step back [m].
 CLEAR, DRAWN, STEP_BACK = 0.3, 20, 0.3
-#: Nothing to walk round.
+#: No obstacles to walk around.
 NOWHERE: Array = np.zeros((0, 4))
 #: Range of a reach ahead and to the side, in units of the arm's length, and above the hips [m].
 AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
@@ -51,7 +51,7 @@ def anatomy(person: Person, blocked: Array) -> _plant.Anatomy:
 
 
 def _clear(person: Person, blocked: Array, place: Array, begin: Array | None = None) -> bool:
-    """Whether a person on the straight way to a place keeps clear of everything."""
+    """Whether the straight path to a place keeps clear of all blocked areas."""
     if not len(blocked):
         return True
     at_work = np.array(person.position)
@@ -66,14 +66,14 @@ def _clear(person: Person, blocked: Array, place: Array, begin: Array | None = N
 def draw_script(
     person: Person, rng: np.random.Generator, blocked: Array = NOWHERE
 ) -> tuple[Array, Array]:
-    """What a person does in one episode: reaches (2, rows, 5) and walks (rows, 3).
+    """Draw the motions of one episode: reaches (2, rows, 5) and walks (rows, 3).
 
     A reach: wait [s], place [m], hold [s]. A walk: stay there [s], place [m].
 
     Args:
-        person: who.
-        rng: draws it.
-        blocked: what walks go round: least x and y, largest x and y [m], shape (k, 4).
+        person: the person.
+        rng: source of the draws.
+        blocked: areas that walks avoid: least x and y, largest x and y [m], shape (k, 4).
     """
     reaches = np.zeros((2, REACHES, _plant.REACH_WIDTH))
     walks = np.zeros((WALKS, _plant.WALK_WIDTH))
@@ -101,7 +101,7 @@ def draw_script(
     drawn[0] = person.position
     for k in range(1, WALKS if len(blocked) else 0):
         last = drawn[k - 1]
-        # From every place there is a way on to the first, where the script begins anew.
+        # From every place there is a path to the first one, where the script repeats.
         tries = [drawn[k], *spots(DRAWN)[:, int(away[k])], drawn[0]]
         free = (p for p in tries if _clear(person, blocked, p) and _clear(person, blocked, p, last))
         drawn[k] = next(free, last)

@@ -30,16 +30,16 @@ OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 USUAL_REACH = 1.146
 #: Names of a second arm's parts begin with this.
 SECOND = "arm2_"
-#: What overlaps is moved by this [m] a time, more for a long arm, at most so often.
+#: Step by which an overlapping thing is moved [m], more for a long arm; largest number of steps.
 STEP, MOVES = 0.05, 16
 #: An arm whose first joint is higher above its floor than this [reach] stands on a pedestal; one
 #: that works below that joint hangs from this height [reach].
 SHOULDER, HANGING = 0.5, 1.1
 #: People may stand this far within a table or an object [m].
 LEANING = 0.01
-#: Where objects are looked at along their paths, and the room for people's sway beside these [m].
+#: Spacing of checked places along an object's path, and clearance for people's sway [m].
 ALONG, ROOM = 0.05, 0.1
-#: A base within this of the origin stands in it [reach].
+#: A base within this distance of the origin counts as at the origin [reach].
 CENTRED = 0.1
 
 
@@ -69,7 +69,7 @@ class Layout:
 
     @classmethod
     def of(cls, bare: Scene, reach: float, moved: Mapping[str, float]) -> Layout:
-        """Of an arm with a reach: where it stands and which way it faces at home."""
+        """The layout of an arm: where it stands, and which way it faces at home."""
         if bare.facts.name in cura6.NAMES:
             return cls(reach, True, moved)
         model, data = bare.model, mujoco.MjData(bare.model)
@@ -111,7 +111,7 @@ class Layout:
 
     @property
     def scale(self) -> float:
-        """Of lengths that are stated for the package's arm."""
+        """Factor for lengths that are stated for the package's arm."""
         return 1.0 if self.own else self.reach / USUAL_REACH
 
     def crossing(self, region: str) -> BodyProxy:
@@ -132,7 +132,7 @@ class Layout:
         return self.someone(max(OPPOSITE * self.reach, NEAREST_PERSON), 0.0, np.pi)
 
     def person(self, someone: Person) -> Person:
-        """Farther from the arm, where that is needed."""
+        """The person, farther from the arm if needed."""
         far = self.moved.get("person", 0.0)
         if not far:
             return someone
@@ -191,7 +191,7 @@ class Usual:
 def check_clear(
     scene: Scene, model: mujoco.MjModel, scratch: mujoco.MjData, data: mujoco.MjData
 ) -> None:
-    """Whether the arm of a state overlaps nothing.
+    """Check that the arm overlaps nothing.
 
     Args:
         scene: what is simulated.
@@ -200,7 +200,7 @@ def check_clear(
         data: the state.
 
     Raises:
-        StartsInContact: it does; the deepest overlap.
+        StartsInContact: it overlaps something; the message has the deepest overlap.
     """
     for name in ("qpos", "mocap_pos", "mocap_quat"):
         getattr(scratch, name)[:] = getattr(data, name)
@@ -243,7 +243,7 @@ def things_around(scene: Scene, model: mujoco.MjModel) -> list[int]:
 
 
 def blocked_ground(scene: Scene) -> Array:
-    """What people go round: least x and y, largest x and y of each geom [m], shape (k, 4)."""
+    """Areas that people avoid: least x and y, largest x and y of each geom [m], (k, 4)."""
     model, data = scene.model, mujoco.MjData(scene.model)
     mujoco.mj_forward(model, data)
     paths = {model.body(o.name).id: np.array(o.path)[:, 1:3] for o in scene.spec.objects if o.path}
@@ -262,7 +262,7 @@ def blocked_ground(scene: Scene) -> Array:
 
 
 def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
-    """Whether people overlap no table and no object, nor stand in an object's path.
+    """Check that people overlap no table or object, and stand in no object's path.
 
     Arms yield to what moves, so they may be in a path.
     """
@@ -286,7 +286,7 @@ def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) ->
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
-    """Of the body that a geom belongs to; of the world's, its own."""
+    """Name of the geom's body; for a geom of the world its own name."""
     body = int(model.geom_bodyid[geom])
     return str(model.body(body).name if body else model.geom(geom).name)
 

@@ -1,4 +1,4 @@
-"""What can differ between episodes: distributions, and how a drawn value changes one copy."""
+"""Quantities that differ between episodes: distributions, and their effect on one copy."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Normal:
-    """Around ``mean``, never outside ``low`` to ``high``."""
+    """A normal distribution, clipped to ``low`` and ``high``."""
 
     mean: float
     deviation: float
@@ -29,7 +29,7 @@ class Normal:
     high: float = np.inf
 
     def draw(self, rng: np.random.Generator, size: int) -> Array:
-        """``size`` values."""
+        """Draw ``size`` values."""
         return np.clip(rng.normal(self.mean, self.deviation, size), self.low, self.high)
 
     def ends(self) -> tuple[float, float]:
@@ -39,13 +39,13 @@ class Normal:
 
 @dataclass(frozen=True)
 class Uniform:
-    """Between ``low`` and ``high``; a pair of numbers means this."""
+    """Uniform between ``low`` and ``high``; a pair of numbers is short for it."""
 
     low: float
     high: float
 
     def draw(self, rng: np.random.Generator, size: int) -> Array:
-        """``size`` values."""
+        """Draw ``size`` values."""
         return rng.uniform(self.low, self.high, size)
 
     def ends(self) -> tuple[float, float]:
@@ -55,12 +55,12 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some values."""
+    """One of several equally likely values."""
 
     values: tuple[float, ...]
 
     def draw(self, rng: np.random.Generator, size: int) -> Array:
-        """``size`` values."""
+        """Draw ``size`` values."""
         return rng.choice(np.array(self.values, dtype=np.float64), size)
 
     def ends(self) -> tuple[float, float]:
@@ -73,12 +73,12 @@ Distribution = Normal | Uniform | Choice
 
 @dataclass(frozen=True)
 class Parameter:
-    """Something that can be drawn: what it means and which values it can have."""
+    """A quantity that can be drawn: its meaning and its range."""
 
     meaning: str
     low: float
     high: float
-    each: bool = False  #: one draw a joint or link
+    each: bool = False  #: one draw for each joint or link
 
 
 PARAMETERS = {
@@ -210,7 +210,7 @@ def draw(
 
 @dataclass
 class Variant:
-    """What one copy simulates instead of the compiled scene's own."""
+    """Model, drive and people of one copy, in place of the compiled scene's."""
 
     model: mujoco.MjModel
     drive: Drive
@@ -275,5 +275,5 @@ def _drive(drive: Drive, drawn: Mapping[str, Array]) -> Drive:
 
 
 def own_model(compiled: CompiledScene) -> mujoco.MjModel:
-    """A model that one copy may change."""
+    """A copy of the model, for one environment to change."""
     return copy.copy(compiled.scene.model)

@@ -15,26 +15,26 @@ from tauguard.envs.gym.compiled import LOWEST, NEAREST, SHORT, pose_box, tool_po
 from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 
-#: A target counts as reached this near [m], and is worth this much reward.
+#: Distance at which a target counts as reached [m], and its reward.
 TOLERANCE, BONUS = 0.03, 1.0
-#: A touch at this force [N], or more, costs as much in a second as a target is worth.
+#: A contact at this force [N] or above costs as much in a second as a target earns.
 CONTACT_FORCE = 100.0
-#: An episode starts this near to home [rad].
+#: Largest distance of the initial pose from home, by joint [rad].
 START_SPREAD = 0.1
 #: Probability that the next target is the candidate whose straight path passes closest to the
 #: person, and number of candidates. With the same probability their hand moves onto the path.
 NEAR_PERSON, CANDIDATES = 0.5, 6
-#: The hand goes to a place between these fractions of the path, with this deviation [m], and stays
-#: there for this long [s].
+#: The hand moves to a place between these fractions of the path, with this standard deviation [m],
+#: and stays there for this time [s].
 HAND_FRACTION, HAND_DEVIATION, HAND_STAYS = (0.4, 1.0), 0.03, 0.6
-#: A target is at least this far from where the tool is [m].
+#: Least distance of a target from the tool [m].
 APART = 0.1
-#: Of a short arm tolerance and distance are these fractions of its reach.
+#: Tolerance and least distance for a short arm, as fractions of its reach.
 SHORT_TOLERANCE, SHORT_APART = 0.1, 0.33
 
 
 class Reach(Task):
-    """Reward: how much nearer the tool came [m], and 1 for a target; then comes the next one."""
+    """The reward is the decrease of the distance [m], and 1 for each target that is reached."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": ("person",)}
     terms: ClassVar[tuple[str, ...]] = ("progress", "target")
@@ -46,10 +46,10 @@ class Reach(Task):
         low, high = pose_box(batch.compiled.scene)
         each = len(low) // self.arms
         parts = [slice(arm * each, (arm + 1) * each) for arm in range(self.arms)]
-        #: An arm each: where its joints are in qpos, and the box of poses to draw from.
+        #: For each arm: addresses of its joints in qpos, and the box from which poses are drawn.
         self._poses = [(batch.compiled.scene.qpos_adr[p], low[p], high[p]) for p in parts]
         model = batch.compiled.scene.model
-        #: Of each region, None where it is held: addresses in qpos and qvel, span [m], speed [m/s].
+        #: For each region (None: held): addresses in qpos and qvel, span [m], speed [m/s].
         self._crossings = [
             (int(model.jnt_qposadr[r.joint]), int(model.jnt_dofadr[r.joint]), r.span, r.speed)
             if r.joint >= 0
@@ -64,11 +64,11 @@ class Reach(Task):
         self._lowest = layout.base[2] + min(LOWEST, height)
         self._nearest = min(NEAREST, away)
         self._apart = min(APART, SHORT_APART * layout.reach)
-        #: A target counts as reached this near [m].
+        #: Distance at which a target counts as reached [m].
         self.tolerance = min(TOLERANCE, SHORT_TOLERANCE * layout.reach)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
-        """Near home, regions anywhere on their lines, a new target."""
+        """Start near home, with regions anywhere on their lines and new targets."""
         batch = self.batch
         home = batch.compiled.scene.home
         batch.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
@@ -83,7 +83,7 @@ class Reach(Task):
         self.memory[i] = batch.metrics["distance"][i]
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
-        """Each at its speed towards the middle of its line, from its outer part."""
+        """Start each region in the outer part of its line, moving to the middle at its speed."""
         data = self.batch.datas[i]
         qpos, qvel = data.qpos, data.qvel
         for crossing in self._crossings:
@@ -93,7 +93,7 @@ class Reach(Task):
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, i: int, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
-        """A place [m] that the tool can reach, at least 0.1 m from ``apart``."""
+        """Draw a place [m] that the tool can reach, at least 0.1 m from ``apart``."""
         compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
@@ -109,11 +109,11 @@ class Reach(Task):
         return place
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
-        """Whether the task wants an arm's target at a place that its tool can reach."""
+        """Whether a reachable place may be the target of an arm in this task."""
         return True
 
     def aim_near_person(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
-        """The first arm's target near the person, or the person's hand on the path to it."""
+        """Put the first arm's target near the person, or the person's hand onto the path to it."""
         batch, data = self.batch, self.batch.datas[i]
         tool = tool_position(batch.compiled, data)
         behind, reaches = rng.random(2) < NEAR_PERSON
@@ -128,7 +128,7 @@ class Reach(Task):
             batch.plants[i].aim(place, HAND_STAYS)
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Progress and bonus; never over by itself. The memory is the last distance [m]."""
+        """Progress and bonus, without an end. The memory is the last distance [m]."""
         reached = step.distance < self.tolerance
         rewards = {"progress": memory - step.distance, "target": BONUS * reached}
         return Outcome(rewards, reached, step.distance)
@@ -145,12 +145,12 @@ class Reach(Task):
 
 
 class CarefulReach(Reach):
-    """Reach in which a touch costs: the peak force of each action, by its duration."""
+    """Reach in which contacts cost: the peak force of each action times its duration."""
 
     terms: ClassVar[tuple[str, ...]] = ("progress", "target", "contact")
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """As :class:`Reach`, less the force over :data:`CONTACT_FORCE`, at most 1, a second."""
+        """As :class:`Reach`, minus force over :data:`CONTACT_FORCE` (at most 1) per second."""
         outcome = super().score(step, memory)
         period = 1 / self.batch.compiled.settings.control_rate
         hard = step.force / CONTACT_FORCE

@@ -17,25 +17,24 @@ from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import BodyProxy, Person, Scene
 
-#: The path goes along y through the tool's place at home, from this far before it to this far
-#: behind it [m].
+#: The path goes along y through the tool's place at home; its lengths before and behind it [m].
 RUN_UP, BEYOND = 0.25, 0.25
-#: Upwards.
+#: The upward direction.
 UP = np.array([0.0, 0.0, 1.0])
-#: Radius of the ball that is hit, and of the last link around its tool, about [m].
+#: Approximate radii of the ball that is hit, and of the last link around its tool [m].
 BALL, LINK = 0.07, 0.05
 #: The path varies by this much across its direction [m].
 ASIDE = 0.02
-#: The path is done this near to its end [m]; the terms of the reward.
+#: Distance from the end at which the path is done [m]; weights of the terms of the reward.
 DONE, DONE_PRIZE, LIMIT_PRICE, IMPULSE_PRICE, TIME_PRICE = 0.03, 1.0, 1.0, 1.0, 0.1
 #: The region stands within this fraction of the run-up around the tool's place at home.
 WHERE = 0.5
-#: Steps of the inverse kinematics from home to the beginning of the path.
+#: Number of steps of the inverse kinematics from home to the start of the path.
 ROUNDS = 30
 
 
 class React(Task):
-    """Bring the tool to the path's end within the limits of who stands on it."""
+    """Bring the tool to the path's end within the force limits of the person on it."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": ("chest",)}
     terms: ClassVar[tuple[str, ...]] = ("progress", "done", "limit", "impulse", "time")
@@ -46,7 +45,7 @@ class React(Task):
         """Find the path.
 
         Raises:
-            ValueError: nobody is there.
+            ValueError: there is no body region.
         """
         super().__init__(batch)
         if not batch.compiled.regions:

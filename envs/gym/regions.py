@@ -1,4 +1,4 @@
-"""The body regions of a scene: limits, stiffness and speeds of what the arm may touch."""
+"""The body regions of a scene: their limits, stiffness and speeds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tauguard.models import BodyProxy, Person, Scene, SceneObject
 from tauguard.models.person import PersonPart
 from tauguard.models.scene import people_parts
 
-#: A region turns back this far from the middle of its line, in units of the reach.
+#: Distance from the middle of its line at which a region turns back, in units of the reach.
 SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
-#: Largest speed of a falling free object [m/s]: from a metre.
+#: Speed of a free object after a fall of one metre [m/s].
 FALL_SPEED = 4.5
 
 
@@ -48,7 +48,7 @@ class RegionInfo:
 
 
 def fastest(region: RegionInfo, people: tuple[Person, ...]) -> float:
-    """At which a region may meet the arm [m/s]."""
+    """Largest speed at which a region may meet the arm [m/s]."""
     if region.mocap < 0:
         return region.speed
     limb = region.name.endswith(("hand", "arm"))
@@ -56,7 +56,7 @@ def fastest(region: RegionInfo, people: tuple[Person, ...]) -> float:
 
 
 def regions_of(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
-    """The proxies, the person's, then the objects."""
+    """The regions of proxies, then of people, then of objects."""
     spec = scene.spec
     return (
         *(_region(scene, proxy, reach) for proxy in spec.proxies),
@@ -121,7 +121,7 @@ def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
 
 
 def _path_speed(obj: SceneObject) -> float:
-    """Largest speed along a path [m/s]; of a free object what it may fall with."""
+    """Largest speed along a path [m/s]; for a free object its speed after a fall."""
     if not obj.path:
         return FALL_SPEED if obj.motion == "free" else 0.0
     rows = np.array(obj.path)

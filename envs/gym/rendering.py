@@ -14,7 +14,7 @@ from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.second_arm import APART
 from tauguard.models.picture import FLOOR_HEIGHT, mark, opengl, staged
 
-#: Of a picture [px].
+#: Size of a picture [px].
 HEIGHT, WIDTH = 480, 640
 #: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
 SHOWN = (0, 1, 2)
@@ -23,7 +23,7 @@ SHADOW_REACH = 3.0
 
 
 def _need_display() -> None:
-    """A window on Linux without a display would end the process."""
+    """Refuse a window on Linux without a display, which would end the process."""
     if sys.platform == "linux" and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -58,7 +58,7 @@ class Stage:
         self.model.vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
 
     def look(self, camera: Any) -> None:
-        """From beside the first arm's front; two arms and people from the side: none hides one."""
+        """Place the camera beside a single arm's front, or at the side of two arms or people."""
         compiled, layout = self._world, self._world.layout
         reach = layout.reach
         if compiled.person is not None:
@@ -75,7 +75,7 @@ class Stage:
         camera.azimuth += np.degrees(layout.yaw)
 
     def follow(self) -> None:
-        """Take over the simulated state."""
+        """Copy the simulated state."""
         model, drawn = self.model, self.drawn
         for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
             getattr(drawn, name)[:] = getattr(self._data, name)

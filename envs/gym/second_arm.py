@@ -14,7 +14,7 @@ from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
 from tauguard.models.scene import _add_label, label_region, lean_model, people_parts, region_names
 
-#: The second arm stands so far ahead of the first [m] and faces it.
+#: Distance of the second arm ahead of the first, which it faces [m].
 APART = 1.1
 #: Sensor of the force between the arms.
 ARMS = "contact_arms"
@@ -104,7 +104,7 @@ def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
 
 
 def both_drives(drive: Drive) -> Drive:
-    """The drives of both arms: every row that belongs to a joint twice."""
+    """The drives of both arms: the numbers of every joint, twice."""
     parts: dict[str, object] = {}
     for field in fields(drive):
         value = getattr(drive, field.name)

@@ -1,4 +1,4 @@
-"""A detector in the loop of an environment, which gets the measured signals sample by sample."""
+"""A detector in the loop of an environment; it reads the measured signals sample by sample."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from tauguard.models.left_over import Player
 FRICTION_FACTOR, TORQUE_FACTOR = 1.5, 0.03
 #: An arm without torque limits gets this threshold [N m].
 PLAIN_THRESHOLD = 5.0
-#: A trained detector's residual may be so many standard deviations without contact.
+#: Largest residual of a trained detector without contact, in standard deviations.
 SIGMAS = 3.0
 #: Slope of the nominal friction around standstill [rad/s].
 STANDSTILL = 0.05
-#: A joint this near to an end of its range, or beyond it, may feel its stop [rad].
+#: Distance from an end of its range within which a joint may touch its stop [rad].
 MARGIN = 0.005
-#: The residual has forgotten a stop after so many of the observer's time constants.
+#: Time until a stop no longer shows in the residual, in time constants of the observer.
 FORGOTTEN = 15.0
 
 
 class Listener(Protocol):
-    """A detector in one copy of an environment; it begins anew when it is made."""
+    """A detector in one copy of an environment, made anew for each episode."""
 
     @property
     def name(self) -> str:
@@ -51,11 +51,11 @@ class Listener(Protocol):
 
     @property
     def fault(self) -> str:
-        """What is wrong with the samples of the last :meth:`steps`, "" for nothing."""
+        """The fault of the samples of the last :meth:`steps`; "" if there is none."""
 
     @property
     def settle(self) -> float:
-        """Seconds after a reset without an alarm."""
+        """Time after a reset in which no alarm is given [s]."""
 
     @property
     def bounds(self) -> Array:
@@ -66,15 +66,15 @@ class Listener(Protocol):
         ...
 
     def get_state(self) -> Any:
-        """What it remembers, for :meth:`set_state`."""
+        """Its state, for :meth:`set_state`."""
         ...
 
     def set_state(self, state: Any) -> None:
-        """Go back to what :meth:`get_state` gave."""
+        """Restore what :meth:`get_state` returned."""
 
 
 class ObserverListener:
-    """The momentum observer with fixed thresholds: nothing is trained, so any arm can have it.
+    """The momentum observer with fixed thresholds. It needs no training, so it fits any arm.
 
     The nominal Coulomb and viscous friction is compensated; the static friction decides the
     threshold. A trained detector is several times as sensitive.
@@ -101,7 +101,7 @@ class ObserverListener:
             drive: nominal drive.
             dt: sample interval of the samples [s].
             gain: gain of the observer [1/s].
-            ranges: of the joints [rad], (n, 2): a joint at an end of its range feels its stop.
+            ranges: joint ranges [rad], (n, 2); a joint at an end of its range touches its stop.
         """
         self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
@@ -198,10 +198,10 @@ class AlarmListener:
 
 
 class PerArm:
-    """One listener an arm, for scenes with several; joints of the arms follow one another."""
+    """One listener for each arm of a scene with two arms, whose joints are in sequence."""
 
     def __init__(self, parts: Sequence[Listener]) -> None:
-        """Take one of each arm, in order."""
+        """Take the listeners of the arms, in order."""
         self._parts = parts
         self.name, self.settle = parts[0].name, max(part.settle for part in parts)
         self.fault = ""
@@ -229,10 +229,10 @@ class PerArm:
 
 
 def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
-    """Find what makes a detector for each copy of ``compiled``: a name, a model file, an alarm.
+    """A function that makes the detector of a copy, from a name, a model file or an alarm.
 
     Raises:
-        ValueError: nothing that can detect, or a model file of another arm.
+        ValueError: ``wanted`` is no detector, or a model file of another arm.
     """
     if wanted is None:
         return None
@@ -287,13 +287,13 @@ def _arms(compiled: CompiledScene) -> list[tuple[RobotNumbers, Drive]]:
 
 
 class Sensing:
-    """The sensors of one copy of a compiled, and the detector that listens to them.
+    """The sensors of one copy of a compiled scene, and the detector that reads them.
 
     Attributes:
         measured: q, qd and current at every physics step of the last action, (substeps, n) each.
         residuals: of the detector [N m], shape (substeps, n).
         alarms: shape (substeps,).
-        sensors: what measures; None: without errors.
+        sensors: model of the sensors; None: without errors.
     """
 
     def __init__(self, compiled: CompiledScene, make: Callable[[], Listener] | None) -> None:
@@ -320,12 +320,12 @@ class Sensing:
 
     @property
     def settle(self) -> float:
-        """The detector is silent for this long after a reset [s]."""
+        """Time after a reset in which the detector gives no alarm [s]."""
         return self.detector.settle if self.detector else 0.0
 
     @property
     def fault(self) -> str:
-        """What is wrong with what the sensors measured in the last action, "" for nothing."""
+        """The fault of the samples of the last action; "" if there is none."""
         return self.detector.fault if self.detector else ""
 
     @property
@@ -336,7 +336,7 @@ class Sensing:
     def measure(
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
     ) -> tuple[Array, Array, Array]:
-        """What the sensors say of true signals, shape (substeps, n) each."""
+        """Measured signals from true ones, shape (substeps, n) each."""
         self.measured = (q, qd, current)
         if self.sensors is not None:
             self._player = self._player or self.sensors.player(self._dt, rng)

@@ -26,9 +26,9 @@ from tauguard.models import (
 )
 from tauguard.models.scene import INTEGRATORS
 
-#: Control modes, in the native order; their units stand in :mod:`tauguard.envs.gym.actions`.
+#: Control modes in the native order; :mod:`tauguard.envs.gym.actions` states their units.
 CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian")
-#: Kinds of the keywords that are no words, and what an error says of them.
+#: Types of the keywords that are not strings, and the text of their errors.
 _SEVERAL = "one, or a tuple of them"
 _KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("timestep", "control_rate", "payload_g"), (Real, "a number")),
@@ -52,23 +52,23 @@ class Settings:
     Attributes:
         control: one of :data:`CONTROLS`.
         control_rate: actions a second [Hz].
-        timestep: of the physics [s].
-        integrator: of the physics.
+        timestep: time step of the physics [s].
+        integrator: integrator of the physics.
         robot: a name, a file or a robot, see ``tauguard robot``.
-        payload_g: carried, not told to controller and observer [g].
-        mismatch: of the simulated against the nominal arm; a number is a seed.
-        obstacles: "person", names of body regions, or such objects placed by hand [m].
+        payload_g: load at the flange, unknown to controller and observer [g].
+        mismatch: difference between the simulated and the nominal arm; a number is its seed.
+        obstacles: "person", names of body regions, or objects of :class:`BodyProxy`, `Person`.
         table: a board that the arm can touch.
         cloth: a hanging cloth.
-        objects: things of your own, or the TOML file that lists them.
+        objects: objects of your own, or the TOML file that lists them.
         detector: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``.
         checkers: names of contact checkers that watch every physics step.
         labels: contact sensors; without them force, cost and tau_ext stay 0.
         noise: observe measured instead of true positions, velocities and currents.
         ideal_drive: no friction, ripple, lag or sensor errors.
-        max_speed: of every joint [rad/s]; default: the arm's own, else 2.
-        randomize: what is drawn each episode, see :mod:`tauguard.envs.gym.randomization`.
-        contact_area: of the robot's contact surface [cm^2], if known.
+        max_speed: largest speed of every joint [rad/s]; default: the arm's own, else 2.
+        randomize: quantities drawn in each episode, see :mod:`tauguard.envs.gym.randomization`.
+        contact_area: area of the robot's contact surface [cm^2], if known.
     """
 
     control: str = "joint_velocity"
@@ -132,12 +132,12 @@ class Settings:
 
     @property
     def substeps(self) -> int:
-        """Physics steps an action."""
+        """Number of physics steps per action."""
         return round(1 / (self.control_rate * self.timestep))
 
     @classmethod
     def from_keywords(cls, defaults: Mapping[str, Any], given: Mapping[str, Any]) -> Settings:
-        """An environment's own defaults with the user's keywords over them.
+        """The settings of an environment: its defaults, replaced by the user's keywords.
 
         Raises:
             ValueError: a keyword that does not exist; the message lists those that do.

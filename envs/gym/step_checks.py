@@ -14,7 +14,7 @@ from tauguard.envs.gym.compiled import CompiledScene
 
 
 class StepChecks:
-    """The checkers of one copy of a compiled.
+    """The checkers of one copy of a compiled scene.
 
     Attributes:
         counts: how many pairs of geoms or flexes each checker reported during the last action,

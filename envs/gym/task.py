@@ -1,4 +1,4 @@
-"""What a task defines, and how an environment with it is arranged."""
+"""The interface of a task, and the construction of its scene."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tauguard.envs.gym.compiled import CompiledScene, compile_scene
 from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
 from tauguard.envs.gym.settings import Settings
 
-#: Beginnings of an episode that are drawn until the arm touches nothing.
+#: Largest number of initial states that are drawn to find one without contact.
 BEGINNINGS = 100
-#: Seeds of the beginnings by which a scene is arranged; of another arm than the package's own at
-#: most so many may be drawn again.
+#: Number of seeds with which the places of things are tested. With an arm that is not part of the
+#: package, at most ``DRAWN_AGAIN`` of the initial states may overlap a thing that can be moved.
 ARRANGED, DRAWN_AGAIN = 12, 1
 
 
@@ -32,7 +32,7 @@ class Task(Usual):
 
     #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
     defaults: ClassVar[dict[str, Any]] = {}
-    #: How many arms the scene has.
+    #: Number of arms in the scene.
     arms: ClassVar[int] = 1
     #: Keywords of the task itself, with their defaults.
     options: ClassVar[dict[str, Any]] = {}
@@ -49,7 +49,7 @@ class Task(Usual):
         self.memory = np.zeros(batch.rows)
 
     def __repr__(self) -> str:
-        """The task and what it runs in."""
+        """The task and its batch."""
         return f"{type(self).__name__}({self.batch!r})"
 
     def start(self, i: int, rng: np.random.Generator) -> None:
@@ -57,19 +57,19 @@ class Task(Usual):
         raise NotImplementedError
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Judge a step; the same arithmetic for one copy and for arrays of all gives equal bits.
+        """Compute rewards and success of a step, for one copy or for arrays of all.
 
         Args:
             step: the result of the action.
-            memory: what the last step, or :meth:`start`, left.
+            memory: the value that the last step, or :meth:`start`, stored.
         """
         raise NotImplementedError
 
     def begin(self, i: int, rng: np.random.Generator) -> None:
-        """Begin an episode of copy ``i`` in which the arm touches nothing at first.
+        """Begin an episode of copy ``i`` without an initial contact of the arm.
 
         Raises:
-            StartsInContact: no such beginning was found.
+            StartsInContact: no such initial state was found.
         """
         for _ in range(BEGINNINGS):
             try:
@@ -79,14 +79,14 @@ class Task(Usual):
         raise refused
 
     def after(self, i: int, rng: np.random.Generator) -> None:
-        """What follows a success of copy ``i``, before its observation is shown."""
+        """Prepare what follows a success of copy ``i``; its next observation shows it."""
 
     def get_state(self) -> Any:
         """The state of the task besides :attr:`memory`."""
         return None
 
     def set_state(self, state: Any) -> None:
-        """Go back to what :meth:`get_state` gave."""
+        """Restore what :meth:`get_state` returned."""
 
 
 def build(
@@ -117,7 +117,10 @@ def build(
 
 
 def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
-    """What the arm overlaps in beginnings: kinds in ``strict`` in few, others in all of a seed."""
+    """The first overlap that occurs too often in initial states, or None.
+
+    A kind in ``strict`` may be overlapped :data:`DRAWN_AGAIN` times, another until no draw is left.
+    """
     missed = 0
     for seed in range(ARRANGED):
         rng = np.random.default_rng(seed)
@@ -133,7 +136,7 @@ def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
 
 
 def _movable(settings: Settings, default: frozenset[str], task_type: type[Task]) -> set[str]:
-    """Kinds of things that the environment places itself."""
+    """Kinds of things whose place the environment chooses."""
     kinds = set(default & {"table", "cloth"})
     kinds |= {item for item in settings.obstacles if isinstance(item, str)}
     return kinds | ({"second arm"} if task_type.arms == 2 else set())

@@ -1,4 +1,4 @@
-"""Whether an arm can be used in every environment: overlaps, forces and divergences of episodes."""
+"""Try an arm in every environment: overlaps, forces and divergences of episodes."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class ArmTrial:
     force: float  #: largest on a link [N]
     bound: float  #: largest that the arm can exert [N]
     diverged: int  #: episodes
-    still: int  #: episodes in which standing still succeeds
-    moved: dict[str, float]  #: things that were placed farther from the arm, and by how much [m]
+    still: int  #: episodes in which an arm that stands still succeeds
+    moved: dict[str, float]  #: things placed farther from the arm, and how far [m]
     refused: str = ""  #: why there is no such environment
 
     @property
     def passed(self) -> bool:
-        """Nothing is wrong."""
+        """Whether nothing is wrong."""
         return not (self.refused or self.overlaps or self.diverged) and self.force <= self.bound
 
 
@@ -43,8 +43,8 @@ def try_arm(robot: str | Robot, episodes: int = 10, seed: int = 0) -> list[ArmTr
 
     Args:
         robot: as the keyword ``robot`` of an environment.
-        episodes: of each environment.
-        seed: of the first episode.
+        episodes: number of episodes in each environment.
+        seed: seed of the first episode.
 
     Raises:
         ValueError, FileNotFoundError: no arm at all.

@@ -16,27 +16,27 @@ from tauguard.models import Person, Scene, Table
 
 #: A person's distance from the line between the arms, in units of the reach.
 BESIDE = 0.75
-#: Targets of TwoArms-v1: the first this near to the middle between the arms, and the distance of
-#: the second from it [m].
+#: Largest distance of the first target from the middle between the arms, and distances between
+#: which the second one lies from it [m].
 MIDDLE, GAP = 0.15, (0.15, 0.35)
-#: Between the arms, low enough to work above.
+#: The table between the arms, below their workspace.
 BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
 
 
 class TwoArms(CarefulReach):
-    """Both targets close to one another, in the part of the workspace that the arms share."""
+    """Both targets are close to each other, where both arms can reach."""
 
     arms: ClassVar[int] = 2
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
 
     @classmethod
     def person(cls, bare: Scene, layout: Layout) -> Person:
-        """Beside the table, looking at it."""
+        """A person beside the table who looks at it."""
         middle, beside = layout.apart(APART) / 2, max(BESIDE * layout.reach, 0.6)
         return layout.someone(middle, -beside, np.pi / 2)
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
-        """The first arm's in the middle, the second's near to it."""
+        """Whether the place is in the middle (first arm) or near the first target (second arm)."""
         layout = self.batch.compiled.layout
         if arm == 0:
             middle = layout.apart(APART) / 2
@@ -77,7 +77,7 @@ class TwoArmsEnv(ArmEnv):
 
     | term | value |
     |---|---|
-    | progress | how much less far the farther tool is from its target [m] |
+    | progress | decrease of the larger of both distances [m] |
     | target | 1 when both are within 3 cm; then come the next targets |
     | contact | -1 for each second at 100 N or more on a link, less force less |
     """

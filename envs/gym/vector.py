@@ -1,4 +1,4 @@
-"""Many copies of an environment at once, on threads, each with the bits of a single one."""
+"""Many copies of an environment, stepped on threads, with the bits of single ones."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from tauguard.envs.gym.task import Task, build
 class VectorArmEnv(VectorEnv[Array, Array, Array]):
     """``num_envs`` copies of an :class:`tauguard.envs.gym.base.ArmEnv`, stepped on a thread pool.
 
-    Bit for bit what the single environments give, for any number of threads. The scene is compiled
-    once and shared. Finished copies begin a new episode at the next step
+    Results equal those of single environments bit for bit, for any number of threads. The scene is
+    compiled once and shared. Finished copies begin a new episode at the next step
     (``AutoresetMode.NEXT_STEP``) or in the same one (``SAME_STEP``), as ``autoreset_mode`` says.
     """
 
@@ -53,10 +53,10 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         Args:
             num_envs: how many copies.
             max_episode_steps: an episode is truncated after so many actions.
-            threads: 0 takes all processors; the result does not depend on it.
+            threads: number of threads; 0 means all processors. The result does not depend on it.
             autoreset_mode: "NextStep", "SameStep" or "Disabled".
-            render_mode: as of the single environment; the first copy is shown.
-            **keywords: as of the single environment.
+            render_mode: as for the single environment; the first copy is shown.
+            **keywords: as for the single environment.
         """
         if num_envs < 1:
             raise ValueError(f"num_envs {num_envs}: expected 1 or more")
@@ -84,9 +84,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         """Begin all episodes, or those that ``options["reset_mask"]`` chooses.
 
         Args:
-            seed: of copy i: ``seed + i``, or entry i of a list.
-            options: ``reset_mask``, a bool array of shape (num_envs,), and values for these
-                episodes of what the keyword ``randomize`` names.
+            seed: copy i gets ``seed + i``, or entry i of a list.
+            options: ``reset_mask``, a bool array of shape (num_envs,), and values by name that
+                replace the draws of ``randomize`` in these episodes.
         """
         stated = {key: value for key, value in (options or {}).items() if key != "reset_mask"}
         try:
@@ -125,7 +125,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def step(  # type: ignore[override]
         self, actions: ArrayLike
     ) -> tuple[Array, Array, Bools, Bools, dict[str, Any]]:
-        """Act in every copy.
+        """Apply one action to every copy.
 
         Raises:
             ValueError: actions of another shape, or with entries that are not finite.
@@ -172,7 +172,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return batch.observation.copy(), rewards, terminated, truncated, infos
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """SAME_STEP: finished copies begin again; their last values go into ``final_`` keys."""
+        """Restart finished copies (SAME_STEP); their last values go into ``final_`` keys."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
@@ -230,7 +230,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return infos | {f"_{key}": shown for key in infos}
 
     def render(self) -> Any:
-        """Pictures of the first copy, one a call."""
+        """A picture of the first copy, as a tuple."""
         if self.render_mode is None:
             return None
         if self._picture is None:

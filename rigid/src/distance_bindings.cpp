@@ -1,5 +1,5 @@
-// Distances, overlap and first contact of convex bodies, grown by balls or not, with each other and
-// with meshes, in tauguard.rigid._rigid_mesh. Arguments are checked in Python.
+// Bindings of tauguard.rigid._rigid_mesh: distance, overlap and first contact of convex bodies,
+// with or without radii, with each other and with meshes. Arguments are checked in Python.
 #include "bodies_binding.hpp"
 #include "mesh_body.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"

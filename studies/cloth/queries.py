@@ -34,11 +34,13 @@ ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
 EARLY = 1e-9  #: target of the largest error of a time [step]
 
 NOTES = {
-    "query": "candidates of ipctk's broad phase on one frame (n of so many). ns: a query. misses "
-    "and false_hits beside ab2pf, whose hits on recorded frames are the listed ones. late: times "
-    "after the exact one; toi_error_most: as a fraction of the step.",
-    "query peer": "ns, ab2pf_ns: a query without contact; all_ns: the mix with hits. misses, "
-    "false_hits, times: of the queries that it was asked from Python; us_a_hit: for a hit.",
+    "query": "candidates of ipctk's broad phase on one frame (n of them). ns: time of a query. "
+    "misses, false_hits: differences from ab2pf, whose hits on recorded frames equal the listed "
+    "ones. late: times of impact after the exact one; toi_error_most: largest error, as a "
+    "fraction of the step.",
+    "query peer": "ns, ab2pf_ns: time of a query without contact; all_ns: time in the mix with "
+    "hits. misses, false_hits and errors are of the queries asked one by one from Python; "
+    "us_a_hit: time of a hit.",
     "hard query": "n public queries with exact labels. us: a query; decided_exactly: by exact "
     "arithmetic.",
 }

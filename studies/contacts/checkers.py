@@ -25,13 +25,15 @@ QUICK_SECONDS = dict(arm_cloth=0.35, sleeve_arm=0.3, garment_chest=0.45) | dict.
 )
 
 NOTES = {
-    "scenes": "recall: of the true contacts, steps_recall: of the steps with contact, precision: "
-    "of the checker's reports. lead_ms: before MuJoCo's first contact; first_error_ms: beside "
-    "the first contact of MuJoCo in steps 50 times shorter (quick: 10). over_mj_step: of the time. "
-    "not_generated, not_held: contacts that MuJoCo did not list, or did not hold.",
-    "crossing": "starts spread over one step's travel. mujoco_generates: it lists a contact; "
-    "mujoco_holds: and the ball does not tunnel; cloth_time_error [s]: beside the closed form.",
-    "cost": "what a checker adds to a step; state_us: the copy of the state that it needs.",
+    "scenes": "recall: fraction of true contacts found; steps_recall: fraction of steps with "
+    "contact found; precision: fraction of reports that are true. lead_ms: lead over MuJoCo's "
+    "first contact; first_error_ms: difference from MuJoCo with steps 50 times shorter (quick: "
+    "10). over_mj_step: time over mj_step's. not_generated, not_held: contacts that MuJoCo did "
+    "not list, or did not hold.",
+    "crossing": "balls that start at points spread over one step's travel. mujoco_generates: "
+    "MuJoCo lists a contact; mujoco_holds: it also stops the ball; cloth_time_error [s]: "
+    "difference from the closed form.",
+    "cost": "time that a checker adds to a step; state_us: copying the state that it needs.",
 }
 
 

@@ -51,14 +51,15 @@ _ALARMS = (
 NOTES = {
     "link": "rates " + _ALARMS + "Missed collisions are not in it.",
     "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
-    "kind": "counts: a row a true kind, a column what was said of it. All are simulated, pushes "
-    "too: no person made one.",
-    "payload": "loads unknown to the detector, taken up and put down. mass_error_g: median, of "
-    "those not called a collision.",
-    "severity": "how often the interval that is to hold 90 % of the true values does, of the "
-    "collisions that raised an alarm; width: median of the upper end over the lower one; "
-    "identifiable: that factor is 6 or less. Impulse [N s] and peak force [N] of the window.",
-    "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
+    "kind": "counts: one row for each true kind, one column for each diagnosed kind. Everything "
+    "is simulated, pushes included: no person made one.",
+    "payload": "loads that are picked up and put down, unknown to the detector. mass_error_g: "
+    "median error of those not diagnosed as a collision.",
+    "severity": "how often the 90 % interval holds the true value, of the collisions that raised "
+    "an alarm. width: median ratio of its upper to its lower end; identifiable: fraction with a "
+    "ratio of 6 or less. Impulse [N s] and peak force [N] of the window.",
+    "cost": "wall time of the diagnosis of one alarm; aftermath_us: the part that computes the "
+    "residual around it.",
 }
 
 

@@ -58,11 +58,12 @@ NOTES = {
     "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms an hour; "
     "alarms_per_hour: what came of it in so many hours. Delays from the touch [ms]. tau98: the "
     "least torque above which 98 % are found [N m], by speed.",
-    "strata": "found of all, by torque [N m]; what is below 4 N m counts in no other rate.",
+    "strata": "collisions found of all, by torque [N m]; collisions below 4 N m count in no "
+    "other rate.",
     "dissertation": "TP, FN, FP, TN printed for a real arm beside ours for simulated ones: the "
     "same experiment, not the same collisions. Sensitivities are of all from 4 N m up.",
-    "conditions": "what training did not have, at the third point, one speed and arm; nothing is "
-    "learnt anew.",
+    "conditions": "conditions that training did not have, at the third operating point, for one "
+    "speed and arm; nothing is trained again.",
     "headline": "sensitivity / specificity of the best detector (one for all cells) and of SVR-SRQ "
     "beside the dissertation's SVR. met: both rates of the best reach 0.98, and both of SVR-SRQ's "
     "the dissertation's.",

@@ -41,8 +41,8 @@ NOTES = {
     "MuJoCo's own rollout of the bare arm in the same run. difference_to_online: of the scores, "
     "largest.",
     "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "
-    "[us]; over_a_period: of its samples, those that took over 1 ms; difference_to_batch: of the "
-    "scores, largest.",
+    "[us]; over_a_period: number of samples that took over 1 ms; difference_to_batch: largest "
+    "difference of the scores.",
     "kernel": "one window of the SVR alone: all support vectors, then ever fewer. The peer is "
     "scikit-learn's predict with its kernel row by NumPy, less than its own callable kernels do. "
     "error: of the output, beside all vectors. What fewer vectors cost in missed collisions is not "

@@ -45,12 +45,12 @@ AIMED, GUARANTEED = "aimed at", "guaranteed"
 
 #: What the columns of the table mean.
 NOTES = {
-    "false alarms": "thresholds from each arm's calibration motion for asked false alarms per "
-    "hour: aimed at, as `train` chooses them, or guaranteed with 95 % confidence (conformal). "
-    "found: in these arms' fresh motion together, with its exact 95 % interval; kept: fraction of "
-    "the arms whose own interval reaches down to asked; refused: arms whose calibration is too "
-    "short for the guarantee. sensitivity from 16 N m up and of all from 4 N m up; delays of the "
-    "former [ms].",
+    "false alarms": "thresholds from each arm's calibration motion for a requested rate of false "
+    "alarms per hour: aimed at, as `train` chooses them, or guaranteed with 95 % confidence "
+    "(conformal). found: rate in other motion of all these arms, with its exact 95 % interval; "
+    "kept: fraction of the arms whose own interval begins at or below the requested rate; refused: "
+    "arms whose calibration is too short for the guarantee. sensitivity from 16 N m up and of "
+    "all from 4 N m up; delays of the former [ms].",
 }
 
 

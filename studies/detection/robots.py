@@ -28,10 +28,10 @@ ASKED = 1.0
 ROBOTS = ",".join(NAMED)
 
 NOTES = {
-    "robot": "One individual of each robot, thresholds from its own motion for one false alarm an "
-    "hour. share: of the CURA6-like arm's largest torque limit, at most 1; payloads and torques "
-    "are smaller by it. sensitivity: of the collisions from 16 N m times share up; all: from 4 N m "
-    "times share up. Delays of the former [ms]."
+    "robot": "one individual of each robot, with thresholds from its own motion for one false "
+    "alarm an hour. share: the robot's largest torque limit over the CURA6-like arm's, at most "
+    "1; payloads and torques are multiplied by it. sensitivity: of the collisions from 16 N m "
+    "times share up; all: from 4 N m times share up. Delays of the former [ms].",
 }
 
 FULL = Size(1, NAMES, (ASKED,), Training(free=10), 0.3, 0.4, 1)

@@ -52,11 +52,10 @@ SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
 ANSWERS = 120.0
 
 NOTES = {
-    "listen": "a simulated arm with collisions, played in real time, all rates at once. events: "
-    "lines about the connection. alike: share of the alarms of `detect` on the file that begin at "
-    "the same sample. silent or late: stretches of fault that begin so, as other programs of the "
-    "machine ran. Times in us from the "
-    "packet's arrival to the answer.",
+    "listen": "a simulated arm with collisions, played in real time at all rates at once. "
+    "events: lines about the connection. alike: fraction of the alarms of `detect` on the file "
+    "that begin at the same sample. silent or late: faults with these reasons, because other "
+    "programs were running. Times in us from the packet's arrival to the answer.",
 }
 
 

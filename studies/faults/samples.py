@@ -36,11 +36,12 @@ LASTS, AFTER = 1.0, 2.5
 #: Faults that a sample and its neighbours show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {
-    "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
-    "faults": "a fault of 1 s at random moments and at collisions; delays in ms from its first "
-    "sample. silent_s: the answer is free. missed: collisions within faults with no answer but "
-    "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
-    "share of its later collisions that are found after the recovery.",
+    "clean": "unchanged logs: seconds in the state fault, all of them false, and alarms beside "
+    "those of `detect`.",
+    "faults": "a fault of 1 s at random moments and at collisions; delays [ms] from its first "
+    "sample. silent_s: time in the state free. missed: collisions within a fault during which "
+    "the state stayed free; of_struck: collisions that the same samples show without the fault. "
+    "found_after: fraction of later collisions that are found after the recovery.",
 }
 
 

@@ -50,12 +50,13 @@ STRONG = 20.0
 #: The currents are compared with those of this time before a push [s].
 BEFORE = 0.1
 NOTES = {
-    "force": "at the tool, told by --at-tool; low, high: 90 % interval; sensor: while the "
-    "diagnosis looks, 0.1 s before to 0.3 s after the alarm. Joints that move by themselves after "
-    "a push raise alarms without a force, which have no row.",
-    "pushed twin": "change of the drives' torques at the sensor's peak, of the three joints with "
-    "the largest [N m]; missed: norm of the difference over that of the arm's; fitted: the "
-    "sensor's rotation comes from this push, so only the other rows are a test.",
+    "force": "pushes at the tool, with --at-tool; low, high: 90 % interval; sensor: peak from "
+    "0.1 s before to 0.3 s after the alarm, the diagnosis's window. Joints that move by "
+    "themselves after a push raise alarms without a force, which have no row.",
+    "pushed twin": "change of the drives' torques at the sensor's peak, for the three joints "
+    "with the largest change [N m]; missed: norm of the difference over the norm of the arm's "
+    "change; fitted: the sensor's rotation was fitted to this push, so only the other rows are a "
+    "test.",
     "errors": "median of |found / sensor - 1|, and of what the pushed twin missed.",
 }
 

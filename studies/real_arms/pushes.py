@@ -49,7 +49,8 @@ SHIFTS = 200
 #: Lower torque thresholds of libfranka's examples [N m].
 FRANKA = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])
 NOTES = {
-    "pushes": "found of pushes by an alarm from 0.15 s before the start to the peak of the force.",
+    "pushes": "pushes that are found: an alarm starts between 0.15 s before the push and the "
+    "peak of its force.",
     "false alarms": "per hour of collision-free logs that training has not seen, and of the rest "
     "of logs with touches; 95 % interval.",
 }

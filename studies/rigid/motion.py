@@ -22,10 +22,10 @@ from tauguard.report import Row
 from tauguard.rigid import Impacts, time_of_impact
 
 NOTES = {
-    "time of impact": "bodies about 2 m apart that move by up to 2 m and turn by less than half a "
-    "turn. us_hit, us_miss: a pair that touches, that stays apart; coal's are its distance calls "
-    "alone. The errors are against a bracket of the first contact; undecided: pairs that come "
-    "closer than the bracket can tell.",
+    "time of impact": "bodies about 2 m apart that move by up to 2 m and turn by less than half "
+    "a turn. us_hit, us_miss: time for a pair that touches, and that stays apart; coal's are its "
+    "distance calls alone. Errors are relative to a bracket of the first contact; undecided: "
+    "pairs whose distance is below the bracket's resolution.",
     "motion of bodies with radii": "both turn; times as above. met_before: "
     "pairs that coal says meet before the time found; distance_at_toi: coal's largest at that time "
     "[m]; coal_disagrees: hits that differ (it stops at 1e-6 m).",

@@ -23,9 +23,10 @@ from tauguard.rigid.comparators import VOLUMES
 from tauguard.rigid.queries import native_overlap
 
 NOTES = {
-    "figure 1.1 volumes": "us a body to build and to update, ns a test of a pair. tightness: "
-    "volume over the hull's, median; false_hits: of the pairs whose hulls are apart, those that "
-    "the volumes cannot tell apart; missed: of the pairs whose hulls meet.",
+    "figure 1.1 volumes": "us to build and to update a body's volume, ns to test a pair. "
+    "tightness: volume over that of the hull, median; false_hits: fraction of pairs with "
+    "separate hulls whose volumes overlap; missed: fraction of pairs with overlapping hulls "
+    "whose volumes are apart.",
 }
 
 

@@ -33,10 +33,11 @@ NOTES = {
     "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
     "alone: physics without drives, observations or rewards; q_difference_rad: of its copies from "
     "mj_step of one. Means little on a loaded machine.",
-    "reaction": "swings into the chest, median [least, most] over them; false_alarms: swings with "
-    "an alarm before the contact, left out of the rest. delay_s: from the contact to the reaction; "
-    "stopping_distance_m, end_m: of the tool from where it touched; force_over_limit: of the "
-    "standard's for a transient contact. Known from the contact: no detector is as fast.",
+    "reaction": "swings into the chest, median [least, most]. false_alarms: swings with an alarm "
+    "before the contact, which are left out of the rest. delay_s: from the contact to the "
+    "reaction; stopping_distance_m, end_m: distance of the tool from where it touched; "
+    "force_over_limit: peak force over the standard's limit for a transient contact. A reaction "
+    "that knows the contact itself bounds what any detector can do.",
 }
 
 

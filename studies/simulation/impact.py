@@ -17,13 +17,13 @@ from tauguard.report import Row
 
 TIMESTEPS = (2.5e-4, 5e-4, 1e-3, 2e-3)
 NOTES = {
-    "rail": "a mass on a rail against each region; errors are fractions of the two-mass model's "
-    "closed form, the worst of the regions; energy_error: of the energy that the spring stores. "
-    "direct: the stiffness is given to MuJoCo as such.",
-    "arm": "a link hits a region at 0.25 m/s. inertial_peak_n: without drives; predicted_n: "
-    "by its reflected mass, error: between both; standard_n: by half the moving mass and the load; "
-    "driven_peak_n: under position control, which neither predicts. The regions are the standard's "
-    "springs, not tissue.",
+    "rail": "a mass on a rail hits each region. Errors are fractions of the closed form of the "
+    "two-mass model, for the worst region; energy_error: of the energy stored in the spring. "
+    "direct: MuJoCo gets the stiffness directly.",
+    "arm": "a link hits a region at 0.25 m/s. inertial_peak_n: without drives; predicted_n: from "
+    "its reflected mass, error: difference of both; standard_n: from half the moving mass and "
+    "the load; driven_peak_n: under position control, which neither predicts. The regions are "
+    "the standard's springs, not tissue.",
 }
 
 

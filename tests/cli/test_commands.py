@@ -91,7 +91,7 @@ def test_of_a_folder_of_recordings_the_newest_is_shown(tmp_path, capsys):
         file.touch()
         os.utime(file, (time, time))
     assert newest(tmp_path) == tmp_path / "c.mcap"
-    assert "3 recordings; shown is the newest, c.mcap" in capsys.readouterr().out
+    assert "3 recordings; showing the newest, c.mcap" in capsys.readouterr().out
     (tmp_path / "index.html").touch()
     assert newest(tmp_path) == tmp_path
 

@@ -25,7 +25,7 @@ COMMANDS = {
     "robot": "what is known and assumed about an arm, number by number",
     "simulate": "labelled episodes of the arm at work, as many as asked",
     "train": "a detector from labelled recordings",
-    "evaluate": "a detector's figures on labelled recordings",
+    "evaluate": "a detector's metrics on labelled recordings",
     "watch": "an environment live in the rerun viewer",
     "listen": "a detector beside a running robot, read-only: free, collision or fault",
     "play-ur": "play a log as a UR controller would send it, to test against",

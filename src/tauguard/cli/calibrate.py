@@ -39,29 +39,28 @@ def command(
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
 
-    Currents tell torques only up to a factor a joint. Its scale comes from --gains (or a preset's)
-    if there are any, else from a log with a known --payload, else from the robot file's masses; the
-    output says which. Each log is also predicted by a calibration from the others.
+    Currents determine torques only up to one factor for each joint. The factors come from --gains
+    or a preset if given, else from a log with a known --payload, else from the robot file's masses;
+    the output says which. Each log is also predicted by a calibration from the other logs.
 
     Args:
-        logs: CSV or MCAP files, or a folder of them; 10 s of motion are the least, two minutes are
-            good.
+        logs: CSV or MCAP files, or a folder of them; at least 10 s of motion, better two minutes.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
         columns: columns of CSV files: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto, or a
             JSON file (see `tauguard detect`).
-        gains: N m per ampere, one a joint.
+        gains: N m per ampere, one number for each joint.
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
-            m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are taken as
-            without a load.
-        scale: what fixes the scale of the torques.
-        torque: the logs hold joint torques in N m where they would hold currents, as ROS 2 efforts
-            may; a column map says so by its field "torque".
-        accept: write the file although a log has torque in bursts as of contacts (alarms), a joint
-            is further off what the other logs predict than its friction (error), or gravity's
-            torques are not those of the robot file (gravity).
+            m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are assumed to
+            have no load.
+        scale: source of the scale of the torques.
+        torque: the logs hold joint torques in N m instead of currents, as ROS 2 efforts may; a
+            column map states this by its field "torque".
+        accept: write the file although a check fails. alarms: a log has bursts of torque, as
+            contacts cause them. error: the error of a joint's prediction exceeds its friction.
+            gravity: gravity's torques differ from those of the robot file.
         reading: how logs are read.
-        json: write the figures here as JSON.
+        json: write the results here as JSON.
     """
     from tauguard.cli.free_logs import explain, free_logs, hold_to
     from tauguard.cli.help_text import print_notes
@@ -90,8 +89,8 @@ def command(
         check_loads(arm, given.logs, data)
     elif (ratio := torque_per_ampere(found.arm, traces)) < SMALL_GAIN:
         print(
-            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
-            "they held joint torques: if they are in N m, say --torque"
+            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as is typical "
+            "of joint torques: if they are in N m, add --torque"
         )
     held = (
         left_out(arm, recordings, scale=given.scale, data=data)
@@ -112,7 +111,7 @@ def command(
 
 
 def summary(names: list[str], found: Identified, held: list[Any], target: Path) -> dict[str, Any]:
-    """The figures, ready for JSON."""
+    """The results, as JSON values."""
     return {
         "name": "calibrate",
         "robot": str(target),
@@ -130,7 +129,7 @@ def summary(names: list[str], found: Identified, held: list[Any], target: Path) 
 
 
 def report(result: dict[str, Any], found: Identified) -> None:
-    """Print the figures."""
+    """Print the results."""
     from tauguard.cli.help_text import print_notes
     from tauguard.report import table
 

@@ -28,14 +28,14 @@ def command(
 ) -> None:
     """Simulate an arm at work, strike it, detect the collisions, leave a recording.
 
-    Leaves in the folder: demo.mcap (a run with collisions, truth and detection), demo.rrd (the
-    same for rerun), model.skops (the trained detector), summary.json and summary.png (how well it
-    did on collisions and motions that it was not trained on).
+    The folder then holds demo.mcap (a run with collisions, truth and detection), demo.rrd (the same
+    for rerun), model.skops (the trained detector), summary.json and summary.png (its metrics on
+    collisions and motions that it was not trained on).
 
     Args:
-        out: folder of the results (made if it does not exist).
-        seed: seed of the arm and of everything drawn; the same seed gives the same files.
-        robot: which arm, by name or file: see `tauguard robot`.
+        out: folder of the results; it is created if it does not exist.
+        seed: seed of the arm and of all random draws; the same seed gives the same files.
+        robot: name or file of the arm; see `tauguard robot`.
         arm_joints: the arm's joints, in a file with several chains: names with commas between, or
             FIRST..LAST.
         workers: processes for the simulation (default: all processors).
@@ -60,8 +60,8 @@ def command(
     load_arm(robot)  # an unknown arm is an error before anything is simulated
     plan = demo_plan(seed, robot)
     print(
-        f"simulates {plan.seconds / 60:.0f} minutes of motion, trains a detector and judges it: "
-        "one to three minutes",
+        f"simulating {plan.seconds / 60:.0f} minutes of motion, then training and testing a "
+        "detector: this takes one to three minutes",
         flush=True,
     )
     training = list(simulate_all(plan.train, workers, "simulate training"))
@@ -132,8 +132,8 @@ def asked_and_found(summary: dict[str, Any]) -> str:
     return (
         f"  false alarms per hour: asked {wanted['per_hour']:g}; found {found['value']:.1f}, "
         f"95 % interval {other}, from {found['n']} alarms in {60 * found['hours']:.0f} min\n"
-        f"  ({60 * wanted['hours']:.0f} min of training motion set the threshold; alone they allow "
-        f"{own} per hour. The motions judged are others.)"
+        f"  ({60 * wanted['hours']:.0f} min of training motion set the threshold and are "
+        f"consistent with {own} per hour. The tested motions are different ones.)"
     )
 
 

@@ -43,17 +43,17 @@ def command(
 ) -> None:
     """Look for collisions in a log of joint positions, velocities and motor currents.
 
-    With --model a trained detector watches the log: free, collision, or fault where the samples
-    themselves are wrong (frozen, missing, of another arm), as `tauguard listen` says it. Without
-    one, the detector of `tauguard train --free` learns from the first --quiet seconds, in which
-    nothing may touch the arm, and watches the rest. More motion makes a better detector: `tauguard
-    train --free` learns from whole logs.
+    With --model a trained detector watches the log. Its states are those of `tauguard listen`:
+    free, collision, or fault if the samples are wrong (frozen, missing, of another arm). Without a
+    model, the detector of `tauguard train --free` learns from the first --quiet seconds, in which
+    nothing may touch the arm, and watches the rest. `tauguard train --free` learns from whole logs
+    and makes a better detector.
 
-    A column called label, contact, collision or touch that holds 0 and 1 is taken as truth: what
-    was found of its contacts, how late, and the alarms outside of them are printed.
+    A column called label, contact, collision or touch with the values 0 and 1 is taken as ground
+    truth. The output then says which contacts were detected, how late, and which alarms were false.
 
-    Torques that the motion does not explain are refused: currents in a wrong unit or of the other
-    sign. Currents of exchanged joints are noticed only as far as gravity loads those joints.
+    A log is refused if the motion does not explain its torques, because its currents have a wrong
+    unit or sign. Exchanged joints are noticed only if gravity loads them.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
@@ -65,17 +65,18 @@ def command(
             "torque": ["tau1", "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
-            a model of `train --free` or no model; 0 for nothing. Without it a load is found from
-            the motion, and until then only hard contacts are.
+            a model of `train --free` or no model; 0 for no load. Without it the load is estimated
+            from the motion, and until then only hard contacts are detected.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
-        at_tool: all contacts are at the tool: the intervals of the forces are narrower.
-        quiet: without --model, seconds from the log's beginning that you vouch for (default: 20); a
-            collision in them raises the bounds so that others like it are missed later.
-        gains: without --model, N m per ampere, one a joint (known for calibrated robot files and
-            for the presets ur10e and ur5).
+        at_tool: all contacts are at the tool, which narrows the intervals of the forces.
+        quiet: without --model, length of the log's beginning in which nothing touches the arm, in
+            seconds (default: 20). A collision in it raises the thresholds, and similar ones are
+            missed later.
+        gains: without --model, N m per ampere, one number for each joint (known for calibrated
+            robot files and for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.
         reading: how logs are read.
-        json: write the figures here as JSON.
+        json: write the results here as JSON.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_one
@@ -169,7 +170,7 @@ def learned(
     length = float(trace.t[-1] - trace.t[0])
     if not 0 < quiet < length:
         raise ValueError(
-            f"--quiet {quiet:g}: expected above 0, below the log's {length:.1f} s; or train on "
+            f"--quiet {quiet:g}: expected above 0 and below the log's {length:.1f} s; or train on "
             "logs of free motion (`tauguard train --free`) and give --model"
         )
     rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))

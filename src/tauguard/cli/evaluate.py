@@ -34,12 +34,12 @@ def command(
             split.
         splits: with --data, which ones (default: those whose name begins with "test").
         model: a model file that `tauguard train` wrote.
-        alarms: with --data, instead of a model: the alarms of any other detector, a CSV file with
-            the columns episode (SPLIT/NUMBER, as `tauguard inspect --episode` takes it), start and
-            end [s], a line an alarm. Judged are all arms of the splits.
+        alarms: with --data, the alarms of any other detector instead of a model: a CSV file with
+            one line per alarm and the columns episode (SPLIT/NUMBER, as for `tauguard inspect
+            --episode`), start and end [s]. All arms of the splits are evaluated.
         detector: module:Class of the method, if it is not one of tauguard's own.
-        json: write the figures here.
-        figure: draw them here (PNG).
+        json: write the metrics here as JSON.
+        figure: draw the metrics here (PNG).
         events: a folder for ten seconds of every missed collision, late detection and false
             alarm, with pictures and a page that `tauguard replay --web` opens. A recording is
             named by its file; with --data as SPLIT/NUMBER, from 0, which `tauguard inspect

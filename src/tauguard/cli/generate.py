@@ -16,16 +16,16 @@ def command(
 ) -> None:
     """Simulate a described dataset and write it as Parquet with a manifest.
 
-    The same command continues where a run stopped, however it stopped, and repairs damaged shards;
-    the bytes are the same for any number of workers.
+    After an interruption the same command continues. It also repairs damaged shards. The bytes are
+    the same for any number of workers.
 
     Args:
-        config: a TOML file, or a name that ships: tauguard-collisions-v2, tauguard-collisions-v1,
-            cura6-twin.
+        config: a TOML file, or one that comes with tauguard: tauguard-collisions-v2,
+            tauguard-collisions-v1, cura6-twin.
         out: folder of the dataset: a new or empty one, or one that holds a part of this dataset.
         workers: processes (default: all processors).
         ray: address of a Ray cluster to work on instead; "local" starts one on this machine.
-        quick: only the first episodes of every split, as many as the configuration says.
+        quick: only the first episodes of every split; the configuration states how many.
     """
     import time
 
@@ -36,7 +36,7 @@ def command(
     if workers is not None and workers < 1:
         raise ValueError(f"--workers {workers}: expected 1 or more")
     if ray is not None and workers is not None:
-        raise ValueError("--workers is for this machine and --ray for a cluster: give one of them")
+        raise ValueError("give either --workers (this machine) or --ray (a cluster)")
     configuration = load(config)
     if quick:
         configuration = configuration.quick()

@@ -22,15 +22,15 @@ def command(
 ) -> None:
     """Show the content of a generated dataset; with --verify read every byte of it.
 
-    Exit code 2: --verify found damaged or missing files, others among the shards, or leaks between
-    splits, or an episode that was simulated again has other bytes. The command that generated the
-    dataset writes damaged files again, and only those.
+    The exit code is 2 if --verify finds damaged, missing or foreign files or leaks between splits,
+    or if --episode gives other bytes. The command that generated the dataset writes damaged files
+    again, and only those.
 
     Args:
         folder: folder of the dataset.
         verify: compare every file with its checksum.
-        json: write the figures here.
-        figure: draw the figures here (PNG).
+        json: write the report here as JSON.
+        figure: draw the report here (PNG).
         episode: simulate this episode again, split/number (from 0), from its line of the manifest,
             and check that it has the same bytes.
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
@@ -43,7 +43,7 @@ def command(
     from tauguard.report import write_json
 
     if (mcap or robot) is not None and episode is None:
-        raise ValueError("--mcap and --robot go with --episode: say which one")
+        raise ValueError("--mcap and --robot need --episode")
     if episode is not None:
         again(folder, episode, mcap, robot)
         return
@@ -66,22 +66,29 @@ def command(
 
 def page(report: Mapping[str, Any]) -> str:
     """The report as text."""
+    from tauguard.report import table
+
     code = report["code"]
     lines = [
         f"{report['name']}, {report['rate']} rows a second, "
         f"configuration {report['configuration_sha256'][:12]}",
         f"made by tauguard {code['tauguard']}, MuJoCo {code['mujoco']}",
         "",
-        f"{'split':<14} {'episodes':>8} {'hours':>8} {'MB':>9} {'MB/h':>6} "
-        f"{'collisions':>10} {'planned':>8}  outcomes",
     ]
-    for name, one in report["splits"].items():
-        rate = one["megabytes"] / one["hours"] if one["hours"] else 0.0
-        outcomes = ", ".join(f"{n} {what}" for what, n in sorted(one["outcomes"].items()))
-        lines.append(
-            f"{name:<14} {one['episodes']:>8} {one['hours']:>8.3g} {one['megabytes']:>9.1f} "
-            f"{rate:>6.0f} {one['collisions']:>10} {one['planned_collisions']:>8}  {outcomes}"
-        )
+    rows = [
+        {
+            "split": name,
+            "episodes": one["episodes"],
+            "hours": one["hours"],
+            "MB": f"{one['megabytes']:.1f}",
+            "MB/h": f"{one['megabytes'] / one['hours'] if one['hours'] else 0.0:.0f}",
+            "collisions": one["collisions"],
+            "planned": one["planned_collisions"],
+            "outcomes": ", ".join(f"{n} {what}" for what, n in sorted(one["outcomes"].items())),
+        }
+        for name, one in report["splits"].items()
+    ]
+    lines.append(table(rows))
     for name, one in report["splits"].items():
         if one["collisions"]:
             lines += ["", *classes(name, one)]
@@ -91,7 +98,7 @@ def page(report: Mapping[str, Any]) -> str:
 
 def classes(name: str, one: Mapping[str, Any]) -> list[str]:
     """Collisions of a split by class, as achieved and as planned."""
-    from tauguard.datasets.inspection import class_order
+    from tauguard.datasets.schedule import class_order
 
     lines = [f"{name}: collisions there (planned)"]
     for what in ("kind", "link", "severity"):
@@ -122,7 +129,7 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     else:
         lines.append("every file is intact, byte for byte")
     for name in report["unchecked"]:
-        lines.append(f"{name}: not checked; `tauguard generate` of this version adds checksums")
+        lines.append(f"{name}: not checked; `tauguard generate` of this version adds a checksum")
     return lines
 
 

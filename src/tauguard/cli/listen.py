@@ -40,7 +40,7 @@ def command(
 ) -> None:
     """Watch a robot as it runs: free, collision or fault, live. Nothing is sent to the robot.
 
-    One of --ur, --play, --stdin and --ros names where the samples come from. It ends after
+    One of --ur, --play, --stdin and --ros names the source of the samples. The command ends after
     --seconds, with Ctrl-C, or when the robot has been gone for --reconnect seconds (exit code 3).
     When no sample comes for 20 ms (2.5 sample intervals where that is longer), the state is
     `fault: no samples`.
@@ -50,13 +50,13 @@ def command(
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         ur: host of a Universal Robots controller, read by RTDE.
         port: port of RTDE.
-        play: a log (CSV or MCAP) to play at its own pace instead.
+        play: a log (CSV or MCAP) to play in real time instead.
         columns: columns of a CSV file, see `tauguard detect`.
         stdin: read lines "t, q1.., qd1.., current1.." from the standard input.
         ros: topic with sensor_msgs/JointState, currents (or torques) in effort; needs ROS 2.
         payload: what the arm carries, as KG or KG,X,Y,Z, see `tauguard detect`.
         torque: the source gives joint torques [N m] instead of currents.
-        seconds: how long.
+        seconds: how long to listen (default: without end).
         reconnect: seconds to go on trying when the connection breaks.
         json: write events and latencies here.
         record: write the received samples as MCAP here.

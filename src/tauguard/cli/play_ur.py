@@ -15,15 +15,16 @@ def command(
 ) -> None:
     """Play a log as a UR controller would send it: RTDE on 127.0.0.1, in real time.
 
-    The clock begins with the first client; the command ends with the log. It is no robot: inputs
-    are refused, and nothing moves.
+    The log starts with the first client, and the command ends with the log. Inputs are refused,
+    because there is no robot that could move.
 
     Args:
         log: CSV or MCAP of an arm with six joints.
         columns: columns of CSV files, see `tauguard detect`.
-        port: to serve; 0 takes one that is free and prints it.
-        fault: NAME@SECONDS or NAME@SECONDS+DURATION, several if asked: frozen, stale, encoder,
-            missing, late, repeated, rate, jump, bias, saturated, swapped, sign, nan.
+        port: port of the server; 0 takes a free one and prints it.
+        fault: one or more faults to inject, NAME@SECONDS or NAME@SECONDS+DURATION. Names: frozen,
+            stale, encoder, missing, late, repeated, rate, jump, bias, saturated, swapped, sign,
+            nan.
     """
     from tauguard.cli import expect
     from tauguard.datasets.logs import read_log

@@ -22,18 +22,18 @@ def command(
 ) -> None:
     """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
 
-    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser; of a
-    folder of MCAP recordings the newest is. With --web or --open an .rrd of PATH's name that is
-    newer than PATH is shown as it is, unless --out, --robot or --whole asks for another.
+    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser. For a
+    folder of MCAP recordings, the newest one is taken. With --web or --open, an .rrd that was made
+    from PATH before is shown unchanged, unless --out, --robot or --whole is given.
 
     Args:
         path: an MCAP file written by tauguard, an .rrd file, or a folder of either.
-        out: the recording (default: PATH with the ending .rrd, if there is none yet).
+        out: the .rrd file to write (default: PATH with the extension .rrd, if it does not exist).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
-        whole: keep what comes before the first detection.
+        whole: keep the part before the first detection.
         open: show it in the rerun viewer, which listens on 127.0.0.1 only.
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
-        port: with --web, of the page (default: a free one).
+        port: with --web, port of the page (default: a free one).
     """
     from tauguard.cli import expect
 
@@ -62,7 +62,7 @@ def newest(path: Path) -> Path:
     found = found or sorted(path.rglob("*.rrd"), key=lambda file: file.stat().st_mtime)
     if not found:
         return path
-    print(f"{path}: {len(found)} recordings; shown is the newest, {found[-1].name}")
+    print(f"{path}: {len(found)} recordings; showing the newest, {found[-1].name}")
     return found[-1]
 
 

@@ -28,14 +28,14 @@ def command(
         robot: a name, an MJCF or URDF file, or a TOML file that describes a robot.
         arm_joints: the arm's joints, in a file with several chains: names with commas between, or
             FIRST..LAST.
-        download: fetch the model by mujoco-menagerie where it has not been fetched before.
+        download: download the model through mujoco-menagerie if it is not there yet.
         json: write the description as JSON.
-        try_: run episodes of every environment with the arm: what begins in contact, the largest
-            force and its bound, what diverges, and where standing still succeeds. The exit code is
-            1 where something is wrong.
-        episodes: of each environment, with --try.
-        seed: of the first episode, with --try.
-        pictures: a PNG of the beginning of an episode in each environment, with --try.
+        try_: run episodes of every environment with the arm, and report initial contacts, the
+            largest force and its bound, divergences, and tasks that standing still solves. The exit
+            code is 1 if something is wrong.
+        episodes: with --try, number of episodes of each environment.
+        seed: with --try, seed of the first episode.
+        pictures: with --try, write a PNG of the start of an episode in each environment.
     """
     from tauguard.cli import expect
     from tauguard.envs.plant import Gains
@@ -92,6 +92,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
     """
     from tauguard.envs.gym.trial import picture, try_arm
     from tauguard.models.picture import check_opengl
+    from tauguard.report import table as text_table
 
     if pictures is not None:
         try:
@@ -99,20 +100,24 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         except RuntimeError as error:
             raise ValueError(f"--pictures: {error}") from None
     rows = try_arm(robot, episodes, seed)
-    print()
-    print(
-        f"{'environment':<22} episodes  begin in contact  largest force [N]  bound [N]  diverged  "
-        "still succeeds"
-    )
+    tried = [
+        {
+            "environment": row.environment,
+            "episodes": row.episodes,
+            "initial contacts": row.overlaps,
+            "largest force [N]": round(row.force),
+            "bound [N]": round(row.bound),
+            "diverged": row.diverged,
+            "still succeeds": row.still,
+            "moved": ", ".join(f"{kind} by {far:.2f} m" for kind, far in row.moved.items()),
+        }
+        for row in rows
+        if not row.refused
+    ]
+    print("\n" + text_table(tried))
     for row in rows:
         if row.refused:
-            print(f"{row.environment:<22} refused: {row.refused}")
-            continue
-        print(
-            f"{row.environment:<22} {row.episodes:>8}  {row.overlaps:>16}  {row.force:>17.0f}  "
-            f"{row.bound:>9.0f}  {row.diverged:>8}  {row.still:>14}"
-            + "".join(f"  {kind} moved by {far:.2f} m" for kind, far in row.moved.items())
-        )
+            print(f"{row.environment}: refused: {row.refused}")
     if pictures is not None:
         import matplotlib.pyplot as plt
         import numpy as np
@@ -174,12 +179,10 @@ def table(facts: Facts, gains: object) -> list[dict[str, object]]:
 
 def text(facts: Facts, rows: list[dict[str, object]], bound: float) -> str:
     """The table and the sources of its columns, as text."""
-    heads = list(rows[0])
-    cells = [[_cell(row[head]) for head in heads] for row in rows]
-    widths = [max(len(h), *(len(row[k]) for row in cells)) for k, h in enumerate(heads)]
-    lines = ["  ".join(h.rjust(w) for h, w in zip(heads, widths, strict=True))]
-    lines += ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
-    lines.append("")
+    from tauguard.report import table as text_table
+
+    shown = [{key: _cell(value) for key, value in row.items()} for row in rows]
+    lines = [text_table(shown), ""]
     lines.append(f"largest force against a skull, 150 N/mm: {bound:.0f} N")
     lines.append(f"tool: {facts.tool or 'origin of the last link'}")
     lines += [f"{part}: {source}" for part, source in sorted(facts.sources.items())]

@@ -41,43 +41,43 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces: on labelled recordings, some with collisions; the threshold comes from the
-    collision-free ones, each scored by a detector that was trained without it. With --calibration
-    the threshold is guaranteed instead: no more than the false alarms per hour that you name, on
-    motion like that.
-    With --free and --robot: a detector of a real arm from logs in which nothing touched it; 10 s of
-    motion are the least, two minutes are good. A card says what it can find, and which regimes the
-    logs do not show.
+    With --traces it learns from labelled recordings, some with collisions. The threshold comes from
+    the collision-free ones, each scored by a detector that was trained without it. With
+    --calibration the threshold guarantees a rate of false alarms on motion like those recordings.
+    With --free and --robot it learns from logs of a real arm in which nothing touched the arm: at
+    least 10 s of motion, better two minutes. A card then says what the detector can find, and which
+    kinds of motion the logs lack.
 
     Args:
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), or a
             dataset (`tauguard generate`), whose first split it is trained on.
-        model: the model file; one that is there is replaced if it is named (default: model.skops).
+        model: the model file (default: model.skops). A file that you name is overwritten.
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
-        calibration: folder of collision-free recordings that are not in --traces. Those with
+        calibration: folder of collision-free recordings that are not in --traces. Recordings with
             labelled collisions are refused; collisions without a label raise the threshold.
-        false_alarms_per_hour: what the threshold aims at on motion like the training's
-            (default: 10), or guarantees with --calibration; with --free, a detector is refused
-            whose own logs show more.
+        false_alarms_per_hour: rate that the threshold aims at on motion like the training's
+            (default: 10), or guarantees with --calibration. With --free, training fails if the
+            detector's own logs show a higher rate.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
-            the bounds; a log that stands out by its alarms is named and left out.
+            the thresholds, so a log with conspicuously many alarms is named and left out.
         twin: with --free, the TOML file that `tauguard twin` wrote of that arm: contacts are
             learned on it and quietness from the logs, as with --traces; --robot is not needed.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains,
             and so does the TOML file of `tauguard twin`.
         columns: columns of CSV files, see `tauguard detect`.
-        gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
-        payload: what the logs carried, see `tauguard calibrate`.
+        gains: N m per ampere, one number for each joint (known for calibrated robot files and for
+            ur10e).
+        payload: loads in the logs, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
-        accept: with --free, logs to learn from even if they stand out, and what the detector may
-            fail in: alarms (more in its own logs, each judged by the others, than
-            --false-alarms-per-hour, or torque in bursts as of contacts), error (beyond the bounds
-            for half of the time), gravity (not that of the robot file).
+        accept: with --free, names of logs to keep even if they stand out, and of checks that may
+            fail. alarms: cross-validated alarms above --false-alarms-per-hour, or bursts of torque
+            as contacts cause them. error: the residual exceeds its bounds half of the time.
+            gravity: gravity's torques differ from those of the robot file.
         arm: of a dataset with several arms, the one that the detector is for.
-        folds: with --traces, number of parts of the recordings that are left out in turn, load by
-            load; each part takes another fit (default: 3). 1 is quicker and keeps a third of the
+        folds: with --traces, number of folds of the cross-validation that sets the threshold, load
+            by load; each needs another fit (default: 3). 1 is quicker and keeps a third of the
             recordings for the threshold.
         reading: with --free, how logs are read.
     """
@@ -155,7 +155,7 @@ def labelled_motion(
     from tauguard.detectors.thresholds.guarantee import check_guarantee
     from tauguard.report import two_digits
 
-    # First: what cannot be used, or cannot be guaranteed, is better named before training.
+    # Name what cannot be used or guaranteed before the training, which takes minutes.
     method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ValueError(
@@ -188,7 +188,7 @@ def labelled_motion(
 
 
 def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
-    """The rate that the threshold aims at, and the interval that its motion supports, as text."""
+    """The rate that the threshold aims at, and its interval from the motion, as text."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
 
@@ -197,7 +197,7 @@ def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -
     minutes = max(1, round(60 * expected.hours))
     return (
         f"aimed at {rate:g} false alarms per hour; the {minutes} min of motion "
-        f"that the threshold comes from allow {low} to {high} (95 %)"
+        f"that set the threshold are consistent with {low} to {high} (95 %)"
     )
 
 

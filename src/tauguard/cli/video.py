@@ -19,16 +19,16 @@ def command(
 ) -> None:
     """Draw an MCAP recording of the simulation: the scene, the arm and what moves around it.
 
-    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Needs an OpenGL: without
-    a display the library libegl1 or libosmesa6.
+    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Drawing needs OpenGL:
+    without a display install libegl1 or libosmesa6.
 
     Args:
         recording: an MCAP file written by tauguard, or a folder, whose newest is taken.
-        out: .gif, .webp, .png or .mp4 (default: RECORDING with the ending .gif).
+        out: .gif, .webp, .png or .mp4 (default: RECORDING with the extension .gif).
         start: start of the part that is drawn [s].
-        seconds: of recording that are drawn (default: to the end).
+        seconds: length of the drawn part [s] (default: to the end).
         slower: factor by which the video is slower than real time.
-        rate: frames a second.
+        rate: frames per second.
         width: width of the picture [px].
         height: height of the picture [px].
     """

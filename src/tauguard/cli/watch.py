@@ -28,12 +28,12 @@ def command(
 
     Args:
         environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
-        policy: target (straight there, Cartesian control), random, still, or a file of
-            examples/learn.py, which brings the keywords that it was trained with.
-        seconds: how long, in simulated time; episodes follow one another.
+        policy: target (straight to the target, Cartesian control), random, still, or a file of
+            examples/learn.py, which contains the keywords of its training.
+        seconds: simulated time; episodes follow one another.
         seed: seed of the first episode.
         set: keywords of the environment, each NAME=VALUE, as in --set detector=observer.
-        reaction: what to do at an alarm or, without a detector, at a touch: stop0, stop1, stop2,
+        reaction: reaction to an alarm or, without a detector, to a contact: stop0, stop1, stop2,
             retract, admittance.
         save: instead of opening the viewer, write an .rrd file or, into a folder, an MCAP
             recording of each whole episode for `tauguard video`.
