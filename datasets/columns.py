@@ -48,7 +48,7 @@ class ColumnMap:
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
     current_scale: float | tuple[float, ...] = 1.0  #: A in one unit; may be per joint
     torque_scale: float | tuple[float, ...] = 1.0
-    """N m in one unit, a number or one a joint; -1 where the log's sign is not the robot file's."""
+    """N m in one unit, a number or one per joint; -1 if the log's sign is not the robot's."""
     clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
     decimal: str = "."  #: mark of decimals

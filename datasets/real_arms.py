@@ -137,7 +137,7 @@ def initial_arm(
         numbers: of the robot file.
         recordings: logs with their loads.
         columns: preset or column map that was given.
-        gains: that were given [N m/A], one a joint; empty for none.
+        gains: that were given [N m/A], one per joint; empty for none.
         scale: "gains", "payload", "masses", or "auto" for the first of these that is known.
 
     Returns:

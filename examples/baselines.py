@@ -34,8 +34,7 @@ KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 1
 POLICIES = Path(__file__).with_name("policies")
 #: Tool speed where no region limits it [m/s].
 UNLIMITED = 0.25
-#: Of the admittance: damping [N s/m], force that is not believed [N], and speed over that of
-#: `power and force`.
+#: Admittance: damping [N s/m], dead band [N], and speed relative to `power and force`.
 DAMPING, DEAD, YIELDING = 250.0, 15.0, 1.5
 
 
@@ -48,7 +47,7 @@ def random(env, info):
 
 
 def velocity(env, speed):
-    """Of each tool towards its target [m/s], slower near to it, shape (arms, 3)."""
+    """Velocity of each tool towards its target [m/s], slower near it, shape (arms, 3)."""
     arms, n = env.unwrapped.compiled.arms, len(env.unwrapped.scene.joint_names)
     first = 3 * n + 3 * arms
     left = env.unwrapped.batch.observation[0, first : first + 3 * arms].reshape(arms, 3)
@@ -70,7 +69,7 @@ def fast(env, info):
 
 
 def limited_speed(env):
-    """At which an impact and a push keep the quasi-static limit of every region [m/s]."""
+    """Speed at which impacts and pushes keep the quasi-static limits of all regions [m/s]."""
     arm = standard_mass(env.unwrapped.scene)
     speeds = [UNLIMITED]
     for region in env.unwrapped.regions:
@@ -126,7 +125,7 @@ def baselines(task, files=(), robot="cura6"):
 
 
 def play(task, name, episodes, first=0, files=(), **keywords):
-    """Success, targets, reward, force over limit and cost [N s], a row an episode."""
+    """Success, targets, reward, force over limit and cost [N s], a row per episode."""
     act, more, wrapper = baselines(task, files)[name]
     keywords = KEYWORDS | more | keywords
     with warnings.catch_warnings():

@@ -29,12 +29,12 @@ from tauguard.cli.watch import parsed
 from tauguard.envs.policies import MlpPolicy
 from tauguard.envs.stable_baselines import NativeVecEnv
 
-#: Of every baseline: tool velocities, 20 actions a second, episodes of 5 s.
+#: Keywords of every baseline: tool velocities, 20 actions a second, episodes of 5 s.
 KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 100}
-#: Learning takes a coarser time step [s] than what the policy is then judged by.
+#: Time step of the training [s], coarser than that of the evaluation.
 COARSE = 2e-3
-#: Lessons of a task: a share of the steps, the steps of a copy between two updates, and keywords. A
-#: sheet of cloth makes a step ten times as slow, so reaching is learned without it.
+#: Lessons of a task: fraction of the steps, steps of a copy between two updates, and keywords. A
+#: cloth makes a step ten times as slow, so reaching is learned without it first.
 LESSONS = {"ClothReach-v1": ((0.8, 256, {"cloth": None}), (0.2, 64, {}))}
 USUAL = ((1.0, 256, {}),)
 TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
@@ -116,7 +116,7 @@ def train(task, budget=None, steps=200_000, seed=0, copies=16, start=None, **key
 
 
 def judge(policy, episodes=96, seed=1_000_000):
-    """Of the policy itself, without exploration: success, and mean cost of an episode [N s]."""
+    """Success and mean cost of an episode [N s] of the policy without exploration."""
     keywords = dict(policy.environment)
     envs = NativeVecEnv(keywords.pop("id").removeprefix("tauguard:"), 16, **keywords)
     envs.seed(seed)

@@ -32,7 +32,7 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
     """Write traces with truth as one LeRobot dataset; returns the number of episodes.
 
     Args:
-        traces: one an episode, all of equally many joints.
+        traces: one per episode, all of equally many joints.
         folder: a new or empty one.
         rate: rate of their rows [Hz].
         robot: what LeRobot calls the robot type.

@@ -17,7 +17,7 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
     episode is one trace; it is truncated at its end.
 
     Args:
-        traces: one an episode, all of equally many joints.
+        traces: one per episode, all of equally many joints.
         name: Minari's id, ``namespace/name-v0``.
         rate: rate of their rows [Hz], put into the description.
 

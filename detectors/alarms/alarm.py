@@ -46,10 +46,10 @@ class CollisionAlarm(Frozen):
     threshold: float  #: of the normalised score
     confirmation: float = CONFIRMATION  #: t_c [s]
     normalisation: SpeedNormalisation | None = None  #: None: the score is compared as it is
-    inputs: UsualInput | None = None  #: what its samples look like; None: not known
+    inputs: UsualInput | None = None  #: limits of usual samples; None: not known
     floor: SpeedNormalisation | None = None
-    """Of the plain thresholds beneath a learned score (``detector.floor``), with the tail of
-    :attr:`normalisation`: the larger of both normalised scores counts. None: the score alone."""
+    """Normalisation of the plain thresholds beneath a learned score (``detector.floor``). The
+    larger of both normalised scores counts. None: the learned score alone."""
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""

@@ -31,8 +31,8 @@ class LogDetection:
     noise: Array  #: of each joint's residual [N m], to name the loudest joint, shape (n,)
     begin: float  #: [s]; alarms are counted from here on
     notes: tuple[str, ...]
-    faults: tuple[Span, ...] = ()  #: of the samples themselves; no alarm is looked for in them
-    fault_seconds: float = 0.0  #: in which collisions may be missed
+    faults: tuple[Span, ...] = ()  #: faults of the samples, in which no alarm is given
+    fault_seconds: float = 0.0  #: time in faults, in which collisions may be missed [s]
 
 
 def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:

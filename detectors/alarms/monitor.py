@@ -25,7 +25,7 @@ STATES = (FREE, COLLISION, FAULT)
 #: after more the detector starts again.
 BRIDGED = 2
 
-#: After a bridged fault nothing is judged until its samples have left the detector's window [s].
+#: Time after a bridged fault until its samples have left the detector's window [s]; no alarms then.
 WINDOW = 0.1
 
 
@@ -106,8 +106,8 @@ class Span:
     state: str  #: "collision" or "fault"
     start: float  #: [s]
     end: float  #: [s]
-    reason: str = ""  #: of a fault, its first
-    score: float = 0.0  #: of a collision, its largest
+    reason: str = ""  #: first reason of a fault
+    score: float = 0.0  #: largest score of a collision
 
 
 @dataclass

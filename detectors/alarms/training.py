@@ -65,14 +65,13 @@ def train(
     Args:
         detector: settings of a method.
         traces: with truth, of one arm at one sample rate.
-        arm: the model before training; the default is what tauguard attached to simulated traces.
-        per_hour: false alarms to accept in an hour of motion like the training's.
-        folds: parts of the traces that are left out in turn (fewer where there are fewer
-            collision-free traces). The detector is trained on all traces, and the threshold comes
-            from all collision-free ones: each is scored by a detector that was trained without its
-            load, or without this trace where there are fewer loads than folds. That takes
-            ``folds`` more fits. 1 is quicker: a third of the collision-free traces is kept for the
-            threshold.
+        arm: the model before training; the default is the one attached to simulated traces.
+        per_hour: accepted false alarms per hour of motion like the training's.
+        folds: folds of the cross-validation (at most one per collision-free trace). The detector is
+            trained on all traces. The threshold comes from the collision-free ones: each is scored
+            by a detector that was trained without its load or, with fewer loads than folds, without
+            this trace. This takes ``folds`` more fits. With 1, which is quicker, a third of the
+            collision-free traces is reserved for the threshold.
 
     Raises:
         ValueError: traces that do not fit or lack what the method needs, or ``folds`` below 1.

@@ -29,11 +29,11 @@ from tauguard.traces.trace import Trace
 #: whose friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e.
 #: Between the two only a note is possible.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
-#: The first of logs with a load, whose centre may not be known. A warm UR5 with a load that is told
-#: leaves 36 %; two joints exchanged leave 46 to 130 % on three arms.
+#: The first one for logs with a load, whose centre may not be known. A warm UR5 with a known load
+#: leaves 36 % unexplained; exchanged joints leave 46 to 130 % on three arms.
 UNEXPLAINED_LADEN = 0.5
-#: A joint's torque counts as this fraction of the arm's largest at least: a torque sensor's error
-#: does not shrink with a joint that hardly needs torque, as one about a vertical axis.
+#: Least torque of a joint in these fractions, relative to the arm's largest. A joint about a
+#: vertical axis needs hardly any torque, but its torque sensor has the same error.
 FAINT = 0.05
 #: If the residual of a held-out log is the first multiple of the others', the arm may have carried
 #: a load. If much torque is unexplained as well, the second multiple is enough. On a UR10e the
@@ -43,13 +43,13 @@ OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
 #: A given load is refused if it differs from the torques' by more than this [kg] and by more than
 #: this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
 WRONG_LOAD = (0.8, 0.3)
-#: Fraction of a joint's torque in a log that is not explained, times the largest hundredth of what
-#: is left over its median, at most. Up to 1.8 in 20 free logs of five arms, each alone; 4 to 9 in
-#: three logs of arms that were pushed.
+#: Largest product of two numbers of a joint: the unexplained fraction of its torque, and the 99 %
+#: quantile over the median of the unexplained torque. It is up to 1.8 in 20 free logs of five arms,
+#: and 4 to 9 in three logs of arms that were pushed.
 BURSTS = 2.5
-#: Shortest motion of a joint that is judged so [s], and times that a message lists.
+#: Least motion of a joint for this check [s], and number of times that a message lists.
 ENOUGH, SAID = 3.0, 6
-#: Slower joints are not judged [rad/s], because static friction hides their torque.
+#: Least speed of a checked joint [rad/s]; below it static friction hides the torque.
 FAST_ENOUGH = 0.05
 
 

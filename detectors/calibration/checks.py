@@ -13,8 +13,7 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: A joint is judged if it is faster than the first speed; its direction changes over the second
-#: [rad/s].
+#: Least speed of a checked joint, and speed over which its direction changes [rad/s].
 FAST, REVERSAL = 0.05, 0.05
 
 #: A joint's current has the wrong sign if its drag is below this number of deviations of the
@@ -22,7 +21,7 @@ FAST, REVERSAL = 0.05, 0.05
 #: with the other sign has the negative of that.
 AGAINST = -1.0
 
-#: Least motion of a joint by which it is judged [s].
+#: Least motion of a joint that is checked [s].
 ENOUGH = 3.0
 
 #: Gravity torque of the calibrated arm over the robot file's. The right files of three real arms

@@ -63,17 +63,17 @@ class Beliefs:
     turns."""
     gain: float = 0.5  #: relative, where gains are identified
     friction: float = 0.3
-    """Of a friction weight, except those below. The unit is the joint's median torque in the log
-    where it is largest. With this prior, columns that are alike at the logged speeds share what
-    they explain and do not cancel each other at other speeds."""
+    """Deviation of most friction weights, relative to the joint's largest median torque of any log.
+    With this prior, columns that are alike at the logged speeds share the torque that they explain.
+    Without it they could cancel there and be large at other speeds."""
     loaded: float = 0.3  #: of friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
     payload: float = 5.0  #: of a load that is not given [kg]
     moment: float = 0.5  #: of its first moment [kg m]
     spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
     softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
-    evenness: float = 0.15  #: a joint's level of error is at least this fraction of the largest
-    rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
+    evenness: float = 0.15  #: least error level of a joint, as a fraction of the largest
+    rest: float = 0.5  #: samples of a joint that has stood for longer do not count [s]
 
 
 BELIEFS = Beliefs()

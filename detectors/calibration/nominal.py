@@ -78,7 +78,7 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
     Args:
         trace: of an arm.
         robot: a name, a file or a robot; the default is what tauguard attached to the trace.
-        gain: gain of the observer [1/s], a number or one a joint.
+        gain: gain of the observer [1/s], a number or one per joint.
 
     Raises:
         ValueError: nothing is attached and no robot is named, or a robot of other joints.

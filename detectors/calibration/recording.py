@@ -17,13 +17,13 @@ MOVING = 0.01
 SHIFTED = 0.01
 #: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
-#: Motion without which nothing is identified [s].
+#: Least motion for an identification [s].
 LEAST = 10.0
 
 
 @dataclass(frozen=True)
 class Load:
-    """The load that the arm carried, as far as it is known."""
+    """The load that the arm carried; parts of it may be unknown."""
 
     mass: float = 0.0  #: [kg]
     centre: tuple[float, float, float] | None = None
@@ -131,7 +131,7 @@ def known_load(load: Load | None) -> Array:
 
 
 def laden(arm: ArmModel, load: Load | None) -> tuple[ArmModel, LoadDeviation]:
-    """The arm with a load in its gripper, as far as it is known, and how uncertain that is."""
+    """The arm with a load in its gripper, and the uncertainty of the load."""
     if load is None:
         return arm, UNKNOWN_LOAD
     inertial = arm.robot.inertial.copy()

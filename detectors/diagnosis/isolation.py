@@ -29,8 +29,8 @@ class Trust:
     """
 
     free: float = 3.0  #: deviations of free motion
-    own: float = 0.05  #: of the joint's own residual
-    largest: float = 0.03  #: of the largest residual of all joints
+    own: float = 0.05  #: fraction of the joint's own residual
+    largest: float = 0.03  #: fraction of the largest residual of all joints
 
     def noise(self, residual: Array, deviation: Array) -> Array:
         """Standard deviations [N m], shape (..., n), for residuals of the same shape."""
@@ -84,8 +84,8 @@ def moments(level: Array, most: int = MOMENTS, fraction: float = FRACTION) -> ND
 
     Args:
         level: strength of the residual, shape (M,).
-        most: how many samples before the highest one.
-        fraction: of the highest level that a sample needs.
+        most: number of samples besides the highest one.
+        fraction: least level of a sample, as a fraction of the highest.
     """
     strong = np.flatnonzero(level >= fraction * level.max())
     spread = strong[np.unique(np.linspace(0, len(strong) - 1, most).round().astype(np.int64))]
@@ -102,8 +102,8 @@ def last_joint(
     Args:
         residual: [N m], shape (n,).
         deviation: its standard deviation in free motion [N m], shape (n,).
-        significant: deviations that count as torque.
-        fraction: of the largest residual that counts as torque besides.
+        significant: threshold in standard deviations.
+        fraction: threshold as a fraction of the largest residual; both are combined.
     """
     least = np.hypot(significant * deviation, fraction * np.abs(residual).max())
     found = np.flatnonzero(np.abs(residual) > least)

@@ -1,8 +1,8 @@
 """The residual around an alarm, with what was known before it held fixed.
 
-The estimator goes on adapting while something touches the arm: a load that stays is soon taken for
-a payload. For a diagnosis the payload, offsets and friction errors of the moment before the alarm
-are kept, so that what came with the alarm stays visible for as long as it lasts.
+The estimator goes on adapting during a contact, and soon takes a lasting contact for a payload. A
+diagnosis therefore fixes payload, offsets and friction errors at the moment before the alarm, so
+that the torque of a contact stays visible for as long as the contact lasts.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: Slower logs get an observer of this fraction of their rate.
+#: Largest observer gain, as a fraction of a log's rate.
 PER_SAMPLE = 0.2
 
-#: What was known this long before the alarm is held [s].
+#: Time before the alarm at which the estimates are fixed [s].
 BEFORE = 0.02
 
-#: The residual is followed this long after the alarm [s], longer where the observer lags more.
+#: Length of the window after the alarm [s], and its least length in lags of the observer.
 AFTER, LAGS = 0.3, 10.0
 
 #: Time constants of the observer after which a payload's columns have forgotten their start.

@@ -94,7 +94,7 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
     covariance, mean, spread = covariance[rows, at], mean[rows, at], spread[rows, at]
     factor = np.linalg.cholesky(covariance)
     free = mean + np.einsum("kij,kj->ki", factor, rng.standard_normal(mean.shape))
-    # The component along the normal anew, above 0; the others follow it as they are correlated.
+    # Draw the component along the normal again, above 0; shift the others by their correlation.
     middle = np.einsum("ki,ki->k", mean, inward)
     most = ndtr(middle / spread)
     pressed = middle - spread * ndtri(np.maximum(rng.random(len(rows)) * most, 1e-300))
@@ -134,7 +134,7 @@ class Interval90:
 
     @classmethod
     def of(cls, draws: Array) -> Interval90:
-        """Of draws, shape (K,)."""
+        """The interval of draws, shape (K,)."""
         low, middle, high = np.quantile(draws, ((1 - COVERAGE) / 2, 0.5, (1 + COVERAGE) / 2))
         return cls(float(middle), float(low), float(high))
 
@@ -153,12 +153,12 @@ class Interval90:
 class ContactTorque:
     """Torques of a contact at the joints, from its beginning to the end of the window."""
 
-    row: int  #: of the peak, among the look's samples
-    seconds: float  #: that it touched, of the 0.4 s or so that are looked at [s]
+    row: int  #: row of the peak among the window's samples
+    seconds: float  #: duration of the contact within the window of about 0.4 s [s]
     impulse: Array  #: integral of tau_ext [N m s], shape (n,)
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
-    hidden: float  #: fraction of its time that the samples do not resolve
+    hidden: float  #: fraction of the duration that the samples do not resolve
     goes_on: bool = False  #: the contact lasted at the end of the window
 
     @property
@@ -174,7 +174,7 @@ class ContactTorque:
 
     @classmethod
     def of(cls, after: PostAlarmWindow) -> ContactTorque:
-        """From the residual around an alarm."""
+        """The torques from the residual around an alarm."""
         width, torque = _without_lag(after)
         top = int(np.linalg.norm(torque / after.deviation, axis=1).argmax())
         along = torque @ (torque[top] / after.deviation[top] ** 2)
@@ -192,14 +192,14 @@ class ContactTorque:
 
 @dataclass(frozen=True, eq=False)
 class Severity:
-    """Of one contact, from its beginning to the end of the look at it."""
+    """Severity of one contact, from its beginning to the end of the window."""
 
     impulse: Interval90  #: norm of the force's integral [N s]
     peak: Interval90  #: largest force [N]
-    torque: ContactTorque  #: which needs no place
+    torque: ContactTorque  #: torques, which do not depend on the point of contact
 
     def text(self, kind: str, names: Sequence[str]) -> str:
-        """In a few words; of an impact the impulse, too.
+        """The severity in a few words, with the impulse of an impact.
 
         Args:
             kind: kind of the contact.
@@ -227,10 +227,10 @@ def severity(
         robot: the arm.
         surface: its sampled surface.
         after: the residual around the alarm.
-        belief: where it was touched.
+        belief: probability of the contact at each point.
         moments: number of moments multiplied in `belief`; its root of that order is used, because
             their errors are not independent.
-        trust: how far a residual is believed.
+        trust: errors of a residual.
     """
     contact_torque = ContactTorque.of(after)
     noise = trust.noise(contact_torque.mean, after.deviation[contact_torque.row])

@@ -14,7 +14,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.physical_consistency import inertial_numbers, pseudo_inertia
 
-#: Inertial numbers a link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
+#: Inertial numbers per link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
 INERTIAL = 10
 
 

@@ -45,19 +45,19 @@ class Unknowns:
     slow: float = 60.0  #: time constant of payload and friction errors [s]
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0
-    """An innovation z above this many of its standard deviations c counts c^2/z. The deviation is
-    that of noise and beliefs, without ``noise_inflation``."""
+    """Innovations are clipped: one of z standard deviations, z above this c, counts c^2/z. The
+    standard deviation is that of noise and beliefs, without ``noise_inflation``."""
     every: float = 0.01  #: time between two corrections [s]
     noise_inflation: float = 1.0
-    """Corrections that an error of the model lasts for, fewer in a log slower than ``every``: the
-    variance of a correction's noise is so many times ``noise^2``. With 1 the filter takes every
-    correction for news."""
+    """Number of successive corrections with the same error of the model (fewer in a log slower than
+    ``every``). The noise variance of a correction is multiplied by it. 1 treats successive
+    corrections as independent."""
     started: float = 0.0
-    """Seconds that a joint moves before its first correction, since the friction of a joint that
-    stands may hold any torque. 0: joints at rest correct the unknowns, too."""
+    """Motion of a joint before its first correction [s], because static friction may hold any
+    torque. 0: joints at rest also correct the unknowns."""
     transition: float = 0.0
-    """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
-    30/s [N m], (transition c_j)^2 is added to ``noise^2`` of a correction."""
+    """Relative error of friction that has just changed. With c_j the difference of friction from
+    its low-pass of 30/s [N m], (transition c_j)^2 is added to ``noise^2`` of a correction."""
     weighted: bool = False
     """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + s_j^2), with
     s_j the standard deviation that the uncertain payload gives it."""
@@ -71,16 +71,16 @@ class Unknowns:
 
     @classmethod
     def for_detection(cls) -> Unknowns:
-        """For detectors: model errors last some 0.2 s, and are a tenth of a change of friction."""
+        """Settings for detectors: model errors last 0.2 s and are a tenth of a friction change."""
         return cls(noise_inflation=20.0, transition=0.1, weighted=True)
 
     @classmethod
     def for_logs(cls, mass: float, moment: float) -> Unknowns:
-        """For real arms, whose ``noise`` is 0.3 friction levels: it lasts some 0.6 s.
+        """Settings for real arms, whose ``noise`` is 0.3 friction levels and lasts about 0.6 s.
 
         Args:
             mass: standard deviation of the load [kg].
-            moment: of each axis of its first moment [kg m].
+            moment: standard deviation of each axis of its first moment [kg m].
         """
         return cls(
             payload=mass,
@@ -172,7 +172,7 @@ class Estimator:
 
         Args:
             arm: the model.
-            gain: rate of the observer [1/s], a number or one a joint.
+            gain: rate of the observer [1/s], a number or one per joint.
             dt: sample interval [s]; intervals of single samples may differ.
             unknowns: what to track (default: payload, offsets, friction).
             sampled: currents are instants of a slow log, and between two of them torque and

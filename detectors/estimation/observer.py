@@ -99,7 +99,7 @@ def observe(
         q: positions [rad], shape (T, n).
         qd: velocities [rad/s], shape (T, n).
         tau: drive torques at the joints less what friction takes, as far as known [N m], (T, n).
-        gain: observer rate [1/s], a number or one a joint.
+        gain: observer rate [1/s], a number or one per joint.
         threads: 0 takes all processors; the result does not depend on it.
 
     Returns:
@@ -122,7 +122,7 @@ class MomentumObserver:
 
         Args:
             robot: the arm.
-            gain: observer rate [1/s], a number or one a joint.
+            gain: observer rate [1/s], a number or one per joint.
             dt: sample interval for steps that do not say theirs [s].
         """
         self.robot = robot

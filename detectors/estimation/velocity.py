@@ -25,7 +25,7 @@ SLOWEST = 2.5e-3
 
 @dataclass(frozen=True, eq=False)
 class SensorNoise:
-    """Standard deviations of what is measured, one a joint."""
+    """Standard deviations of what is measured, one per joint."""
 
     position: Array  #: [rad], shape (n,)
     velocity: Array  #: [rad/s], shape (n,)
@@ -42,7 +42,7 @@ class SensorNoise:
 
     @classmethod
     def measured(cls, traces: Sequence[Trace]) -> SensorNoise:
-        """From third differences, which smooth motion leaves almost nothing in.
+        """Estimate the noise from third differences, which are almost 0 for smooth motion.
 
         Args:
             traces: of one arm at one rate; each of 4 samples or more.

@@ -23,14 +23,14 @@ ASKED = 10.0
 
 
 def check_own_alarms(logs: Sequence[CrossValidatedLog], asked: float = ASKED) -> None:
-    """Refuse more alarms in the logs, each judged by the others, than ``asked`` an hour.
+    """Refuse a detector whose cross-validated logs have more than ``asked`` alarms per hour.
 
     Args:
-        logs: each judged by the others.
-        asked: false alarms an hour that are accepted.
+        logs: cross-validated logs.
+        asked: accepted false alarms per hour.
 
     Raises:
-        ValueError: so many that, with 97.5 % confidence, the rate is above ``asked``.
+        ValueError: the rate is above ``asked`` with 97.5 % confidence.
     """
     alarms, seconds = sum(len(log.alarms) for log in logs), sum(log.seconds for log in logs)
     low = poisson_rate(alarms, seconds / 3600)["low"]
@@ -63,12 +63,12 @@ def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
 def check_held_out(
     arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording], held: Sequence[Array]
 ) -> None:
-    """Refuse a calibration whose error in a left-out log exceeds what bounds are measured in.
+    """Refuse a calibration whose error in a held-out log exceeds the unit of the bounds.
 
     Args:
         arm: identified from all.
-        names: of the recordings.
-        recordings: collision-free; those with a load are not judged.
+        names: names of the recordings.
+        recordings: collision-free; those with a load are not checked.
         held: held-out residual of each without its load [N m], shape (n,) each.
 
     Raises:

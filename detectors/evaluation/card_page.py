@@ -62,9 +62,9 @@ REGIMES = {
 
 
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
-    """A joint's number: "-" if nothing is watched there, in brackets if it is prior knowledge.
+    """A joint's number: "-" if it is not watched, in brackets if it rests on prior knowledge.
 
-    It is where no log shows the regime, or the joint's motion while others move.
+    That is so if no log shows the regime, or none shows the joint's motion while others move.
     """
     value, moving = _levels(card)[name][j], card.moving
     if value != value:
@@ -87,9 +87,9 @@ def rate_text(high: float, seconds: float, said: str) -> str:
     """An upper bound of alarms per hour in the text ``said``, if the log is long enough.
 
     Args:
-        high: the bound.
-        seconds: that were watched.
-        said: with {} for the number.
+        high: the upper bound.
+        seconds: watched time [s].
+        said: the text, with {} for the number.
     """
     if seconds < SHORTEST:
         return f"; {seconds / 60:.1f} min are too short to say how many an hour"
@@ -153,7 +153,7 @@ def _force(card: ThresholdCard, name: str) -> str:
 
 
 def _newton(force: float) -> str:
-    """A force, where any is found in so many poses and directions."""
+    """A force as text; "none" if none is found in enough poses and directions."""
     if not force < float("inf"):
         return "none"
     return f"{force:.0f} N" if force >= 10 else f"{force:.1f} N"

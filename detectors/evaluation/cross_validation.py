@@ -1,8 +1,8 @@
-"""Logs given as free of contacts, each judged by what the other logs show.
+"""Cross-validation of logs that are given as free of contacts.
 
-A contact in such a log raises the bounds, and contacts like it are then missed. So every log is
-looked at under a calibration and bounds from the others. Its alarms are counted; a log that has far
-more of them for its length than the others stands out.
+A contact in such a log raises the bounds, and similar contacts are then missed. So every log is
+evaluated with a calibration and bounds from the other logs, and its alarms are counted. A log with
+a far higher rate of alarms than the others stands out.
 """
 
 from __future__ import annotations
@@ -40,47 +40,47 @@ from tauguard.detectors.scores.free_motion import (
 )
 from tauguard.traces.trace import Alarm
 
-#: Calibrations that leave logs out, at most: more logs than this are left out in groups.
+#: Largest number of calibrations; more logs than this are left out in groups.
 TURNS = 12
 
-#: A log stands out where so many alarms had this probability at the others' rate, for all logs
-#: together. On three real arms the least of a free log is 0.14, the largest of a log with pushes
-#: among free ones 1e-5.
+#: A log stands out if its number of alarms has less than this probability at the other logs' rate,
+#: corrected for the number of logs. On three real arms the probability of a free log is at least
+#: 0.14, and that of a log with pushes at most 1e-5.
 CHANCE = 0.01
 
-#: Median of a log's residual in motion over its bound, from which on it differs throughout, as with
-#: a load that is not given (1.1 and 0.6 on two simulated arms; up to 0.5 of three arms' free logs).
+#: Least median of a log's residual in motion over its bound at which the log differs throughout, as
+#: with an unknown load (1.1 and 0.6 on two simulated arms; up to 0.5 in free logs of three arms).
 THROUGHOUT = 0.8
 
 
-#: Motion that is kept at least when logs are left out [s].
+#: Least motion that remains when logs are left out [s].
 KEPT = 20.0
 
 
 @dataclass(frozen=True)
 class CrossValidatedLog:
-    """A log under a calibration and bounds from the others."""
+    """A log, evaluated with a calibration and bounds from the other logs."""
 
     name: str
     begin: float  #: its first time [s]
-    seconds: float  #: its length
+    seconds: float  #: its length [s]
     alarms: tuple[Alarm, ...]  #: in the log's own time
     level: float  #: median of the largest residual over bound of joints in motion
 
     @property
     def throughout(self) -> bool:
-        """Whether its torques differ from the others' all along, not now and then."""
+        """Whether its torques differ from the other logs' throughout."""
         return self.level > THROUGHOUT
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Which logs to learn from."""
+    """The logs to learn from, and those that are left out."""
 
-    kept: tuple[CrossValidatedLog, ...]  #: each judged by the other kept ones
+    kept: tuple[CrossValidatedLog, ...]  #: each evaluated by the other kept ones
     left_out: tuple[CrossValidatedLog, ...]
-    """That stood out, each judged by those that were left then."""
-    accepted: tuple[CrossValidatedLog, ...]  #: kept ones that stand out but were vouched for
+    """Logs that stood out, each evaluated by those that remained then."""
+    accepted: tuple[CrossValidatedLog, ...]  #: logs that stand out and are kept on request
 
 
 def cross_validate(
@@ -124,11 +124,10 @@ def standing_out(logs: Sequence[CrossValidatedLog]) -> list[CrossValidatedLog]:
 
 
 def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[CrossValidatedLog]:
-    """Every log's alarms under calibration and bounds from the others.
+    """Every log's alarms with calibration and bounds from the other logs.
 
-    One log alone is cut, and each part judged by the other parts.
-
-    Where the others show too little motion to calibrate from, the calibration is that of all logs.
+    A single log is cut into parts, each of which is evaluated by the others. If the other logs have
+    too little motion for a calibration, that of all logs is used.
 
     Returns:
         In order.

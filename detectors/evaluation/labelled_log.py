@@ -6,24 +6,23 @@ from typing import Any
 
 from tauguard.traces import Alarm
 
-#: An alarm within so long after the onset of a contact is that contact's [s].
+#: Time after the onset of a contact within which an alarm belongs to it [s].
 LATE = 0.5
 
 
 def beside_labels(
     alarms: Sequence[Alarm], touched: Sequence[tuple[float, float]], begin: float, end: float
 ) -> dict[str, Any]:
-    """What was found of the labelled contacts, ready for JSON.
+    """Results on the labelled contacts, as JSON values.
 
-    A contact is found by an alarm that begins while it lasts, or within 0.5 s of its onset, and
-    before the next contact. Where none does, an alarm from before may still be up. An alarm that
-    begins elsewhere is false.
+    A contact is found by an alarm that begins during it, or within 0.5 s of its onset, and before
+    the next contact. Without one, an earlier alarm may still be up. Any other alarm is false.
 
     Args:
         alarms: in order of time.
         touched: first and last labelled time of each contact [s], in order.
-        begin: since when the detector watches [s]; contacts that begin before do not count.
-        end: of the log [s].
+        begin: start of the detection [s]; contacts that begin before do not count.
+        end: end of the log [s].
 
     Returns:
         ``contacts``, ``found``, ``still_up`` (in an alarm that began before), ``missed`` (their

@@ -22,17 +22,16 @@ def upper_quantile(
 ) -> Array:
     """Coefficients c >= 0 so that ``x @ c`` is about the quantile of ``y``.
 
-    They minimise the pinball loss and ``weight @ |c - prior|``: what the rows do not show keeps
-    the prior. The linear programme is solved in its dual, whose constraints are as few as the
-    coefficients.
+    They minimise the pinball loss plus ``weight @ |c - prior|``, so coefficients without data keep
+    the prior. The linear programme is solved in its dual, which has few constraints.
 
     Args:
         x: at least 0, shape (R, k).
         y: shape (R,).
         quantile: between 0 and 1.
         prior: shape (k,).
-        weight: of the distance from the prior, in rows of x = 1 that say less, shape (k,).
-        rows: how many are used; the sum of the loss stays that of all.
+        weight: weight of the distance from the prior, as a number of rows of x = 1, shape (k,).
+        rows: number of rows that are used; the loss is scaled to that of all rows.
 
     Returns:
         Shape (k,).
@@ -66,8 +65,8 @@ def upper_quantile(
 #: Bound at rest: deviations of the noise, and multiples of the friction level.
 NOISE, REST = 6.5, 0.12
 
-#: What motion of any joint adds to the bound at rest, a contact to that of a joint that it turned,
-#: and a start to that in motion.
+#: Additions to bounds: by motion of any joint to that at rest, by a contact to that of a joint that
+#: it turned, and by a start to that in motion.
 STOP, TURNED, START = 1.2, 0.6, 1.0
 
 #: The bound in motion over the 99 % quantile of left-out residuals, and its least value.
@@ -80,15 +79,15 @@ PRIOR = np.array([0.3, 0.02, 0.05, 0.03, 0.3])
 #: A friction level from T seconds of motion is widened by hypot(1, this / T).
 WIDENING_SECONDS = 40.0
 
-#: Seconds of a joint's own motion, faster than this [rad/s], that half tell its friction.
+#: Motion of a joint [s] above a speed [rad/s] at which its own friction counts half.
 KNOWN_SECONDS, FULL_SPEED = 4.0, 0.05
 
-#: Seconds of its motion without which nothing is known of a joint's motion, and how far beyond
-#: where it stood it may stand [rad]. Positions of other joints are not limited.
+#: Least motion of a joint whose motion counts as known [s]. Another joint may stand only where it
+#: stood in the logs, within this distance [rad].
 SHOWN_SECONDS, BEYOND, ANYWHERE = 1.0, 0.1, 1e6
 _ENDS = ("min", "max")
 
-#: Where the logs' gravity torques stand that the friction level is taken at.
+#: Quantile of the logs' gravity torques at which the friction level is taken.
 LOADED = 0.9
 
 
@@ -102,11 +101,11 @@ class Bound:
     quantile: Array
     """99 % of the residual in motion [N m per 1, rad/s, rad/s^2, rad/s^2, 1], shape (n, 5)."""
     low: Array
-    """Where joints stood whose motion no log shows, from here [rad], -ANYWHERE for others, (n,)"""
-    high: Array  #: to here, ANYWHERE for others
+    """Least position of joints that move in no log [rad], -ANYWHERE for others, shape (n,)."""
+    high: Array  #: their largest position, ANYWHERE for others
     scale: Array
-    """What left-out logs showed of the bounds at rest, of what motion adds to them, and in motion,
-    over the prior's, shape (3, n)."""
+    """Factors from held-out logs on the prior bounds: at rest, added by motion, and in motion,
+    shape (3, n)."""
 
     @classmethod
     def prior(cls, friction: Array, static: Array, low: Array, high: Array) -> Bound:
@@ -158,13 +157,13 @@ class Bound:
 
 
 def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Array, Array]:
-    """What a joint's bounds are measured in, in motion and at rest [N m], shapes (n,).
+    """The units of a joint's bounds, in motion and at rest [N m], shapes (n,).
 
-    At rest: its friction at 0.1 rad/s under the load that gravity puts on it in the logs; without
-    the load, a joint that carries the arm would count as one of half its friction. In motion: that,
-    or 1.5 times the error where it is more. Widened by hypot(1, 40 s / T), T: seconds of pieces in
-    which a joint moves. A joint's own friction counts as far as the joint moved: by T_j / (T_j +
-    4 s); else it is taken for the largest of the arm's.
+    At rest it is the joint's friction at 0.1 rad/s under the gravity torque in the logs; without
+    that torque, a joint that carries the arm would count as one with half its friction. In motion
+    it is the same, or 1.5 times the error if that is larger. Both are widened by
+    hypot(1, 40 s / T) for T seconds of motion. A joint's own friction has the weight
+    T_j / (T_j + 4 s), and the arm's largest friction has the rest.
     """
     n = arm.robot.joints
     error = 1.5 * np.asarray(arm.noise)

@@ -55,41 +55,41 @@ CONFIRMATION = 0.0
 #: The quantile of the residual in motion that is learned.
 QUANTILE = 0.99
 
-#: Seconds of motion that the prior is worth, where speed and accelerations are these [rad/s, ...].
+#: Weight of the prior in seconds of motion at these speeds and accelerations [rad/s, ...].
 WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
 
 #: Time between two rows of the regression [s].
 EVERY = 0.04
 
-#: Calibrations that leave logs out, at most.
+#: Largest number of calibrations with held-out logs.
 FOLDS = 5
 
-#: What left-out logs showed at most counts so many times, between these fractions of the bounds at
-#: rest, after motion and in motion, and against so many seconds of the prior.
+#: Factor on the largest signals of held-out logs; their least and largest value as fractions of the
+#: bounds at rest, after motion and in motion; weight of the prior in seconds.
 SCALE_MARGIN, SCALE_LEAST, SCALE_MOST = (1.5, 1.5, 1.3), (1.0, 1.0, 0.4), 3.0
 SCALE_WORTH = (30.0, 20.0, 60.0)
 
-#: Of an arm that no log shows moving: a joint's noise over the largest at least, and what static
-#: friction is taken to keep in deviations of the noise.
+#: For an arm that moves in no log: least noise of a joint over the largest, and the torque that
+#: static friction is assumed to hold, in standard deviations of the noise.
 QUIETEST, KEEPS = 0.2, 10.0
 
-#: Noise of an arm that stands: so many times the deviation in the calmest tenth of pieces of this
-#: length [s], where it is less than the median says. Touches leave some pieces calm. Free logs of
-#: two arms have 1.03 to 1.68 for the factor, so there the median stays, or nearly.
+#: Noise of a standing arm: at most this factor times the standard deviation in the calmest tenth of
+#: pieces of this length [s], because contacts leave some pieces calm. In free logs of two arms the
+#: median over that deviation is 1.03 to 1.68, so the median counts there, or nearly.
 CALM, PIECE = 1.45, 0.3
 
-#: Seconds at a log's beginning that nothing is learned from, nor an alarm raised in.
+#: Beginning of a log that is neither learned from nor watched [s].
 SETTLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What a detector saw of a trace; rows are samples."""
+    """A detector's signals along a trace; rows are samples."""
 
     t: Array  #: [s], shape (T,)
     qd: Array  #: [rad/s], shape (T, n)
     qdd: Array  #: sizes of accelerations [rad/s^2], shape (T, n)
-    ratio: Array  #: of each joint's signal to its bound, at most 1 until confirmed, shape (T, n)
+    ratio: Array  #: each joint's signal over its bound, at most 1 until confirmed, (T, n)
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: without biases [N m], shape (T, n)
     rest: Bools  #: which joints are at rest, shape (T, n)
@@ -103,7 +103,7 @@ class FittedFreeMotion(Frozen):
     dt: float  #: of the slowest training log [s]
     bound: Bound
     load: LoadDeviation  #: how uncertain the carried load is
-    seconds: float  #: of collision-free motion that the bounds rest on
+    seconds: float  #: collision-free motion that the bounds were learned from [s]
     unseen: Unseen = ()  #: what the logs do not show
     name: str = "free-motion"
     settle: float = SETTLE  #: [s]

@@ -48,7 +48,7 @@ class ExpectedRate:
 
     @classmethod
     def of(cls, scores: Sequence[FreeScores]) -> ExpectedRate:
-        """From collision-free motion, an episode each.
+        """The rates from scores of collision-free episodes.
 
         Raises:
             ValueError: no episodes.
@@ -73,7 +73,7 @@ class ExpectedRate:
         return found
 
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
-        """The lowest and the highest rate that the motion allows [1/h]."""
+        """Interval of the rate, from redrawn episodes and from the counted alarms [1/h]."""
         side = (1 - confidence) / 2
         low, high = np.quantile(self.rates(threshold), (side, 1 - side))
         seen = poisson_rate(int(np.sum(self.highest > threshold)), self.hours, confidence)
@@ -93,7 +93,7 @@ class Tails:
     def of(
         cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array, fraction: float
     ) -> Tails:
-        """Of this fraction of each draw's blocks; ``hours`` of each draw."""
+        """The tails of the highest ``fraction`` of each draw's blocks; ``hours`` are the draws'."""
         together = np.concatenate(blocks)
         order = np.argsort(together)
         together = together[order]

@@ -42,7 +42,7 @@ struct Command {
 struct Controls {
   Mode mode = Mode::table;
   double period = 0.01;              // of control [s]
-  std::vector<double> scale;         // of the action, one an entry
+  std::vector<double> scale;         // of the action, one per entry
   std::vector<double> centre;        // of the position mode [rad]
   std::vector<double> max_speed;     // [rad/s]
   std::vector<double> torque_limit;  // [N m]

@@ -63,7 +63,7 @@ struct Kinematics {
                                                          m[6] * c.x + m[7] * c.y + m[8] * c.z};
   }
 
-  // Torques that hold the nominal links against gravity [N m], one a joint.
+  // Torques that hold the nominal links against gravity [N m], one per joint.
   void hold(double* tau) const {
     std::fill(tau, tau + size(), 0.0);
     for (std::size_t link = 0; link < size(); ++link) {

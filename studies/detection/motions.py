@@ -33,7 +33,7 @@ SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
 #: Contact force of a judged collision [N].
 FORCES = (20.0, 200.0)
-#: Below the judged strata, for the smallest torque that is found [N m], and forces [N].
+#: Torques below the evaluated strata, for the smallest detected torque [N m], and forces [N].
 FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
 #: Collisions of one judged episode, and rounds of drawing again.
 GROUP, ROUNDS = 5, 8

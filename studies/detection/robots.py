@@ -76,7 +76,7 @@ def _descriptions(keep: str | None) -> Iterator[Path]:
 
 
 def conditions(name: str, folder: Path) -> Conditions:
-    """Under which a robot is judged; a description with losses is written into ``folder``.
+    """The file that a robot is tested with; one with losses is written into ``folder``.
 
     The package's own arms and descriptions (TOML) are taken as they are.
     """

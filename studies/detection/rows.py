@@ -57,7 +57,7 @@ def rows(by_speed: BySpeed, fleets: Sequence[Fleet]) -> list[Row]:
 
 
 def _thresholds(fleets: Sequence[Fleet], name: str, point: str) -> Row:
-    """Of the normalised score (the network's first two: amperes): median over arms and range."""
+    """Thresholds of the normalised score (network: amperes): median and range over arms."""
     values = [fleet[name].thresholds[point] for fleet in fleets]
     low, high = float(min(values)), float(max(values))
     return {"threshold": float(np.median(values)), "threshold_low": low, "threshold_high": high}
@@ -69,7 +69,7 @@ def countable(tally: Tally) -> list[Outcome]:
 
 
 def sensitivity(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """With its Wilson interval."""
+    """A rate with its Wilson interval."""
     return rate(sum(outcome.delay is not None for outcome in outcomes), len(outcomes))
 
 
@@ -232,7 +232,7 @@ def _hourly(own: list[Row]) -> Row:
 
 
 def _torques(own: list[Row]) -> Row:
-    """Found of all by torque, every speed together."""
+    """Fraction of collisions found, by torque, over all speeds."""
     by_torque = groups(own, lambda row: str(row["torque_nm"]))
     kinds = {kind: _together(by_torque[kind]) for kind in sorted(by_torque, key=_low)}
     return {"study": "strata", "detector": own[0]["detector"], "point": own[0]["point"], **kinds}

@@ -46,7 +46,7 @@ def command(
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the twin, a TOML file; its bodies are written beside it.
         columns: as for `tauguard calibrate`.
-        gains: N m per ampere, one a joint.
+        gains: N m per ampere, one per joint.
         payload: loads that were carried, LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
         torque: the logs hold joint torques in N m where they would hold currents.
         judge: free logs without a load of programs that LOGS do not have; without them, each third
