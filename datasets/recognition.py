@@ -2,8 +2,8 @@
 
 Names come in groups that differ by a joint's number, such as ``q0`` to ``q6``, ``actual_q_0`` or
 ``/joint_states/position[0]``. The last word of its name identifies a group. Commands are ignored.
-Values decide the units: angles beyond two turns are degrees, and sample intervals of more
-than half a second are milliseconds or less.
+Values decide the units: angles beyond two turns, or named so, are degrees, and sample intervals of
+more than half a second are milliseconds or less.
 """
 
 import re
@@ -45,6 +45,10 @@ _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
 #: A unit behind a name: "time [ms]", "angle (rad)".
 _UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
+#: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
+_WRITTEN = re.compile(
+    r"(?<=[a-z0-9])_(deg|degrees|rad|radians|deg_s|rad_s|deg_per_s|rad_per_s|ma|a|nm|n_m|ns|us|ms|s)$"
+)
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -72,7 +76,7 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _field(prefix: str) -> str | None:
-    plain = re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_")
+    plain = _WRITTEN.sub("", re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_"))
     if _OTHER.search(plain):
         return None
     for field, words in WORDS.items():
@@ -90,7 +94,11 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         header: names of all columns.
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
     """
-    time = next((n for n in header if _UNIT.sub("", n).strip(" #").lower() in TIMES), None)
+
+    def plain(name: str) -> str:
+        return _WRITTEN.sub("", _UNIT.sub("", name).strip(" #").lower())
+
+    time = next((name for name in header if plain(name) in TIMES), None)
     groups: dict[str, tuple[str, ...]] = {}
     for prefix, columns in grouped(header).items():
         field = _field(prefix)
@@ -128,7 +136,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         qd=groups.get("qd", ()),
         current=groups["current"] if effort == "current" else (),
         torque=groups["torque"] if effort == "torque" else (),
-        degrees=largest(groups["q"]) > FURTHEST,
+        degrees=largest(groups["q"]) > FURTHEST or "deg" in groups["q"][0].lower(),
         time_scale=scale,
         clock=clock,
         current_scale=1e-3 if milli else 1.0,

@@ -238,7 +238,7 @@ def bodies_file(path: Path) -> Path:
     """
     from tauguard.models.known_robots import find_file, known_names
 
-    if not path.exists() and str(path) in known_names():
+    if not path.is_file() and str(path) in known_names():
         return find_file(str(path))
     if path.suffix.lower() != ".toml":
         return path

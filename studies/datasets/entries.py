@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.framework import Workers
+from studies.framework import Workers, draw_found, groups
 from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import arms_of, episodes_of_splits
@@ -73,6 +73,12 @@ def measure(
             jobs = [(folder, arm, name) for arm in arms for name in names]
             entries = list(each(_entry, jobs))
     return [row for name in names for row in rows_of(name, entries)]
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Found from 16 N m up, by split and detector."""
+    splits = groups(rows, lambda row: f"split {row['split']}")
+    draw_found({k: {r["detector"]: r["from_16"] for r in own} for k, own in splits.items()}, figure)
 
 
 def configuration(quick: bool, seed: int) -> Configuration:

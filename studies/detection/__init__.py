@@ -63,17 +63,14 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         axes = ("microseconds a sample", "rms error of the output")
         label, cost_us = f"{row['support_vectors']} support vectors", number(row["us"]) or 0.0
         yield Point("Reduced sets of the SVR", label, cost_us, row["error_rms"], "", "", *axes)
-    for row in (row for row in table_rows(rows, "false alarms") if row["found"]["hours"]):
+    counted = table_rows(rows, "false alarms")
+    for row in (row for row in counted if row["found"]["hours"] >= HOURS):
         axes, label = (
             ("asked for, an hour", "counted, an hour"),
             f"{row['detector']}, {row['threshold']}",
         )
         question = "False alarms of arms on which nothing was set"
         yield Point(question, label, row["asked"], row["found"]["value"], "", "", *axes)
-    for row in (row for row in table_rows(rows, "robot") if row["sensitivity"]["n"]):
-        axes = ("false alarms an hour (none: 0.1)", "fraction of the harder collisions missed")
-        missed, alarms = 1 - row["sensitivity"]["value"], row["false_alarms_per_hour"]["value"]
-        yield Point(f"Robot {row['robot']}", row["detector"], alarms or 0.1, missed, "", "", *axes)
     cost = {row["detector"]: number(row["us"]) for row in table_rows(rows, "step")}
     for row in table_rows(rows, "hourly"):
         us, found = cost.get(row["detector"]), number(row["sensitivity"])

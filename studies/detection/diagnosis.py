@@ -308,6 +308,6 @@ def draw(rows: list[Row], figure: Any) -> None:
         points = [r["point_cm"] for r in mine if r["study"] == "contact"]
         axes[1].plot(at, points, "o-", label=method)
     for axis, label in ((axes[0], "link right"), (axes[1], "point error, median [cm]")):
-        axis.set_xticks(range(len(names)), names)
-        axis.set_ylabel(label)
+        axis.set_xticks(range(len(names)), [name.removesuffix(" N m") for name in names])
+        axis.set(xlabel="external torque [N m]", ylabel=label)
         axis.legend()

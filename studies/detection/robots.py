@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from studies.detection.motions import Conditions, Training
 from studies.detection.rates import AIMED, Size, arm_tallies, collisions, point
-from studies.framework import JobCache, Workers
+from studies.framework import JobCache, Workers, draw_found, groups
 from tauguard.models import cura6_drive, load_arm
 from tauguard.models.arm import NAMED
 from tauguard.report import Row
@@ -24,8 +25,6 @@ from tauguard.report import Row
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds")
 #: False alarms per hour that the thresholds aim at.
 ASKED = 1.0
-#: Robots of a run that names none: those of the package.
-ROBOTS = ",".join(NAMED)
 
 NOTES = {
     "robot": "one individual of each robot, with thresholds from its own motion for one false "
@@ -39,9 +38,10 @@ LITTLE = Training(slices=6, free=4, free_seconds=20.0)
 QUICK = Size(1, NAMES[:3], (ASKED,), LITTLE, 0.1, 0.1, 1)
 
 
-def measure(quick: bool, seed: int, robot: str = ROBOTS, keep: str | None = None) -> list[Row]:
-    """Rows ``robot``: one a robot and detector."""
-    names = [name.strip() for name in robot.split(",")]
+def measure(quick: bool, seed: int, robot: str | None = None, keep: str | None = None) -> list[Row]:
+    """Rows ``robot``: one a robot and detector (default: the package's arms; quick: one)."""
+    own = NAMED[1:2] if quick else NAMED
+    names = list(own) if robot is None else [name.strip() for name in robot.split(",")]
     stems = [Path(name).stem for name in names]
     twice = next((stem for stem in stems if stems.count(stem) > 1), None)
     if twice is not None:
@@ -61,6 +61,13 @@ def measure(quick: bool, seed: int, robot: str = ROBOTS, keep: str | None = None
         for stem, under, arm in zip(stems, unders, arms, strict=True)
         for detector in size.names
     ]
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Found of the harder collisions, by robot and detector."""
+    known = groups([row for row in rows if row["sensitivity"]["n"]], lambda row: row["robot"])
+    panels = {k: {row["detector"]: row["sensitivity"] for row in own} for k, own in known.items()}
+    draw_found(panels, figure)
 
 
 @contextlib.contextmanager

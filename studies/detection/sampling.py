@@ -66,6 +66,9 @@ def draw(rows: list[Row], figure: Figure) -> None:
     left.set(ylabel="found from 16 N m up")
     right.set(xscale="log", xlabel="samples per second", yscale="symlog")
     right.set(ylabel="false alarms per hour")
+    rates = list(dict.fromkeys(row["hz"] for row in rows))
     for axis in (left, right):
+        axis.set_xticks(rates, [f"{hz:g}" for hz in rates], rotation=45)
+        axis.minorticks_off()
         axis.grid(alpha=0.3)
     right.legend(fontsize=8)

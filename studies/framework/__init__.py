@@ -1,6 +1,7 @@
 """The framework of all studies: parts, timings, summary, processes, job cache."""
 
 from studies.framework.jobs import Each, JobCache, Workers
+from studies.framework.pareto import draw_found
 from studies.framework.rows import (
     Incomplete,
     Point,
@@ -14,6 +15,6 @@ from studies.framework.rows import (
 from studies.framework.study import Part, Study
 
 __all__ = [
-    "Each", "Incomplete", "JobCache", "Part", "Point", "Study", "Workers", "answer", "groups",
-    "number", "table_rows", "time_in_turn", "timed",
+    "Each", "Incomplete", "JobCache", "Part", "Point", "Study", "Workers", "answer", "draw_found",
+    "groups", "number", "table_rows", "time_in_turn", "timed",
 ]  # fmt: skip

@@ -2,14 +2,18 @@
 
 import io
 import math
-from collections.abc import Iterable, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from studies.framework.rows import Point, groups
+from tauguard.report import Row
 from tauguard.report.charts import COLOURS
 
 #: Colours of tauguard's points and of the peers' points.
 OURS, PEER = COLOURS[:2]
+#: A figure without points.
+NOTHING = "what was measured is in the tables"
 
 
 def front(points: Sequence[Point]) -> list[Point]:
@@ -42,7 +46,7 @@ def draw_points(points: Iterable[Point], figure: Any) -> None:
     """A panel for each question whose points have an error."""
     shown = groups([p for p in points if not math.isnan(p.error)], lambda p: p.question)
     if not shown:
-        figure.text(0.5, 0.5, "times and errors are in the tables", ha="center")
+        figure.text(0.5, 0.5, NOTHING, ha="center")
         return
     figure.set_size_inches(6.0 * len(shown), 5.8)
     panels = figure.subfigures(1, len(shown), squeeze=False)[0]
@@ -50,24 +54,47 @@ def draw_points(points: Iterable[Point], figure: Any) -> None:
         _draw(own, panel)
 
 
+def draw_found(found: Mapping[str, Mapping[str, Row]], figure: Any) -> None:
+    """A panel for each key: the fraction that each method found, with its 95 % interval."""
+    if not found:
+        figure.text(0.5, 0.5, NOTHING, ha="center")
+        return
+    rows = (len(found) + 1) // 2
+    longest = max(len(own) for own in found.values())
+    figure.set_size_inches(9.0, 0.6 + rows * (0.8 + 0.26 * longest))
+    panels = figure.subplots(rows, min(2, len(found)), squeeze=False, sharex=True).ravel()
+    for axes in panels[len(found) :]:
+        axes.set_axis_off()
+    for axes, (title, own) in zip(panels, found.items(), strict=False):
+        for k, rate in enumerate(own.values()):
+            value, low, high = (rate[key] for key in ("value", "low", "high"))
+            spread, colour = [[value - low], [high - value]], COLOURS[min(k, 1)]
+            axes.errorbar(value, k, xerr=spread, fmt="o", color=colour)
+        axes.set_yticks(range(len(own)), list(own), fontsize=9)
+        axes.set(title=title, xlim=(-0.02, 1.02), ylim=(len(own) - 0.5, -0.5))
+    figure.supxlabel("found, with 95 % interval", fontsize=10)
+
+
 def _draw(points: Sequence[Point], figure: Any) -> None:
     """Draw points numbered by label; a list below the axes explains the numbers."""
     axes = figure.subplots()
     labels = list(dict.fromkeys(p.method for p in sorted(points, key=lambda p: p.cost)))
+    numbers: dict[tuple[float, float], dict[str, None]] = {}
     for number, label in enumerate(labels, 1):
         own = [point for point in points if point.method == label]
         colour, marker = (PEER, "s") if own[0].role == "peer" else (OURS, "o")
         at = [p.cost for p in own], [p.error for p in own]
         axes.plot(*at, marker, color=colour, ms=6, label=f"{number}  {label}")
-        for point in own:
-            shown = str(number)
-            place = (point.cost, point.error)
-            axes.annotate(shown, place, (4, 4), textcoords="offset points", fontsize=9)
+        for place in zip(*at, strict=True):
+            numbers.setdefault(place, {})[str(number)] = None
+    for place, own_numbers in numbers.items():
+        text = ", ".join(own_numbers)
+        axes.annotate(text, place, (4, 4), textcoords="offset points", fontsize=9)
     best = front(points)
     axes.plot([p.cost for p in best], [p.error for p in best], "-", color="0.7", lw=1, zorder=0)
     _scale(points, axes)
     one = points[0]
-    axes.set(title=one.question, xlabel=one.cost_axis, ylabel=one.error_axis)
+    axes.set(title=textwrap.fill(one.question, 44), xlabel=one.cost_axis, ylabel=one.error_axis)
     axes.grid(alpha=0.25)
     figure.legend(loc="outside lower left", ncols=2, fontsize=8, frameon=False)
 
@@ -88,6 +115,9 @@ def _scale(points: Sequence[Point], axes: Any) -> None:
     above = [p.error for p in points if p.error > 0]
     if above and max(above) > 20 * min(above):
         axes.set_yscale("symlog", linthresh=min(above))
+        axes.yaxis.get_major_locator().set_params(numticks=7)
     axes.margins(x=0.1, y=0.12)
+    if max(costs) == min(costs):
+        axes.set_xlim(costs[0] / 3, costs[0] * 3)
     if not above:
         axes.set(ylim=(-0.1, 1.0), yticks=[0])

@@ -38,7 +38,7 @@ BESIDE_WHOM = (
 )
 DETECTIONS = (
     "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
-    "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on a UR5.</p>"
+    "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on arms.</p>"
 )
 FIGURES = (
     "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
@@ -49,6 +49,7 @@ RUNS = (
     "time. load: programs that wanted to run when a part ended; above the number of cores its "
     "times are too long."
 )
+UNRECORDED = "<p>A quick run records none: <code>tauguard report --mistakes</code> does.</p>"
 CASES = (
     "<p>Named cases with exact answers, put to every library that is installed; "
     "<code>tauguard hard-cases</code> runs them, on other libraries too. "
@@ -64,12 +65,12 @@ def command(
     seed: int = 0,
     study: tuple[str, ...] = (),
     bound: bool = False,
-    mistakes: bool = True,
+    mistakes: bool | None = None,
 ) -> None:
     """Run the studies that the folder does not hold yet, and write `index.html` of all of them.
 
-    A stopped run continues where it stopped. The page opens offline. It also links to recordings of
-    the mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If something
+    A stopped run continues where it stopped. The page opens offline. A full run also records the
+    mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If something
     cannot be shown, the page and a message name it, and the exit code is 1.
 
     Args:
@@ -80,7 +81,7 @@ def command(
         study: these studies or parts only (default: all that `tauguard bench list` names).
         bound: write the page from what the folder holds; run no study and no hard case.
         mistakes: train the detector of `tauguard demo` and record its mistakes, unless the
-            folder holds those of this build.
+            folder holds those of this build (default: where the run is not --quick).
     """
     from studies.framework import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run
@@ -99,10 +100,11 @@ def command(
         rows = run(load_cases(), adapters())
         found = {"name": kept.stem, "versions": versions(), "rows": rows}
         write_json(kept, found)
-    cases = found["rows"]
-    links = (
-        missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "") if mistakes else ""
-    )
+    cases, links = found["rows"], ""
+    if mistakes or (mistakes is None and not quick):
+        links = missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "")
+    elif mistakes is None:
+        links = UNRECORDED
     print(f"report: {Report(out, failed, missing).write(cases, links)}")
     for line in missing.lines:
         print(f"not shown, or not whole: {line}", file=sys.stderr)

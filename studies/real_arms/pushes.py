@@ -17,12 +17,14 @@ docs/notes/2026-11-24-touches.md lists what was compared.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from studies.real_arms import observers
+from studies.framework import draw_found, groups, table_rows
+from studies.real_arms import detections, observers
 from studies.real_arms.arms import ArmData, Push, Touched, available, nominal, recordings, touched
 from tauguard.detectors import ArmModel, poisson_rate
 from tauguard.detectors.alarms.alarm import CollisionAlarm
@@ -56,6 +58,18 @@ NOTES = {
 }
 
 
+def table(rows: list[Row]) -> list[Row]:
+    """Pushes found with the arm's false alarms, then the rates of these of every arm."""
+    rest = [row for row in rows if row["study"] != "pushes"]
+    return [{"study": "pushes", **line} for line in detections(rows)] + rest
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Pushes found, by arm, state and detector."""
+    own = groups(table_rows(rows, "pushes"), lambda row: f"{row['arm']}, {row['state']}")
+    draw_found({k: {row["detector"]: row["found"] for row in v} for k, v in own.items()}, figure)
+
+
 @dataclass
 class Tally:
     """What one detector did on one arm."""
@@ -71,13 +85,14 @@ FOLDS = 6
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """All rows; one that says so where the data are absent."""
+    """All rows; one that says so where the data are absent. A quick run judges no free log."""
     arms, rng = available(), np.random.default_rng(seed)
     found: list[Row] = []
     if not arms:
         found.append({"study": "real arm", "log": "no logs: set TAUGUARD_DATA to their folder"})
+    arms = [arm for arm in arms if arm.contact] if quick else arms
     for arm in tqdm(arms, desc="arms", unit="arm", disable=None):
-        tallies = arm_tallies(arm, 1 if quick else FOLDS, rng)
+        tallies = arm_tallies(arm, 0 if quick else FOLDS, rng)
         rows = [row for how, tally in tallies.items() for row in _rows(arm.name, how, tally)]
         found += sorted(rows, key=lambda row: (str(row["study"]), str(row.get("state", ""))))
     return found
@@ -168,7 +183,8 @@ def _rows(arm: str, how: str, tally: Tally) -> list[Row]:
     per_hour = poisson_rate(tally.alarms, tally.seconds / 3600)
     row: Row = {"study": "false alarms", "arm": arm, "detector": how}
     row |= {"minutes": tally.seconds / 60, "alarms": tally.alarms, "per hour": per_hour["value"]}
-    rows = [row | {"at least": per_hour["low"], "at most": per_hour["high"]}]
+    row |= {"at least": per_hour["low"], "at most": per_hour["high"]}
+    rows = [row] if tally.seconds else []
     for moving, delays in tally.delays.items():
         found = [delay for delay in delays if np.isfinite(delay)]
         if delays:

@@ -43,15 +43,6 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         name = ", ".join(str(row[key]) for key in ("timestep_ms", "integrator", "contact"))
         question, axis = "An impact on a rail beside the two-mass model", "error of the peak force"
         yield from _point(row, question, name, "peak_force_error", axis)
-    for row in table_rows(rows, "needs"):
-        axes = ("false alarms an hour (none: 0.1)", "fraction missed from 16 N m up")
-        for where, alarms, found in (
-            ("the whole simulation", row["false_per_hour"], row["from_16"]),
-            ("the poorer one", row["believed_false"], row["believed_from_16"]),
-        ):
-            question = f"A part left out of training, judged in {where}"
-            at = number(alarms) or 0.1, 1 - (number(found) or 0.0)
-            yield Point(question, row["left out"], *at, "", "", *axes)
     steps = {str(row["what"]): row for row in table_rows(rows, "step")}
     if steps:
         question = "10 ms of an arm with drives, observations and rewards"

@@ -201,5 +201,5 @@ def draw(rows: list[Row], figure: Any) -> None:
             axes.plot([row["speed_m_s"] for row in line], forces, "o-", label=reaction)
         axes.axhline(body_region("chest").transient_force, color="black", lw=0.8, ls="--")
         axes.set(xlabel="tool speed [m/s]", ylabel="peak force on the chest [N]")
-        axes.set_title(f"Reaction known from the {known}")
+        axes.set_title(f"known from the {known}")
         axes.legend(fontsize=8)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from studies.framework import Workers, time_in_turn
+from studies.framework import Workers, draw_found, time_in_turn
 from tauguard.datasets import plans
 from tauguard.detectors import SrqSvr, detection_metrics, matchings, train
 from tauguard.detectors.calibration.nominal import nominal_arm
@@ -51,6 +51,13 @@ def measure(quick: bool, seed: int) -> list[Row]:
         {"study": "needs", "left out": part, "cost": cost[part], **row}
         for part, row in zip(parts, found, strict=True)
     ]
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Found without each part, in the whole simulation and as believed."""
+    judged = {"in the whole simulation": "from_16", "in the poorer one": "believed_from_16"}
+    own = {k: {row["left out"]: row[key] for row in rows} for k, key in judged.items()}
+    draw_found(own, figure)
 
 
 def episodes(size: tuple[int, int, int, int], seed: int) -> tuple[Episodes, Episodes]:

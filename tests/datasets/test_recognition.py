@@ -68,6 +68,17 @@ def test_measured_signals_are_found_among_commanded_ones(names, fields):
     assert {name: group[1] for name, group in found.groups().items()} == fields
 
 
+def test_units_may_be_the_last_words_of_names():
+    kinds = ("pos_deg", "vel_deg_s", "motor_current_mA")
+    names = ["timestamp_us", *(f"axis{k}_{kind}" for kind in kinds for k in (1, 2, 3))]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    table[:, 0], table[:, 7:] = 10_000 * np.arange(50), 800 * table[:, 7:]
+    found = recognised(names, table)
+    assert found.degrees  # by its name: no angle is beyond two turns
+    assert (found.t, found.time_scale, found.current_scale) == ("timestamp_us", 1e-6, 1e-3)
+    assert found.qd == ("axis1_vel_deg_s", "axis2_vel_deg_s", "axis3_vel_deg_s")
+
+
 def test_nothing_is_proposed_where_something_lacks():
     table = np.zeros((5, 4))
     assert recognised(["t", "q1", "q2", "x"], table) is None

@@ -202,6 +202,12 @@ def test_the_bodies_of_a_description_are_its_file(tmp_path, arm):
         bodies_file(path)
 
 
+def test_a_folder_does_not_hide_the_arm_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("panda").mkdir()  # of logs
+    assert bodies_file(Path("panda")).name == "panda.xml"
+
+
 def test_an_identified_drive_has_friction_ripple_and_sensors_of_its_own(tmp_path, arm):
     path, n = tmp_path / "r.toml", len(load_arm(str(arm(4))).joints)
     rows = np.full((200, n), 0.3)
