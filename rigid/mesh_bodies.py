@@ -24,7 +24,8 @@ def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Sol
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ValueError(
-            "a, b: both are meshes; give convex bodies as one of them, or use MeshTree.overlap"
+            "a, b: both are meshes; MeshTree.overlap, contacts and sweep take two, distance takes "
+            "a mesh and convex bodies, such as Hulls of the vertices"
         )
     if isinstance(a, MeshTree):
         return a, cast(Solid, b), False

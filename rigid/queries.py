@@ -74,6 +74,8 @@ def sweep(
 ) -> Impacts:
     """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 
+    Two meshes: :meth:`MeshTree.sweep`. Bodies that turn: :func:`time_of_impact`.
+
     Args:
         a: N bodies of one kind at rest, or one.
         b: N bodies, or one.
@@ -159,7 +161,9 @@ def rows(a: Bodies, b: Bodies) -> int:
             )
         if type(bodies) not in _KINDS:
             kinds = ", ".join(kind.__name__ for kind in _KINDS)
-            raise ValueError(f"{name}: {type(bodies).__name__}, expected one of {kinds}")
+            given = type(bodies).__name__
+            way = "; two meshes meet by MeshTree.sweep" if given == "MeshTree" else ""
+            raise ValueError(f"{name}: {given}, expected one of {kinds}{way}")
     if isinstance(a, Polygons) != isinstance(b, Polygons):
         raise ValueError("b: polygons meet polygons only, for there is no third coordinate")
     if len(a) != len(b) and 1 not in (len(a), len(b)):

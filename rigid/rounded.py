@@ -144,7 +144,9 @@ def solid_parts(
         )
     if not isinstance(core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
         kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
-        raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}")
+        triangles = hasattr(core, "vertices") and hasattr(core, "faces")
+        way = "; a mesh is MeshTree(mesh.vertices, mesh.faces)" if triangles else ""
+        raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}{way}")
     if core.largest > most or (radius is not _SHARP and radius.max(initial=0.0) > most):
         raise ValueError(f"{name}: a number beyond {most:g}; scale the scene down".replace("+", ""))
     return core, radius

@@ -7,11 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 
 from oracles.bare_physics import rollout_pieces
 from oracles.processor_time import clock, count_time
-from studies.framework import time_in_turn
+from studies.framework import table_rows, time_in_turn
 from tauguard.datasets import columns_of_shards
 from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored
 from tauguard.datasets.configuration import load
@@ -40,6 +41,20 @@ NOTES = {
 def measure(quick: bool, seed: int) -> list[Row]:
     """All rows; the quick run has few episodes."""
     return rate_rows(quick, seed) + size_rows(quick, seed)
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Where the time of a sample goes, and that of mujoco.rollout alone."""
+    own = [row for row in table_rows(rows, "rate") if "steps [us]" in row]
+    axes, left = figure.subplots(), np.zeros(len(own))
+    names = [row["episodes"] for row in own]
+    for part in PARTS:
+        width = np.array([row[f"{part} [us]"] for row in own])
+        axes.barh(names, width, 0.4, left=left, label=part)
+        left = left + width
+    axes.plot([row["rollout [us]"] for row in own], names, "kD", label="mujoco.rollout")
+    axes.set(xlabel="microseconds a sample", ylabel="episodes")
+    axes.legend()
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from oracles.moving_bodies import REST, as_hulls, corners_of, motions, placed, rounded
 from tauguard.rigid import (
@@ -13,6 +14,7 @@ from tauguard.rigid import (
     Tetrahedra,
     distance,
     overlap,
+    sweep,
     time_of_impact,
 )
 from tauguard.rigid.comparators import ComparedTree
@@ -116,8 +118,12 @@ def test_inside_a_closed_mesh_the_surface_counts():
 def test_mesh_queries_refuse_what_they_cannot_answer():
     tree = MeshTree(np.eye(3), [[0, 1, 2]])
     ball = Spheres(np.zeros((2, 3)), 1.0)
-    with pytest.raises(ValueError, match=r"or use MeshTree\.overlap"):
+    with pytest.raises(ValueError, match=r"both are meshes; MeshTree\.overlap"):
         overlap(tree, tree)  # type: ignore[call-overload]
+    with pytest.raises(ValueError, match=r"^a: MeshTree, .*; two meshes meet by MeshTree\.sweep"):
+        sweep(tree, tree, [1, 0, 0])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"a mesh is MeshTree\(mesh\.vertices, mesh\.faces\)"):
+        overlap(trimesh.creation.box(), ball)
     with pytest.raises(ValueError, match="a, b: both are meshes"):
         distance(tree, tree)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="b: a number beyond 1e30"):
