@@ -46,10 +46,10 @@ _NO_VERTICES = np.zeros((0, 3))
 class State:
     """Positions and velocities of the scene at one instant.
 
-    Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1],
-    with dx the difference of both xpos and w the shortest rotation vector from one xmat to the
-    other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. Checkers
-    and the ground truth report contacts on this path.
+    Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1].
+    Here dx is the difference of both xpos, and w the shortest rotation vector from one xmat to the
+    other, as in ``mj_integratePos`` with a free joint. A flex vertex moves linearly. Checkers and
+    the ground truth report contacts on this path.
 
     Attributes:
         time: [s].

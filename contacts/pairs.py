@@ -1,8 +1,8 @@
 """The pairs of geoms and flexes that may touch: MuJoCo's rules, applied to a compiled model.
 
-The rules are those of the manual's chapter "Collision detection: selection": explicit pairs always
-count; other pairs need two bodies that are not welded together, not parent and child (unless the
-parent is the world), not excluded and not both immovable, and masks that agree.
+The rules are those of the manual's chapter "Collision detection: selection". Explicit pairs always
+count. Other pairs need masks that agree, and two bodies that are not welded together, not excluded
+and not both immovable. Parent and child do not count, unless the parent is the world.
 """
 
 from __future__ import annotations

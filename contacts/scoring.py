@@ -81,8 +81,8 @@ def judge(
 ) -> tuple[Outcome, ...]:
     """Whether MuJoCo listed each event, and whether the contact held.
 
-    A contact held if it was listed and never deeper than the thinner partner's inner radius (planes
-    and cloth have none), and no geom or triangle is pushed the other way from one step to the next.
+    A contact held if MuJoCo listed it and it was never deeper than the thinner partner's inner
+    radius (planes and cloth have none). Also, no normal may reverse from one step to the next.
     """
     if not touches:
         return ()

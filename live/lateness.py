@@ -2,8 +2,8 @@
 
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
-#: It is a fault if no sample arrives for this time, or if a sample is later than the least late one
-#: by this time [s].
+#: Longest time without a sample, and largest delay of a sample compared with the least delayed one;
+#: beyond it is a fault [s].
 BEHIND = 20e-3
 #: The limit is at least this number of sample intervals.
 INTERVALS = 2.5

@@ -20,8 +20,8 @@ ARM_BITS, OBSTACLE_BITS = 1, 2
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
 #: Its colour, and the group of collision shapes if visual shapes exist.
 STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
-#: Branches below a chain of at least the first number of joints are a gripper if each has at most
-#: the second number of joints, and no more than the chain.
+#: Least number of joints in a chain whose end branches may be a gripper, and largest number of
+#: joints of each branch (never more than the chain has).
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
 #: Below such a chain, a joint with such a name and all joints below it are a gripper, too.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)

@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 
-#: Rotor inertia at the joint per torque limit [kg m^2 / (N m)]: between geared cobot drives with
-#: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's
-#: (0.016: 3.2 kg m^2 for 200 N m).
+#: Rotor inertia at the joint per torque limit [kg m^2 / (N m)]. Geared cobot drives with small
+#: motors have about 0.002 (1e-5 kg m^2 behind a gear of 101 for 54 N m); the DLR arm has 0.016
+#: (3.2 kg m^2 for 200 N m).
 ROTOR_PER_TORQUE = 0.005
 #: Rotor inertia of a joint without torque limit, as a fraction of the joint's largest inertia.
 ROTOR_FRACTION = 0.05
-#: A torque limit that is not stated is the sum of three: this multiple of the torque that holds the
-#: arm, twice the file's friction, and the torque for this acceleration of the largest inertia
+#: Default torque limit: the first number times the sum of the torque that holds the arm and of the
+#: file's friction, plus the torque that accelerates the largest inertia by the second number
 #: [rad/s^2] (a UR10e's base: 27).
 HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
 #: Torque limit of the strongest joint over gravity's torque at the most loaded joint. UR5, UR10,
@@ -177,7 +177,7 @@ def stiffest_mode(
     """Change of the servo's fastest mode in a time step, and the joint that dominates it.
 
     An explicit velocity loop of rate ``d`` and a position loop of ``k`` (per unit of inertia) are
-    stable for ``d dt + k dt^2 / 2 < 2``; this is the largest such sum over the poses.
+    stable for ``d dt + k dt^2 / 2 < 2``. The result is the largest such sum over the poses.
     """
     dt = float(model.opt.timestep)
     masses = inertia_matrices(model, joints, random_poses(model, joints))

@@ -52,9 +52,9 @@ def friction_torque(friction: Friction, qd: Array, torque: Array, steps: Array) 
     """Friction along a motion [N m], by the recursion of :class:`tauguard.models.Friction`.
 
     Args:
-        friction: its numbers; the temperature is that of reference.
+        friction: the parameters, at the reference temperature.
         qd: velocities [rad/s], shape (T, n).
-        torque: that the joints transmit [N m], shape (T, n).
+        torque: torque that the joints transmit [N m], shape (T, n).
         steps: time before each sample [s], shape (T,).
     """
     slip = np.exp(-((qd / friction.stribeck_velocity) ** 2))

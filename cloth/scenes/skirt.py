@@ -11,9 +11,9 @@ HEM_PLEATS = 12
 def seated_skirt(triangles: int = 20_000, seed: int = 0) -> Scene:
     """An underskirt and an overskirt sink to the floor and stack up in horizontal folds.
 
-    Sitting shortens the height that the skirt has while its length stays: the profile buckles into
-    an accordion whose folds come to lie on one another, unevenly around the body, so that some meet
-    early and others not at all. One cloth, which meets itself.
+    Sitting lowers the waist while the skirt keeps its length, so the profile buckles into folds
+    that come to lie on one another. The folds differ around the body: some meet early, others not
+    at all. It is one cloth, which meets itself.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, (2, 3))

@@ -6,8 +6,7 @@ from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
 
-#: Shorter pauses than this between touching steps are part of one event, and never less than two
-#: steps [s].
+#: Longest pause within one event [s]; pauses of up to two steps never end an event.
 GAP = 5e-3
 
 #: Two partners, sorted: ("body", id) or ("flex", id).

@@ -54,23 +54,23 @@ class GuardedStepper:
 
     A plain step is tried first. It is accepted, with the bits of ``mj_step``, unless the verdict
     finds a pair that becomes too deep or that touches and separates unseen. Otherwise the state is
-    rolled back, the pair is made stiff until it separates, and the step is taken in sub-steps: one
-    up to the touch, and then sub-steps in which the solver stops the approach. A sub-step that
-    still fails is halved. If that does not help, the partners move rigidly together
+    rolled back and the pair is made stiff until it separates. The step is then taken in sub-steps:
+    one up to the touch, and others in which the solver stops the approach. A sub-step that still
+    fails is halved. If that does not help, the partners move rigidly together
     (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`).
 
     Args:
         model: the scene's. Its ``opt.timestep``, margins and contact parameters are changed within
             a step and restored; those of ``stiff`` pairs are restored when the pair separates.
         data: the MjData to step.
-        checkers: which pairs are covered, as the checkers of that name: ``rigid`` geoms against
-            geoms, ``cloth`` flexes against geoms, one another and themselves. :attr:`uncovered`
-            lists the pairs that may touch and are not covered.
+        checkers: names of checkers, whose pairs are covered: ``rigid`` geoms against geoms,
+            ``cloth`` flexes against geoms, other flexes and themselves. :attr:`uncovered` lists the
+            pairs that may touch and are not covered.
         stiff: whether the contacts of pairs that caused a rollback are made stiff.
         most: calls of ``mj_step`` that one step may cost before partners are stopped.
 
     Raises:
-        ValueError: another name, ``most`` below 2, or what :meth:`step` refuses.
+        ValueError: another name, ``most`` below 2, or a model that :meth:`step` refuses.
     """
 
     def __init__(

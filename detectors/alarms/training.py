@@ -1,9 +1,9 @@
-"""From collision-free motion to a threshold: the one path, for the command line and all studies.
+"""From collision-free motion to a threshold, for the command line and all studies.
 
-Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
-(:mod:`.speed_normalisation`), and the threshold is where the tail of their peaks has the rate of
-false alarms that is accepted (:mod:`.tail_model`), or the one that a calibration set guarantees
-(:mod:`.guarantee`). What else the motion allows: :mod:`.expected_rate`.
+Scores are reduced to the peaks of pieces (:mod:`.free_scores`) and normalised over the speed
+(:mod:`.speed_normalisation`). The threshold is where the tail of the peaks has the accepted rate of
+false alarms (:mod:`.tail_model`), or the one that a calibration set guarantees (:mod:`.guarantee`).
+:mod:`.expected_rate` gives the interval of the rate.
 """
 
 from __future__ import annotations

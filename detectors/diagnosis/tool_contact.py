@@ -1,7 +1,7 @@
 """The force of a contact whose place is known: the tool, as in most handling and pushing.
 
-If the place is known, the torques of six joints determine the three components of the force. The
-uncertainty is in the torques: static friction of a joint at rest hides that much of a push. The
+If the place is known, the torques of six joints determine the three components of the force. These
+torques are uncertain, because static friction at a joint at rest hides a part of the push. The
 prior of the force is a mixture of Gaussians of several sizes, weighted by their likelihood.
 """
 
@@ -21,12 +21,12 @@ from tauguard.detectors.diagnosis.severity import (
 )
 from tauguard.detectors.estimation.estimator import ArmModel
 
-#: Sizes that are equally likely before [N].
+#: Sizes of the force that the prior weighs equally [N].
 SIZES = np.geomspace(5.0, 400.0, 9)
-#: Standard deviations: of any joint [N m], of a torque relative to itself, of what the friction of
-#: a joint at rest hides relative to that friction, of the drives' gains and levers (log).
+#: Standard deviations: of any joint's torque [N m]; of a torque, relative; of the torque that
+#: static friction hides, relative to that friction; of gains and levers (log).
 LEAST, OWN, HIDDEN, SCALE = 0.15, 0.05, 0.5, 0.15
-#: A joint that is slower is at rest [rad/s].
+#: Speed below which a joint counts as at rest [rad/s].
 AT_REST = 0.02
 
 

@@ -1,12 +1,12 @@
 """The rate of false alarms of a threshold, estimated from recorded motion.
 
-Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that are rarer than the
-motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
-replacement, since the moments of one episode are alike. Every draw has its own tail. The tails
-differ most in rare alarms. A tail has an end only if the peaks show this beyond chance.
+Alarms are blocks of the merge gap whose peak exceeds the threshold. For alarms that are too rare to
+count, a generalised Pareto tail is fitted to the blocks' peaks. The interval comes from a bootstrap
+of whole episodes, because the moments of one episode are alike. Every draw has its own tail, and
+the tails differ most in rare alarms. A tail ends only if the peaks show this beyond chance.
 
-No tail contains moments that no episode shows. Therefore an interval always contains the exact
-Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an
+A tail knows nothing of situations that no episode shows. Therefore an interval always contains the
+exact Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an
 alarm do not exclude two alarms an hour with 80 % confidence, whatever the threshold.
 """
 

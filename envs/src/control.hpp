@@ -17,8 +17,8 @@ enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian
 // Replacements of the action by a reaction: follow velocities, no power, no power with brakes on.
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
-// A brake holds like a stiff spring that slips beyond its torque: this many times the servo's
-// stiffness.
+// Stiffness of a brake in units of the servo's. A brake holds like a spring that slips beyond its
+// torque.
 constexpr double brake_stiffness = 10.0;
 constexpr double brake_damping = 3.0;
 // Damping of the Cartesian mode's least squares; it bounds the step near a singular pose.
@@ -30,8 +30,8 @@ struct Table {
   std::size_t width = 0;  // joints
 };
 
-// A reference keeps this distance from the ends of a joint's range [rad] and approaches them at
-// most at this rate [1/s], so that the arm does not run into its stops.
+// Least distance of a reference from the ends of a joint's range [rad], and largest rate of its
+// approach [1/s]: they keep the arm off its stops.
 constexpr double end_margin = 0.01, end_rate = 6.0;
 
 struct Command {
@@ -41,9 +41,9 @@ struct Command {
 
 struct Controls {
   Mode mode = Mode::table;
-  double period = 0.01;              // of control [s]
-  std::vector<double> scale;         // of the action, one per entry
-  std::vector<double> centre;        // of the position mode [rad]
+  double period = 0.01;              // control period [s]
+  std::vector<double> scale;         // scale of each entry of the action
+  std::vector<double> centre;        // centre of the position mode [rad]
   std::vector<double> max_speed;     // [rad/s]
   std::vector<double> torque_limit;  // [N m]
   std::vector<double> low, high;     // ends of the joints' ranges [rad]
@@ -55,7 +55,7 @@ struct Controls {
   Command command;
   Table table;
 
-  // No override, the reference where the arm is.
+  // Removes an override and puts the reference where the arm is.
   void reset(const std::vector<double>& q) {
     override = Override::none;
     command.origin = q;
@@ -103,7 +103,7 @@ struct Controls {
     follow(joints, q);
   }
 
-  // The motor torque [N m] wanted of joint i in physics step `row` of the action or table,
+  // The wanted motor torque [N m] of joint i in physics step `row` of the action or table,
   // `elapsed` after its beginning.
   double wanted(const Joint& j, std::size_t i, std::size_t row, double elapsed, double q,
                 double qd) const {

@@ -63,7 +63,7 @@ class Person : public Posture {
     if (body_.reacts && force > felt && touched_[segment] < 0) touched_[segment] = t;
   }
 
-  // How far the nearer hand is from a place [m].
+  // Distance of the nearer hand from a place [m].
   double away(Vec3 place) const { return std::min(norm(place - grip_[0]), norm(place - grip_[1])); }
 
   // Sends the nearer hand to a place at once, in place of its next reach.
@@ -114,9 +114,9 @@ class Person : public Posture {
   double until_ = 0, back_until_ = 0;
   double turned_ = 0;               // yaw [rad]
   double lowered_ = 0;              // the hands: 0 in front, 1 beside the body
-  std::array<bool, 2> held_up_{};   // an object keeps the hand from where it would be
-  std::array<double, 2> raised_{};  // so high the hand is above its way, to pass an object [m]
-  std::array<double, person_segments> touched_{};  // when [s]; -1: not
+  std::array<bool, 2> held_up_{};   // an object stops the hand
+  std::array<double, 2> raised_{};  // height of the hand above its path, to pass an object [m]
+  std::array<double, person_segments> touched_{};  // time of the last touch [s]; -1: none
 
   template <class Each>
   static void visit(Vec3& v, Each&& each) {
@@ -196,7 +196,7 @@ class Person : public Posture {
     stride_ += speed * dt * 4.0;  // [rad/m]: a step of 0.8 m
   }
 
-  // Where there are objects, a person takes the hands back before walking off, or stays.
+  // If there are objects, a person takes the hands back before walking off, or stays.
   bool hands_are_back(double t) {
     if (!barriers_) return true;
     bool back = true;
@@ -292,7 +292,7 @@ class Person : public Posture {
       }
       return least;
     };
-    // A trunk that leans into something, or takes an upper arm there, stays as it was.
+    // A trunk that would lean into something, or move an upper arm into it, stays as it was.
     if (body() < 0 && lean_ != before) {
       lean_ = before;
       body();
@@ -316,9 +316,9 @@ class Person : public Posture {
     return nearest({at + upper_arm, at + lower_arm, at + hand});
   }
 
-  // An arm that has just been posed towards a goal, from where the palm was last. A palm that is
-  // held up follows its goal no faster than a startled hand, slides along what is in the way and
-  // climbs over it; so it passes through nothing.
+  // Corrects an arm that has just been posed towards a goal, starting from the last place of the
+  // palm. A palm that is stopped follows its goal no faster than a startled hand. It slides along
+  // the object and climbs over it, so it passes through nothing.
   void keep_clear(int side, Vec3 shoulder, Vec3 goal, double sign, Vec3 last, double dt) {
     Vec3 want = goal;
     if (held_up_[side]) {

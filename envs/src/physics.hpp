@@ -12,7 +12,7 @@
 
 namespace tauguard::envs {
 
-// An array of doubles, row-major, that somebody else made and the plant reads or writes.
+// A row-major array of doubles that the plant reads or writes and does not own.
 class Held {
  public:
   Held() = default;
@@ -38,7 +38,7 @@ class Held {
   std::shared_ptr<const void> owner_;
 };
 
-// Fields of MuJoCo's data by their names there, its functions, and who keeps them.
+// Fields of MuJoCo's data by their names there, its functions, and their owner.
 struct Engine {
   using Function = void (*)(const void*, void*);
   const void* model = nullptr;
@@ -78,12 +78,12 @@ class Physics {
   const double* geom_rotation(int geom) const { return e_.geom_xmat + 9 * geom; }
   double bounding_radius(int geom) const { return e_.geom_rbound[geom]; }
 
-  // Between two geoms, up to `most` [m], and the nearest points of both.
+  // Distance of two geoms, up to `most` [m], and their nearest points.
   double distance(int first, int second, double most, double* points) const {
     return e_.distance(e_.model, e_.data, first, second, most, points);
   }
 
-  // While one lives, a geom is elsewhere.
+  // Moves a geom to another place during its lifetime.
   class Moved {
    public:
     Moved(const Physics& physics, int geom, const double* centre, const double* quat_wxyz)

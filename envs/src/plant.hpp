@@ -99,7 +99,7 @@ class Plant {
     }
   }
 
-  // The hand that is nearest to a place [m] goes there now and stays for `hold` [s].
+  // Sends the nearest hand to a place [m] now, where it stays for `hold` [s].
   void aim(Vec3 place, double hold) {
     Person* nearest = nullptr;
     for (Person& person : around_.people)
@@ -124,7 +124,7 @@ class Plant {
     finish();
   }
 
-  // The observation and metrics once more, after a target has moved.
+  // Updates observation and metrics after a target has moved.
   void refresh() {
     if (sound_) observe();
     report();
@@ -150,14 +150,14 @@ class Plant {
     return done;
   }
 
-  // Everything that the plant remembers beside MuJoCo's data, as numbers; of one length.
+  // The plant's state beside MuJoCo's data, as numbers of a fixed length.
   std::vector<double> state() {
     std::vector<double> out;
     visit([&](auto& value) { out.push_back(static_cast<double>(value)); });
     return out;
   }
 
-  // Goes back to what state() gave; false, and as it was, where no plant of this scene gives that.
+  // Restores what state() returned. False, without a change, if it is not of such a plant.
   bool restore(const std::vector<double>& saved) {
     const std::vector<double> before = state();
     if (saved.size() != before.size()) return false;
@@ -209,7 +209,7 @@ class Plant {
     visit([&](auto& value) { value = static_cast<std::decay_t<decltype(value)>>(saved[at++]); });
   }
 
-  // Whether everything that is an index is one.
+  // Whether all indices are in range.
   bool plausible() const {
     const auto within = [](int k, std::size_t most) {
       return k >= 0 && static_cast<std::size_t>(k) <= most;
@@ -220,7 +220,7 @@ class Plant {
                        [](const Person& p) { return p.plausible(); });
   }
 
-  // One physics step: the state before it into a row, the drives' torques, mj_step.
+  // One physics step: writes the state before it, applies the drives' torques, calls mj_step.
   void advance(double* q, double* qd, double* current) {
     const double elapsed = static_cast<double>(row_) * drives_.dt;
     for (std::size_t i = 0; i < joints(); ++i) {
@@ -245,7 +245,7 @@ class Plant {
     for (const Belt& b : belts) b.run(physics_);
   }
 
-  // Of a person: two rows of hands, and their part of the walks.
+  // The script of a person: two rows of hands, and their part of the walks.
   Script script(std::size_t p) const {
     const std::size_t reaches = rows_.reaches.shape(1);
     const std::size_t walks = rows_.walks.shape(0) / around_.people.size();
@@ -282,7 +282,7 @@ class Plant {
     rows_.touched.clear();
   }
 
-  // Over the last physics step; the row has where the regions were before it.
+  // Velocities over the last physics step; the row has the regions' places before it.
   void measure_speeds() {
     if (row_ == 0) return;
     const std::size_t width = 7 * around_.regions.size();
@@ -330,7 +330,7 @@ class Plant {
     read_regions(around_.regions, around_.arms, step, contact_, rows_.touched, between);
   }
 
-  // Whether the arm can exert the largest force so far; a solver that fails reports any number.
+  // Whether the arm can exert the largest force so far; a failed solver may report any number.
   bool possible() const {
     const double squared = contact_.force * contact_.force;
     if (squared <= controls.moving + controls.driven) return true;

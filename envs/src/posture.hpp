@@ -26,7 +26,7 @@ class Posture {
   Axes axes_{};
   std::array<Vec3, 2> grip_;       // places of the palms
   double stride_ = 0, swing_ = 0;  // phase and amplitude of the gait [rad]
-  double lean_ = 0;                // of the trunk, forward [rad]
+  double lean_ = 0;                // forward lean of the trunk [rad]
 
   void place(int segment, Vec3 a, Vec3 b) {
     centre[segment] = mix(a, b, 0.5);

@@ -1,5 +1,5 @@
-// What touches the arm and how hard, kept up to date at every physics step: the net force, the
-// external joint torque, the onset of a collision, and each body region's force against its limits.
+// Contacts of the arm at every physics step: net force, external joint torque, onset of a
+// collision, and the force on each body region with its limits.
 #pragma once
 
 #include <algorithm>
@@ -16,28 +16,29 @@ namespace tauguard::envs {
 // A body region in the scene; -1 where it has no joint (held in place).
 struct Region {
   int body = -1, joint = -1, qpos = -1, dof = -1;
-  int mocap = -1;                          // of the frame that a person moves; -1: no person's
+  int mocap = -1;                          // mocap frame of a person's part; -1: of no person
   bool held = false;                       // cannot move away
   int sensor = -1;                         // address of its ten contact numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no impact is allowed
-  double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
-  double area = 0;             // of the robot's contact surface [cm^2]; 0: unknown
-  double least_pressure = 0;   // of a flat surface, where the area is unknown [N/cm^2]
-  double stiffness = 0;        // of its contact [N/m]
-  double touching = 0;         // unbroken contact so far [s]
-  double force = 0;            // at the last physics step [N]
-  double advance = 0;          // of the arm into it during the unbroken contact [m]
+  double span = 0,
+         speed = 0;           // it turns back at this distance from its origin [m]; its speed [m/s]
+  double area = 0;            // area of the robot's contact surface [cm^2]; 0: unknown
+  double least_pressure = 0;  // pressure of a flat surface, if the area is unknown [N/cm^2]
+  double stiffness = 0;       // stiffness of its contact [N/m]
+  double touching = 0;        // unbroken contact so far [s]
+  double force = 0;           // at the last physics step [N]
+  double advance = 0;         // advance of the arm into it during that contact [m]
 };
 
-// A region that has left its span comes back at its own speed: a hand that goes to and fro.
+// Sends a region that has left its span back at its own speed, like a hand that goes to and fro.
 inline void turn_back(const Region& r, const Physics& physics) {
   if (r.joint < 0 || r.speed == 0) return;
   const double at_now = physics.qpos()[r.qpos];
   if (std::fabs(at_now) > r.span) physics.qvel()[r.dof] = at_now > 0 ? -r.speed : r.speed;
 }
 
-// Of each region at its peak over an action: force [N], pressure [N/cm^2], point [m], direction of
-// the force on it.
+// The peak contact of each region over an action: force [N], pressure [N/cm^2], point [m],
+// direction of the force on it.
 struct Touched {
   Held force, pressure, point, direction;
 
@@ -47,7 +48,7 @@ struct Touched {
   }
 };
 
-// The largest values over one control step, and what lasts longer.
+// The largest values over one control step, and the state of the collision.
 struct Contact {
   double force = 0;         // peak net force on a link [N]
   double cost = 0;          // impulse beyond the regions' limits [N s]
@@ -68,11 +69,11 @@ constexpr double merge_gap = 0.5;       // contacts closer than this are one col
 constexpr double transient_time = 0.5;  // longer contacts are quasi-static [s]
 constexpr int sensor_width = 10;        // found, force (3), torque (3), position (3)
 
-// What a physics step leaves in its row: net force on the arm [N]; link, point [m] and force [N] of
-// the largest force on a link, 0 and NaN where there is none.
+// The record of a physics step: net force on the arm [N], and link, point [m] and force [N] of the
+// largest force on a link; without contact link and force are 0, and the point is NaN.
 constexpr int contact_width = 8;
 
-// Reads the links' contact sensors at time t; tau receives tau_ext, row what touched.
+// Reads the links' contact sensors at time t, and writes tau_ext to tau and the contact to row.
 inline void read_links(const Kinematics& arms, const double* sensor, double t, Contact& c,
                        double* tau, double* row) {
   std::fill(tau, tau + arms.size(), 0.0);
@@ -122,7 +123,7 @@ inline double speed_of(const Kinematics& arms, const double* links, const double
   return link < arms.size() ? dot(arms.velocity(link, point, qd), direction) : 0.0;
 }
 
-// What a physics step of the arms is read from: the links' sensors, all sensors, joint velocities.
+// Inputs of a physics step's record: sensors of the links, all sensors, joint velocities.
 struct Sensed {
   const double *links, *all, *qd;
   double dt;

@@ -25,14 +25,14 @@ struct Surroundings {
   std::vector<Region> regions;
   int people_begin = 0;  // the first of the people's regions, person after person
   std::vector<Person> people;
-  std::vector<double> low, high;  // of the observation
-  int sensor_begin = -1;          // of the links' contact sensors; -1: none
-  int arms_sensor = -1;           // of what two arms do to one another; -1: none
-  std::vector<int> people_geoms;  // of the people's capsules, person after person
-  Barriers barriers;              // which people's arms go round
+  std::vector<double> low, high;  // bounds of the observation
+  int sensor_begin = -1;          // first contact sensor of the links; -1: none
+  int arms_sensor = -1;           // sensor of the force between two arms; -1: none
+  std::vector<int> people_geoms;  // geoms of the people's capsules, person after person
+  Barriers barriers;              // obstacles that people's arms avoid
 };
 
-// Where an environment's results go: rows of arrays that Python owns.
+// Output rows of an environment, in arrays that Python owns.
 struct Rows {
   Held observation, metrics, tau_ext, target;
   Held q, qd, current, tau;  // physics steps x joints
@@ -44,7 +44,7 @@ struct Rows {
   Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }
 };
 
-// Where a run along a table of references is written to: row k belongs to the state before step k.
+// Output of a run along a table of references; row k belongs to the state before step k.
 struct Track {
   Held q, qd, current;  // rows x joints
   Held sensors, poses;  // rows x numbers of the links' sensors, rows x bodies x 7

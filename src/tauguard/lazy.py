@@ -15,8 +15,8 @@ def on_demand(package: str) -> Callable[[str], Any]:
 
     ``dir`` and completion list those names, too, without importing any.
 
-    Type checkers see those imports as they stand; at run time a name costs its own module only, so
-    that a light part of a package does not load what the heavy ones need.
+    Type checkers read those imports. At run time a name loads its own module only, so that a light
+    part of a package does not load the libraries of the heavy parts.
     """
     where = _typed_imports(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
 

@@ -1,8 +1,8 @@
 """The dissertation's experiment on simulated arms: detectors, speeds, operating points.
 
 Every arm differs from the nominal one within the measured magnitudes. Its detectors are trained on
-its own 15 slices with the dissertation's payloads, get their thresholds from other motion of that
-arm, and are judged on motions with payloads that no slice had and no detector is given.
+its own 15 slices with the dissertation's payloads, and their thresholds come from other motion of
+that arm. They are tested on motions with other payloads, which no detector is given.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

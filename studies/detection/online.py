@@ -1,7 +1,7 @@
 """What one sample costs: simulated and detected in batch, then online, method by method.
 
-scikit-learn's ``SVR.predict`` gets the same windows as the kernel sum, one row a call; it is
-charged with the kernel row against the support vectors alone, in NumPy: less than its own callable
+scikit-learn's ``SVR.predict`` gets the same windows as the kernel sum, one row per call. Its time
+includes only the kernel row of the support vectors, in NumPy, which is less than its own callable
 kernels compute.
 """
 

@@ -1,8 +1,8 @@
 """Any robot: what detectors find on it, how soon, and their false alarms.
 
-Every arm is an individual of its robot: masses, gains and friction differ from what is believed. A
-robot of whose friction neither its file nor its description says anything gets the losses of the
-CURA6-like arm's drives, as fractions of its torque limits: without losses any detector is good.
+Every arm is an individual of its robot: masses, gains and friction differ from the nominal ones. If
+neither file nor description states a robot's friction, it gets the losses of the CURA6-like arm's
+drives, as fractions of its torque limits, because any detector is good on an arm without losses.
 Payloads and torques of collisions are smaller on an arm with smaller torque limits.
 """
 

@@ -1,11 +1,12 @@
 """Real arms: false alarms and pushes found, beside public observers on the same logs.
 
-Each arm's collision-free logs are dealt into folds; a detector trained on the others judges each
-log, with its load if that is known. Logs with pushes are judged by a detector trained on all
-collision-free logs, a Panda's touches by one that knows the untouched beginnings of its other logs.
-A push is found by an alarm between 0.15 s before its start and the peak of its force, a touch until
-its label ends, a push of seconds within half a second. ``by chance`` is what the same alarms find
-when all are shifted by a random time.
+Each arm's collision-free logs are dealt into folds. Each log is watched by a detector that was
+trained on the other folds, with its load if that is known. Logs with pushes are watched by a
+detector trained on all collision-free logs. A Panda's touches are watched by a detector that was
+trained on the untouched beginnings of its other logs. An alarm finds a push if it begins between
+0.15 s before the start and the peak of the force; a touch, if it begins before the label ends; a
+push of seconds, within half a second. ``by chance`` counts what the same alarms find when all are
+shifted by a random time.
 
 Beside ours stand the observers of :mod:`studies.real_arms.observers`, with our calibration, and
 Franka's own estimate of the external torque with the thresholds of libfranka's examples.
