@@ -142,8 +142,8 @@ def load(source: str | Path) -> Configuration:
     """The configuration in a TOML file, or the one that ships under that name.
 
     Raises:
-        ValueError: not TOML, an unknown key, a value out of its range, or a split with a value
-            that it calls unseen; the message names key, value and what would work.
+        ValueError: not TOML, an unknown key, a value out of range, or a split that shares a value
+            declared as unseen; the message names key, value and what would work.
         OSError: no such file.
     """
     path = Path(source)

@@ -1,4 +1,4 @@
-"""A simulated arm that is like a real one: identified from free logs, judged on others."""
+"""A simulated arm that is like a real one: identified from free logs and tested on others."""
 
 from tauguard.twin.identify import Twin, identify_twin, with_intervals
 from tauguard.twin.judge import Likeness, compare, with_alarms

@@ -1,4 +1,4 @@
-"""A twin as the robot file that the simulator reads: TOML, beside it the bodies as URDF or MJCF."""
+"""Write a twin as a robot file for the simulator: TOML, and the bodies as URDF or MJCF."""
 
 import re
 from collections.abc import Sequence
@@ -93,7 +93,7 @@ def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
 
 
 def _bodies(twin: Twin) -> list[str]:
-    """The inertial numbers that the logs show, as comments: of one link a line."""
+    """The identified inertial numbers as comments, one line per link."""
     half = twin.intervals.get("inertial")
     if half is None:
         return []

@@ -17,15 +17,15 @@ from tauguard.twin.signals import Motion
 STRIBECK = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: Candidates of the rise of friction with the load, at its median.
 LOADS = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.8])
-#: Speeds over which the level rises [rad/s]: a gear's lubricant.
+#: Speeds over which friction rises, as a gear's lubricant lets it [rad/s].
 SLOPES = (0.03, 0.1, 0.3, 1.0)
-#: A joint whose motion is shorter is not fitted [s].
+#: Least motion of a joint that is fitted [s].
 LEAST = 1.0
 #: Standard deviation of the priors, relative to the median friction.
 BELIEF = 0.3
-#: A sample counts 1/SOFTNESS^2, as in the calibration: the law's errors are not white.
+#: A sample has the weight 1/SOFTNESS^2, as in the calibration, because errors are not white.
 SOFTNESS = 5.0
-#: A number is the prior's where its variance is more than this fraction of the prior's.
+#: A number counts as not identified if its variance exceeds this fraction of the prior's.
 SHOWN = 0.5
 
 
@@ -45,7 +45,7 @@ class FrictionFit:
 def fit_friction(
     joint: int, motions: Sequence[Motion], torques: Sequence[Array]
 ) -> FrictionFit | None:
-    """What one joint loses; None where it moves for less than :data:`LEAST`.
+    """Friction of one joint; None if it moves for less than :data:`LEAST`.
 
     Args:
         joint: its index.
@@ -78,7 +78,7 @@ def fit_friction(
 def _solve(
     qd: Array, load: Array, left: Array, stribeck: float, rise: float, usual: float
 ) -> tuple[Array, float, Bools]:
-    """Coefficients, the norm of what they leave with the priors, and which of two are seen.
+    """Coefficients, norm of the residual with the priors, and which of two are identified.
 
     The last two coefficients are an offset of either sign. Seen are static friction, relative to
     Coulomb friction, and viscous friction.
@@ -103,6 +103,6 @@ def _solve(
 
 
 def _norm(products: Array) -> float:
-    """Norm of what least squares with coefficients of 0 or more leaves."""
+    """Norm of the residual of non-negative least squares."""
     root = np.linalg.cholesky(products).T
     return float(nnls(root[:, :-1], root[:, -1])[1])

@@ -60,7 +60,7 @@ def verdict(likeness: Likeness) -> str:
 
 
 def _ratios(likeness: Likeness, joint: int) -> str:
-    """Simulated over real residuals of one joint, where there are any."""
+    """Simulated and real residuals of one joint, if there are any."""
     parts = {
         "rms": likeness.rms,
         "peaks": likeness.peaks,

@@ -1,4 +1,4 @@
-"""A twin from free logs: the calibrated bodies, friction, and what neither explains."""
+"""Identify a twin from free logs: bodies, friction, and the errors that remain."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -14,13 +14,13 @@ from tauguard.twin.drive_fit import SLOPES, FrictionFit, fit_friction
 from tauguard.twin.play import friction_torque, modelled
 from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 
-#: Candidates of the angle over which friction turns around with the joint [rad], and the prior.
+#: Candidates and prior of the angle over which friction reverses with the joint [rad].
 PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
-#: Between these speeds a joint shows it [rad/s]. A slower one holds what its controller asks for.
+#: Speeds between which a joint shows that angle [rad/s]; a slower joint is held by its controller.
 TURNING = (0.005, 0.1)
 #: Prior of the gear ratio.
 GEAR = 101.0
-#: Least half width of an interval, of the largest joint's number: no law of friction is truer.
+#: Least half width of an interval, relative to the largest joint's number: the error of the law.
 FORM = 0.02
 #: The identified numbers that have an interval.
 NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
@@ -78,7 +78,7 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
 
 
 def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
-    """The twin with intervals by the jackknife over logs: errors of the model last for a log.
+    """The twin with intervals by the jackknife over logs, within which model errors are alike.
 
     Args:
         twin: of all logs.
@@ -145,7 +145,7 @@ def _friction(fits: Sequence[FrictionFit | None], gain: Array) -> Friction:
 
 
 def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Array]) -> Friction:
-    """Friction with the bristle stiffness that fits best while joints turn around."""
+    """Friction with the bristle stiffness that fits best while joints reverse."""
     level = friction.bristle_stiffness * USUAL
     errors = []
     for angle in PRESLIDING:
@@ -162,7 +162,7 @@ def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Arra
 
 
 def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
-    """What the logs report beyond the model, at even steps; nothing is smoothed.
+    """Errors of the model along the logs, at even steps and without smoothing.
 
     Each sample goes to the nearest even time with its impulse, error times step. A late sample and
     the early one after it would else leave an impulse that neither the arm nor an observer saw.
@@ -191,7 +191,7 @@ def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -
 
 
 def _sensors(traces: Sequence[Trace], n: int) -> Sensors:
-    """Quanta and times of the samples; the noise is part of the left-over errors."""
+    """Quanta and times of the samples. The noise is part of the left-over errors."""
     one = max(traces, key=lambda trace: len(trace.t))
     steps = np.concatenate([np.diff(trace.t) for trace in traces])
     usual = float(np.median(steps))

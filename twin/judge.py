@@ -1,4 +1,4 @@
-"""A twin beside its arm on logs that it has not seen: residuals, their peaks, and a classifier."""
+"""Compare a twin with its arm on held-out logs: residuals, their peaks, and a classifier."""
 
 import itertools
 from collections.abc import Sequence
@@ -23,10 +23,10 @@ from tauguard.traces import Trace
 from tauguard.twin.play import played, residual_of
 from tauguard.twin.signals import SLOW
 
-#: Lengths of what is compared [s]: windows of the classifier, spans of peaks, groups of windows
-#: that are kept together, and what the estimator needs to begin.
+#: Lengths [s] of the classifier's windows, of the spans of peaks, of groups of windows that stay in
+#: one fold, and of the start of a log, in which the estimator settles.
 WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
-#: Least duration of what an rms is computed from [s].
+#: Least duration for an rms [s].
 SHORTEST = 1.0
 #: Fewest windows of each kind for an area under a curve.
 FEWEST = 40
@@ -34,7 +34,7 @@ FEWEST = 40
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """Simulated over real residuals of held-out logs; NaN where the logs show too little."""
+    """Ratios of simulated to real residuals of held-out logs; NaN without enough motion."""
 
     rms: Array  #: ratio while the joint moves, shape (n,)
     peaks: Array  #: ratio of the 99 % quantiles of peaks of 0.5 s, moving, shape (n,)
@@ -133,7 +133,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
 
 
 def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
-    """Of each joint's own rows, shape (n,); NaN where they last for less than :data:`SHORTEST`."""
+    """Rms of each joint's own rows, shape (n,); NaN if they are shorter than :data:`SHORTEST`."""
     weight = rows * seconds[:, None]
     total = weight.sum(axis=0)
     square = (weight * values**2).sum(axis=0)
@@ -194,7 +194,7 @@ def _auc(
 def _real_auc(
     real: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array], seed: int
 ) -> tuple[float, float]:
-    """Of windows of like motion: successive windows are given one label each in turn."""
+    """Area for windows of like motion, whose labels alternate."""
     a, groups = _windows(real, rows, times)
     return _area(a, np.arange(len(a), dtype=np.float64) % 2, groups, seed)
 

@@ -1,4 +1,4 @@
-"""The currents that a drive would report along a motion that is given."""
+"""Currents that a drive would report along a given motion."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _TRACKED = Unknowns.for_detection()
 
 
 def modelled(arm: ArmModel, friction: Friction | None, gain: Array, trace: Trace) -> Array:
-    """Currents that bodies and friction ask for along a log's motion [A], shape (T, n)."""
+    """Currents that bodies and friction need along a log's motion [A], shape (T, n)."""
     motion = motion_of(arm, trace)
     torque = motion.bodies
     if friction is not None:
@@ -43,7 +43,7 @@ def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
 
 
 def residual_of(arm: ArmModel, trace: Trace) -> Array:
-    """What a detector's estimator does not explain of a log [N m], shape (T, n)."""
+    """Residual of a detector's estimator along a log [N m], shape (T, n)."""
     estimator = Estimator(arm, OBSERVER, trace.dt, _TRACKED)
     return estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
 

@@ -1,4 +1,4 @@
-"""What a log says before any model of a drive: its motion, and the bodies' torque along it."""
+"""Motion of a log, and the torque of the bodies along it, before any model of the drives."""
 
 import itertools
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from tauguard.traces import Trace
 
 #: A joint that is slower stands [rad/s].
 SLOW = 0.02
-#: Standard deviation of the filter of velocities that friction is computed from [s].
+#: Standard deviation of the velocity filter for the friction [s].
 SMOOTHING = 0.02
-#: A log is split where two samples are this many intervals apart.
+#: Gap at which a log is split, in sample intervals.
 GAP = 4.0
 #: Time around a log's last stop that is left out [s].
 STOP = 0.05
@@ -24,7 +24,7 @@ STOP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A log's motion, and what bodies and rotors ask of the drives."""
+    """A log's motion, and the drive torques for bodies and rotors."""
 
     t: Array  #: [s], shape (T,)
     qd: Array  #: smoothed without delay [rad/s], shape (T, n)
@@ -65,7 +65,7 @@ def without_gaps(trace: Trace, shortest: float = 1.0) -> list[Trace]:
 
 
 def bridged_stop(trace: Trace, error: Array) -> Array:
-    """The error along a log without that of its last stop, which is interpolated, shape (T, n).
+    """The error along a log, interpolated over its last stop, shape (T, n).
 
     A program that is cut off brakes all joints within a sample or two, which the log does not
     resolve: hundreds of N m that are none of the arm.

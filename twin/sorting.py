@@ -1,4 +1,4 @@
-"""Checks that all logs are of one arm with the stated loads; others would falsify a twin."""
+"""Check that all logs are of one arm with the stated loads, because others distort a twin."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ ROUNDS = 4
 
 
 def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[int]:
-    """Logs without a load that the others do not predict: indices, at most a third of them.
+    """Indices of logs without a load that the others do not predict, at most a third of them.
 
     Args:
         arm: nominal numbers; its gains hold.
@@ -51,7 +51,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
 
 
 class _Errors:
-    """Residual of a log under a calibration from others [N m]; inf where they are too short."""
+    """Residual of a log with a calibration from others [N m]; inf if they are too short."""
 
     def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
         self._recordings = recordings

@@ -78,9 +78,9 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
 def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
     """Root mean square of the drives' torque divided by that of the log's columns [N m/A].
 
-    It is taken over all joints and samples, so the joints that carry the arm dominate, not a wrist
-    joint whose gain nothing fixes. Joint torques given as currents have 0.9 to 1.1, currents 4 to
-    16.
+    It is taken over all joints and samples, so the joints that carry the arm dominate. A wrist
+    joint, whose gain is hardly identifiable, has little influence. Joint torques given as currents
+    have 0.9 to 1.1, currents 4 to 16.
     """
     current = np.concatenate([trace.current for trace in traces])
     torque = current * arm.drive_gain

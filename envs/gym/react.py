@@ -90,7 +90,7 @@ class React(Task):
         self.memory[i] = batch.metrics["distance"][i]
 
     def _joints(self, place: Array) -> Array:
-        """Of the tool at ``place``, turned as little as it may from home [rad], shape (n,)."""
+        """Joint positions near home with the tool at ``place`` [rad], shape (n,)."""
         compiled, model, data = self.batch.compiled, self.batch.compiled.scene.model, self._scratch
         adr, dofs = compiled.scene.qpos_adr, compiled.scene.dof_adr
         data.qpos[adr] = compiled.scene.home
@@ -106,7 +106,7 @@ class React(Task):
         return np.array(data.qpos[adr])
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Progress, and what it costs. It remembers the last distance [m]."""
+        """The reward's terms. The memory is the last distance [m]."""
         period = 1 / self.batch.compiled.settings.control_rate
         hurt = step.limit_ratio > 1
         done = (step.distance < DONE) & (step.limit_ratio <= 1)
@@ -121,7 +121,7 @@ class React(Task):
 
 
 def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:
-    """Where the tool is at home [m], and the direction of its swing, shapes (3,).
+    """Position of the tool at home [m], and direction of its swing, shapes (3,).
 
     The package's arm swings along y; any other horizontally, across the line from its first joint
     to its tool, so that no other link is on the path.

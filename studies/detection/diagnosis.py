@@ -36,10 +36,10 @@ from tauguard.traces import STRATA, Collision, stratum
 
 #: The detector whose alarms are explained, and its false alarms per hour.
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0
-#: Force that the damping of the usual way expects [N].
+#: Force for which the damping of the usual method is chosen [N].
 EXPECTED = 100.0
 METHODS = ("surface", "exposed", "usual", "exact")
-#: Links that collisions of these plans are on, which ``exposed`` knows.
+#: Links that collisions of these plans may be on, as ``exposed`` assumes.
 EXPOSED = (2, 3, 4, 5, 6)
 
 _ALARMS = (
@@ -65,7 +65,7 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Size:
-    """How much is simulated."""
+    """Amount of simulated motion."""
 
     arms: int
     speeds: tuple[float, ...]
@@ -80,13 +80,13 @@ FULL = Size(3, SPEEDS, Training(slices=3), 0.3, 13, 3, 8)
 QUICK = Size(1, (10.0, 60.0), Training(slices=1, free=6, free_seconds=20.0), 0.02, 2, 1, 2)
 
 
-#: What a method says of an event: the link (1-based, 0: none), the force [N] and the point [m].
+#: Answer of a method: the link (1-based, 0: none), the force [N] and the point [m].
 Answer = tuple[int, Array, Array]
 
 
 @dataclass(frozen=True)
 class Judged:
-    """What one event was, and what all methods say of it; nothing without an alarm.
+    """One event and the answers of all methods; there are none without an alarm.
 
     Its trace is not kept: many would fill the memory.
     """
@@ -229,7 +229,7 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
 
 
 def severity_rows(contacts: Sequence[Judged]) -> list[Row]:
-    """What the intervals of impulse and peak force are worth, by kind and by link."""
+    """Coverage and width of the intervals of impulse and peak force, by kind and by link."""
     by_kind = groups(sorted(contacts, key=lambda j: j.kind), lambda j: j.kind)
     by_link = groups(sorted(contacts, key=_link), lambda j: f"link {_link(j)}")
     rows = []
@@ -248,7 +248,7 @@ def severity_rows(contacts: Sequence[Judged]) -> list[Row]:
 
 
 def kind_rows(judged: Sequence[Judged]) -> list[Row]:
-    """True kind (a row) against the kind said."""
+    """True kind (row) against diagnosed kind (column)."""
     rows = []
     for kind in KINDS:
         said = [j.diagnosis.kind for j in judged if j.diagnosis and j.kind == kind]
@@ -279,7 +279,7 @@ def payload_rows(judged: Sequence[Judged]) -> list[Row]:
 
 
 def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row:
-    """Microseconds of a diagnosis, and of what must be computed before."""
+    """Time of a diagnosis, and of the computations before it [us]."""
     alarm = event.alarm
     assert alarm is not None
     diagnoser = Diagnoser.of(trained.detector.arm, surface)

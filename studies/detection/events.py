@@ -1,4 +1,4 @@
-"""Judged events of the diagnosis study: struck, pushed and loaded arms, and the truth of each."""
+"""Events of the diagnosis study: collisions, pushes and payloads, with the truth of each."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +13,11 @@ from tauguard.detectors.events import detection_window
 from tauguard.envs import Episode, PayloadPick, simulate
 from tauguard.traces import STRATA, Alarm, Collision, Trace
 
-#: Seconds at the end of the look in which a lasting contact must touch without a break.
+#: End of the window in which a lasting contact must touch without a break [s].
 END = 0.03
-#: A hand's push: half a sine of force that lasts so long [s].
+#: Duration of a hand's push, half a sine of force [s].
 PUSH_SECONDS = (0.6, 1.4)
-#: Severity of pushes [N m], and payloads that are taken up and put down [g], unknown both.
+#: Severity of pushes [N m]; payloads that are picked up and put down [g], unknown to detectors.
 PUSH_STRATA, PICKED = STRATA[:4], (500.0, 1000.0, 2000.0, 3500.0)
 #: Times of one payload episode at which the load comes and goes [s].
 UP, DOWN, LONG = 4.0, 8.0, 10.0
@@ -25,7 +25,7 @@ UP, DOWN, LONG = 4.0, 8.0, 10.0
 
 @dataclass(frozen=True)
 class Event:
-    """One judged event and the alarm that it raised, if any."""
+    """One event and the alarm that it raised, if any."""
 
     arm: int  #: mismatch seed
     speed: float  #: percent
@@ -39,7 +39,7 @@ class Event:
 def struck_events(
     seed: int, speed: float, trained: dict[int, CollisionAlarm], per_stratum: int
 ) -> Iterator[Event]:
-    """Collisions of the detection study: strikes, pulses and clamps, every severity alike."""
+    """Collisions of the detection study: strikes, pulses and clamps of all severities."""
     for struck in struck_pool(seed, speed, list(trained), per_stratum):
         alarms = trained[struck.arm].detect(struck.trace).alarms
         assert struck.trace.truth is not None
@@ -79,7 +79,7 @@ def push_events(
 def payload_events(
     seed: int, speed: float, trained: dict[int, CollisionAlarm], episodes: int
 ) -> Iterator[Event]:
-    """Payloads that are taken up and put down again without a word."""
+    """Payloads that are picked up and put down, unknown to the detector."""
     rng = np.random.default_rng([seed, round(100 * speed), 22])
     arms = list(trained)
     for k in range(episodes):
@@ -119,7 +119,7 @@ def first_alarm(alarms: Sequence[Alarm], collision: Collision) -> Alarm | None:
 
 
 def contact_kind(trace: Trace, collision: Collision, alarm: Alarm | None) -> str:
-    """A clamping still presses at the end of the look; what is over by then is an impact."""
+    """The kind of a contact: a clamp still presses at the end of the window, an impact does not."""
     if collision.kind != "clamp" or alarm is None or trace.truth is None:
         return "impact"
     end = alarm.start + AFTER

@@ -72,7 +72,7 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Size:
-    """How much is simulated."""
+    """Amount of simulated motion."""
 
     arms: int  #: judged, each with its own detectors
     detectors: tuple[str, ...]
@@ -85,7 +85,7 @@ class Size:
     conditions: bool = False  #: also what training did not have
 
 
-#: Those with one front end follow each other, so that it is fitted once and estimates once a trace.
+#: Detectors with the same front end are neighbours, so that it runs once for all of them.
 ALL = (
     "srq-svr",
     "moving-thresholds",
@@ -96,7 +96,7 @@ ALL = (
 )
 #: Rates of false alarms are the question of the part ``false_alarms``, on more arms.
 FULL = Size(3, ALL, Training(), 0.75, 2.0, 13, 5, conditions=True)
-#: Collision-free motion of a quick run, to calibrate and again to judge: an episode a speed [h].
+#: Collision-free motion of a quick run for calibration, and the same for the test [h].
 SIX_MINUTES = 0.095
 QUICK = Size(
     1,
@@ -119,7 +119,7 @@ CONDITIONS: dict[str, tuple[float, Conditions]] = {
     "mismatch doubled since training": (40.0, Conditions(scale=2.0)),
     "speed 80 %": (80.0, Conditions()),
 }
-#: Payloads that are taken up half-way [g]: whatever alarm that raises is false.
+#: Payloads that are picked up half-way [g]; an alarm that they raise is false.
 TAKEN_UP = (1500.0, 2500.0, 3500.0)
 #: Collisions of a stratum and hours of free motion for each condition.
 PER_CONDITION, HOURS = 5, 0.1
@@ -153,7 +153,7 @@ def measure(
 
 
 def _rest(found: list[Row], names: Sequence[str], more: Iterator[list[Row]]) -> list[Row]:
-    """The rows of the conditions; one that fails does not take the others along."""
+    """The rows of the conditions; an error in one leaves the others."""
     rest: list[Row] = []
     failed: dict[str, BaseException] = {}
     for name in names:

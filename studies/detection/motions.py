@@ -27,29 +27,29 @@ from tauguard.traces import STRATA, Collision, Trace
 
 #: Percent of the maximum speed in the training slices.
 TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
-#: Percent of the joints' maximum speed that detectors are judged at.
+#: Speeds at which detectors are tested [% of the maximum].
 SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
-#: Payloads of the judged motions, none of them a training payload, unknown to the detector [g].
+#: Payloads of the test motions [g], no training payloads and unknown to the detector.
 PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
-#: Contact force of a judged collision [N].
+#: Contact force of a tested collision [N].
 FORCES = (20.0, 200.0)
 #: Torques below the evaluated strata, for the smallest detected torque [N m], and forces [N].
 FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
-#: Collisions of one judged episode, and rounds of drawing again.
+#: Collisions of one test episode, and rounds of drawing again.
 GROUP, ROUNDS = 5, 8
 
-#: Streams of seeds: training, thresholds, judged motions.
+#: Streams of seeds: training, thresholds, test motions.
 TRAIN, CALIBRATE, TEST = 11, 12, 13
 
 Stratum = tuple[float, float]
 Wish = tuple[str, Stratum]
-#: Of a collision that is in none.
+#: Stratum of a collision that is in none.
 _NONE = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which a pool is simulated; the defaults are those of the study's first table."""
+    """Conditions of a pool; the defaults are those of the study's first table."""
 
     payloads: tuple[float, ...] = PAYLOADS  #: gone through in turn [g]
     temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
@@ -98,7 +98,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Training:
-    """How much one arm's detectors are trained with."""
+    """Amount of training data of one arm's detectors."""
 
     slices: int = 15  #: with collisions, through the dissertation's payloads
     collisions: int = 5  #: a slice
@@ -115,13 +115,13 @@ class Training:
 
 
 def stream(seed: int, *key: int) -> int:
-    """A seed of its own for every purpose, so that judged motions are never trained on."""
+    """A seed for each purpose, so that test motions are never trained on."""
     return int(np.random.SeedSequence([seed, *key]).generate_state(1)[0])
 
 
 @dataclass(frozen=True)
 class Struck:
-    """One judged episode with collisions."""
+    """One test episode with collisions."""
 
     arm: int  #: mismatch seed
     trace: Trace
@@ -218,7 +218,7 @@ def free_pool(
     conditions: Conditions | None = None,
     seconds: float = 60.0,
 ) -> list[tuple[int, Episode]]:
-    """Arm and episode of at least ``hours`` of judged collision-free motion at one speed.
+    """Arms and episodes of at least ``hours`` of collision-free test motion at one speed.
 
     The first seconds of an episode, in which detectors settle, come on top.
     """

@@ -1,4 +1,4 @@
-"""Detectors of one arm at operating points: training, thresholds, and what their alarms say.
+"""Detectors of one arm at operating points: training, thresholds, and counted alarms.
 
 Hours of motion at 1 kHz do not fit the memory: an episode is simulated, scored by every detector,
 reduced to alarms at the operating points, and forgotten.
@@ -39,7 +39,7 @@ HOURLY = "hourly"
 #: Fraction of the cases that are the tail, which is extrapolated to rarer ones.
 CASE_TAIL = 0.1
 
-#: Collision-free scores: by detector, an episode each.
+#: Collision-free scores by detector, one entry per episode.
 Free = Mapping[str, Sequence[FreeScores]]
 
 
@@ -52,7 +52,7 @@ class Operated:
 
     @property
     def thresholds(self) -> dict[str, float]:
-        """By operating point."""
+        """Alarms by operating point."""
         return {point: alarm.threshold for point, alarm in self.alarms.items()}
 
     def sustained(self, trace: Trace) -> dict[str, Array]:
@@ -97,7 +97,7 @@ def calibration(job: tuple[int, int, Mapping[str, FittedDetector], float, float]
 
 
 def expected(scores: Sequence[FreeScores], threshold: float) -> float:
-    """The fraction of cases expected above ``threshold``: that of N seen, Jeffreys' prior."""
+    """Expected fraction of cases above ``threshold``, from the counts and Jeffreys' prior."""
     cases = np.concatenate([one.cases() for one in scores])
     return (float(np.sum(cases > threshold)) + 0.5) / (len(cases) + 1)
 
@@ -163,7 +163,7 @@ class Tally:
     free_seconds: float = 0.0
 
     def add(self, other: Tally) -> None:
-        """Take the other's episodes in."""
+        """Add the other's episodes."""
         self.outcomes += other.outcomes
         self.cases += other.cases
         self.false_cases += other.false_cases
@@ -171,7 +171,7 @@ class Tally:
         self.free_seconds += other.free_seconds
 
 
-#: By detector and operating point.
+#: Tallies by detector and operating point.
 Tallies = dict[tuple[str, str], Tally]
 
 

@@ -1,4 +1,4 @@
-"""False alarms asked for and counted on fresh arms, and what the same thresholds find.
+"""Requested and counted false alarms on fresh arms, and the collisions found.
 
 Every arm has its own detectors and thresholds from its own collision-free motion with the training
 payloads. What is counted is other motion of that arm, with payloads that were in no recording. One
@@ -56,7 +56,7 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Size:
-    """How much is simulated."""
+    """Amount of simulated motion."""
 
     arms: int
     names: tuple[str, ...]  #: of the detectors
@@ -104,7 +104,7 @@ def _counted(arms: Sequence[Tallies], name: str, way: str, asked: float) -> Row:
 
 
 def collisions(tally: Tally, share: float) -> Row:
-    """What an arm finds whose torques are ``share`` of the CURA6-like arm's."""
+    """Collisions found on an arm whose torques are ``share`` of the CURA6-like arm's."""
     pairs = [(outcome.collision.peak_tau, outcome.delay) for outcome in tally.outcomes]
     hard = [delay for torque, delay in pairs if torque >= share * HEADLINE]
     every = [delay for torque, delay in pairs if torque >= share * STRATA[0][0]]
@@ -124,7 +124,7 @@ def point(way: str, asked: float) -> str:
 
 
 def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
-    """Train, set thresholds and judge on the arm ``job[2]``, with the study's seed ``job[1]``."""
+    """Train, set thresholds and test on the arm ``job[2]``, with the study's seed ``job[1]``."""
     return tallies_by_rate((*job, (None,)))[0]
 
 

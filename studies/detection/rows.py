@@ -23,7 +23,7 @@ DISSERTATION = {
 }
 #: Detectors beside the dissertation's SVR (0) and network (1).
 BESIDE = {"srq-svr": 0, "srq-svr-plain": 0, "current-network": 1}
-#: The lowest torque of the 65 judged collisions [N m].
+#: The lowest torque of the 65 tested collisions [N m].
 LOWEST = 4.0
 #: tau98 is the smallest torque above which this fraction of the collisions is found.
 GOAL = 0.98
@@ -184,7 +184,7 @@ def headline(found: Sequence[Row]) -> list[Row]:
 
 
 def _values(row: Row) -> tuple[float, float]:
-    """Sensitivity and specificity of a cell; 0 where nothing was judged."""
+    """Sensitivity and specificity of a cell; 0 without test cases."""
     return row["sensitivity"]["value"] or 0.0, row["specificity"]["value"] or 0.0
 
 

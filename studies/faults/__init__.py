@@ -22,7 +22,7 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """How soon a fault is seen, and how often it is not."""
+    """Delay of the detection of faults, and fraction of missed faults."""
     axes = ("median delay of what is seen [ms]", "fraction not seen")
     for row in table_rows(rows, "faults"):
         if row["median_ms"] is not None:

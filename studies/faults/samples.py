@@ -1,4 +1,4 @@
-"""Every kind of fault in the samples of every arm: is it seen, how soon, and at what cost.
+"""Every kind of fault in the samples of every arm: detection, delay and cost.
 
 A fault of one second is put into logs that training has not seen. The answers are compared with
 those on the same samples without the fault. A fault is ``seen`` if a reason is given while it lasts
@@ -57,7 +57,7 @@ class Heard:
 
 
 def heard(tested: ArmLogs, packets: Packets) -> Heard:
-    """What the monitor says of packets, as ``listen`` counts it."""
+    """Answers of the monitor to packets, as ``listen`` counts them."""
     assert tested.alarm.inputs is not None
     monitor, out = Monitor(tested.alarm, tested.alarm.inputs), Heard()
     lateness = Lateness(tested.alarm.inputs.dt)

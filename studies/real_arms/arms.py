@@ -78,7 +78,7 @@ ARMS = (
 
 
 def by_eye(log: str) -> tuple[Push, ...]:
-    """Pushes of a log without a sensor, from ``pushes.csv``, which says how it was made."""
+    """Pushes of a log without a sensor, from ``pushes.csv``, which documents their source."""
     lines = Path(__file__).with_name("pushes.csv").read_text().splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return tuple(
@@ -104,14 +104,14 @@ def available() -> list[ArmData]:
 
 
 def nominal(arm: ArmData) -> ArmModel:
-    """What a user knows of the arm before any calibration."""
+    """The arm model of a user who has not calibrated."""
     robot = RobotNumbers.from_pin(pin_model(arm.file))
     drive = DRIVES.get(arm.name)
     return ArmModel(robot, np.array(drive.gain) if drive else np.ones(robot.joints))
 
 
 def recordings(arm: ArmData) -> dict[str, Recording]:
-    """Collision-free logs by name; of an arm without any, what touched logs begin with."""
+    """Collision-free logs by name; without any, the untouched beginnings of other logs."""
     if not arm.free:
         logs = {n: one for n, one in touched(arm).items() if one.pushes[0].start > SHORTEST}
         return {n: Recording(cut(o.recording.trace, slice(None, o.quiet))) for n, o in logs.items()}

@@ -1,4 +1,4 @@
-"""Force truth: what a detector and a twin say of pushes beside a force sensor.
+"""Forces of pushes by a detector and by a twin, compared with a force sensor.
 
 A UR5 stands and is pushed at the tool; a sensor there gives the force. Its logs without contact
 make the detector and the twin. A row an alarm: peak, impulse, contact time and loudest joint as
@@ -43,11 +43,11 @@ Array = NDArray[np.float64]
 
 #: Arm and log with a sensor.
 ARM, LOG = "ur5", "no10_standing_force"
-#: The diagnosis looks at this time before and after an alarm [s].
+#: Window of the diagnosis before and after an alarm [s].
 LOOKED = (0.1, 0.3)
-#: What the medians call a strong push [N].
+#: Least force of a strong push in the medians [N].
 STRONG = 20.0
-#: The currents are compared with those of this time before a push [s].
+#: Time before a push with whose currents the push is compared [s].
 BEFORE = 0.1
 NOTES = {
     "force": "pushes at the tool, with --at-tool; low, high: 90 % interval; sensor: peak from "
@@ -89,7 +89,7 @@ def sensor() -> Array:
 
 
 def _beside(t: Array, size: Array, cause: Diagnosis) -> Row | None:
-    """What a diagnosis says, beside the sensor; None where that shows no push."""
+    """The diagnosis beside the sensor; None if the sensor shows no push."""
     start, severity = cause.alarm.start, cause.severity
     look = (t >= start - LOOKED[0]) & (t <= start + LOOKED[1])
     if size[look].max() < BEGINS:
@@ -119,7 +119,7 @@ def pushed(
     force: Array,
     spans: list[tuple[int, int]],
 ) -> list[Row]:
-    """The twin pushed with the sensor's force, beside the arm: changes of the drives' torques."""
+    """Changes of the drives' torques: of the twin, pushed with the sensor's force, and the arm."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
 

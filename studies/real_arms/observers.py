@@ -1,4 +1,4 @@
-"""Public observers of the external torque, written from their papers, with thresholds of one rule.
+"""Public observers of the external torque after their papers, with one rule for thresholds.
 
 The momentum p of the arm obeys ``dp/dt = u + d``, ``u = tau + C^T qd - g``; tau is the drive torque
 less the friction of the same calibration as ours, d the external torque. Every observer has the
@@ -95,7 +95,7 @@ PEERS: dict[str, Callable[[ArmModel, Trace, Array], Array]] = {
 
 
 def alarms(value: Array, limit: Array, trace: Trace) -> Bools:
-    """Where any joint has been above its threshold for the confirmation, shape (T,)."""
+    """Whether a joint has been above its threshold for the confirmation time, shape (T,)."""
     above = (np.abs(value) > limit).any(axis=1) & (trace.t - trace.t[0] > SETTLE)
     return confirmed(above, confirmation_samples(LASTS, trace.dt))
 

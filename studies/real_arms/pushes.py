@@ -43,9 +43,9 @@ from tauguard.traces import Trace
 
 Alarms = Callable[[Recording], NDArray[np.bool_]]
 
-#: An alarm so long before the start of a push still finds it [s].
+#: Time before the start of a push in which an alarm still finds it [s].
 EARLY = 0.15
-#: An alarm so long after a push belongs to it [s].
+#: Time after a push in which an alarm belongs to it [s].
 LATE = 0.5
 #: Random shifts of a log's alarms, for ``by chance``.
 SHIFTS = 200
@@ -73,7 +73,7 @@ def draw(rows: list[Row], figure: Any) -> None:
 
 @dataclass
 class Tally:
-    """What one detector did on one arm."""
+    """Results of one detector on one arm."""
 
     alarms: int = 0
     seconds: float = 0.0
@@ -102,7 +102,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def arm_tallies(arm: ArmData, turns: int, rng: np.random.Generator) -> dict[str, Tally]:
-    """What every detector did on one arm; so many ``turns`` of its folds are left out."""
+    """Results of every detector on one arm; ``turns`` of its folds are held out."""
     start, free, contact = nominal(arm), recordings(arm), touched(arm)
     tallies: dict[str, Tally] = {}
 
