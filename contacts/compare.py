@@ -57,10 +57,10 @@ def compare(
         keep: Whether the report keeps the states for a recording.
 
     Raises:
-        ValueError: an unknown scene or checker, a geom that a checker or the ground truth
-            cannot handle, a checker's contact that is not of the model or the step, whose distance
-            is not finite or whose normal is no unit vector, options of a checker that is not asked
-            for, a timestep or duration that is not above 0, a ``fine`` below 1.
+        ValueError: an unknown scene or checker; a geom that a checker or the ground truth cannot
+            handle; a contact outside the model or the step, without a finite distance or a unit
+            normal; options of another checker; a timestep or duration that is not above 0; a
+            ``fine`` below 1.
     """
     scene = _scene(scene)
     duration = scene.seconds if seconds is None else seconds

@@ -79,7 +79,7 @@ def standing_then_hit(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, i
         The trace, and the row of the first impact.
     """
     seconds = settle + PAUSE + len(IMPACTS) * (IMPACT + PAUSE)
-    # Windows and confirmation need some samples even where these are rare.
+    # At a low rate too, windows and confirmation need some samples.
     slow = max(1.0, dt / 0.01)
     t = np.arange(round(seconds * slow / dt), dtype=np.float64) * dt
     begin, period = settle + PAUSE * slow, (IMPACT + PAUSE) * slow

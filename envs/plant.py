@@ -70,7 +70,7 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
 
     Args:
         scene: the composed scene; ``scene.drive`` is what is simulated.
-        nominal: what the controller believes about the drive (its gains).
+        nominal: drive that the controller assumes (its gains).
         gains: of the servo.
         data: of the scene's model.
     """

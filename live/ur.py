@@ -109,8 +109,8 @@ class UrStream(Closing):
     def _lose(self, error: Exception) -> None:
         """Drop the connection and begin to open it again.
 
-        An ``OSError`` means that it broke. After any other error a packet could not be read, and
-        the connection is dropped here.
+        An ``OSError`` means that the connection broke. Any other error means that a packet could
+        not be read; then this side closes the connection.
 
         Raises:
             StreamClosed: ``reconnect`` is 0.

@@ -124,9 +124,9 @@ _COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel, float], Filtered]] = {}
 
 
 def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> Filtered:
-    """The columns of the trace's free rows; kept while it lives, until others are asked for.
+    """The columns of the trace's free rows, cached with the last settings while the trace lives.
 
-    Calibrations that leave some traces out, as folds do, ask for the same ones again.
+    The folds of a cross-validation use the same columns.
     """
     key, found = _COLUMNS.get(id(trace), (None, None))
     if found is None or key is None or key[0] is not arm or key[1:] != (model, rate):

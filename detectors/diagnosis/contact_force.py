@@ -80,7 +80,7 @@ def point_jacobians(
 
     Args:
         robot: the arm.
-        poses: of its links.
+        poses: poses of its links.
         link: 0-based link that each point is fixed to, shape (K,).
         point: world frame [m], shape (K, 3).
     """
@@ -165,7 +165,7 @@ def contact_belief(
     inward = -np.einsum("kij,kj->ki", turn, surface.normal).T
     jacobian = point_jacobians(robot, poses, surface.link, point)
     torque = np.ascontiguousarray(jacobian.transpose(2, 1, 0)) / sigma[:, None, None]  # (n, 3, K)
-    # Standardised forces have the same deviation in all directions.
+    # Divided by their standard deviations, forces are alike in all directions.
     normal = np.einsum("nik,ik->nk", torque, inward)
     torque = friction * torque + (1 - friction) * normal[:, None] * inward
     log, force = _explain(torque, y / sigma, inward, np.array(scales))

@@ -36,8 +36,8 @@ def match(
 ) -> Matching:
     """Match the alarms of one trace with its collisions.
 
-    A non-collision case is a piece of ``case_seconds`` of collision-free time: every collision-free
-    stretch is cut into such pieces from its beginning, and the rest at its end is in no case.
+    A non-collision case is ``case_seconds`` of collision-free time. Every collision-free stretch is
+    cut into such cases from its beginning; a shorter rest at its end does not count.
 
     Args:
         alarms: merged alarms, in order.

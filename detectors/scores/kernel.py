@@ -116,8 +116,8 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self.machine_(rows)
 
 
-#: A vector whose squared distance from the span of the chosen ones is below this is not chosen: it
-#: would add only rounding errors. The norm of a vector is 1 in the SRQ kernel.
+#: Least squared distance of a vector from the span of those chosen before. A nearer one would add
+#: only rounding errors: the norm of a vector is 1 in the SRQ kernel.
 DEPENDENT = 1e-8
 
 

@@ -46,8 +46,8 @@ class SimulationLoop:
 
         Args:
             scene: the composed scene; ``scene.drive`` is what is simulated.
-            nominal: what the controller believes about the drive (its gains).
-            gains: of the position control; the default suits the arm's inertia.
+            nominal: drive that the controller assumes (its gains).
+            gains: gains of the position control; the default suits the arm's inertia.
         """
         self.scene = scene
         self.model = scene.model

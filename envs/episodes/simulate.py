@@ -133,7 +133,7 @@ class Simulation:
 
         Args:
             episode: what to simulate.
-            nominal: what the controller believes about the drive (default: the arm's nominal one).
+            nominal: drive that the controller assumes (default: the arm's nominal one).
             checkers: contact checkers whose answers go into the trace.
             without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
         """
@@ -351,7 +351,7 @@ def simulate(
 
     Args:
         episode: what to simulate.
-        nominal: what the controller believes about the drive (default: the arm's nominal one).
+        nominal: drive that the controller assumes (default: the arm's nominal one).
         checkers: contact checkers, by name or made, whose answers go into ``Trace.contacts``; they
             change nothing else.
         without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.

@@ -67,7 +67,7 @@ class CompiledScene:
 
     settings: Settings
     scene: Scene  #: without visual shapes
-    nominal: Drive  #: what the controller believes about the drive
+    nominal: Drive  #: drive that the controller assumes
     gains: Gains
     nominal_mass: Array  #: of the links [kg], shape (n,)
     nominal_com: Array  #: in the links' frames [m], shape (n, 3)
@@ -110,11 +110,11 @@ def compile_scene(
     """Compile what ``settings`` ask for, and nothing else.
 
     Args:
-        settings: what is wanted.
-        places: where things go that were asked for by name.
-        arms: 1 or 2.
+        settings: the keywords of the environment.
+        places: places of things that are given by name.
+        arms: number of arms, 1 or 2.
         moved: see :attr:`tauguard.envs.gym.placing.Layout.moved`.
-        default: which of "table" and "cloth" the user did not state: they are fitted to the arm.
+        default: those of "table" and "cloth" that are defaults, which are fitted to the arm.
 
     Raises:
         ValueError, FileNotFoundError: a robot that cannot be used.
@@ -231,7 +231,7 @@ def _force_bound(
 
 
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
-    """What the controller believes: the arm's nominal drive, with all friction that is known."""
+    """The drive that the controller assumes: nominal, with all known friction."""
     return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
 
 

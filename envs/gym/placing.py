@@ -194,8 +194,8 @@ def check_clear(
     """Check that the arm overlaps nothing.
 
     Args:
-        scene: what is simulated.
-        model: the scene's, or a variant of it.
+        scene: the simulated scene.
+        model: the scene's model, or a variant of it.
         scratch: data of the model, overwritten.
         data: the state.
 

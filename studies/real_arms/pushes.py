@@ -160,9 +160,9 @@ def count(
     known: tuple[Push, ...] | None,
     rng: np.random.Generator,
 ) -> None:
-    """Adds a log: its pushes' delays, inf where one is missed, or its false alarms.
+    """Add a log: the delays of its pushes (inf: missed), or its false alarms.
 
-    Where every contact is labelled, the alarms outside of them are false.
+    If every contact is labelled, alarms outside of them are false.
     """
     t = trace.t - trace.t[0]
     starts = np.array([one.start for one in find_alarms(t, alarm, SERIES)])

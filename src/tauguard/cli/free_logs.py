@@ -93,11 +93,11 @@ def free_detector(
     Args:
         arm: of :func:`free_arm`.
         recordings: by file name.
-        accept: checks and logs that the user vouches for; None: the command has no such flag.
+        accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
         ValueError: too little motion, another arm's gravity torques, much torque that is not
-            explained, or in bursts as of contacts.
+            explained, or bursts of torque, as contacts cause them.
     """
     from tauguard.detectors.calibration.checks import check_weight
     from tauguard.detectors.scores.free_motion import FreeMotion
@@ -122,10 +122,10 @@ def explain(
         arm: identified.
         recordings: by file name.
         held: held-out residual of each [N m], (n,) each; empty: not known.
-        accept: checks and logs that the user vouches for; None: the command has no such flag.
+        accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
-        ValueError: much torque is not explained, or in bursts as of contacts.
+        ValueError: much torque is not explained, or torque has bursts, as contacts cause them.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.real_arms import calibration_notes
