@@ -142,8 +142,8 @@ class MeshCCD:
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
-            min_distance: Pairs that come this close count, in the unit of the positions:
-                conservative there, exact at 0 (with an exact method).
+            min_distance: Pairs that come this close count, in the unit of the positions. The
+                answer is conservative, and exact at 0 (with an exact method).
             fresh: Descend from the root instead of the last frame's front. The answer is the same.
             limit: Most collisions of either kind (some 300 bytes each), and an eighth of the pairs
                 of leaves that may be held (16 bytes each).

@@ -110,7 +110,7 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-    resource_tracker.ensure_running()  # start() would otherwise start it and unblock Ctrl-C
+    resource_tracker.ensure_running()  # start() would start it too, and unblock Ctrl-C
     with _stop_signals_deferred(), _ctrl_c_blocked(), _without_opengl():
         process.start()
         crew[ours] = process

@@ -1,7 +1,7 @@
-"""Whether a detector from a file can be one: silent while an arm stands, loud when it is hit.
+"""Test of a detector from a file: no alarm while an arm stands, an alarm when it is hit.
 
-Numbers that are each in their range can still make a detector that never raises an alarm, or always
-one. What is asked here is the least that every detector does; it says nothing of how well.
+A file whose every number is in its range can still hold a detector that never raises an alarm, or
+raises one at all times. The test finds these. It does not measure how good a detector is.
 """
 
 from __future__ import annotations

@@ -2,13 +2,13 @@
 
     python examples/baselines.py [EPISODES] [FIRST_SEED] [TASK ...] [POLICY.npz ...] [--robot R]
 
-Prints a Markdown table: success with its 95 % interval, targets, reward, largest force divided by
-its limit and cost [N s], the environment's `info["cost_sum"]`, a mean an episode of 5 s each; then
-the episodes in which some force exceeded its limit.
+Prints a Markdown table of means over episodes of 5 s: success with its 95 % interval, targets,
+reward, largest force divided by its limit, and cost [N s] (`info["cost_sum"]`). The last column
+counts the episodes in which some force exceeded its limit.
 `fast` goes straight to the target. The others do so too, and differ in what they do about people:
 
-* `power and force`: at the speed at which the impact with each region, and a lasting push, keep its
-  quasi-static limit (two-mass model of ISO 10218-2).
+* `power and force`: limits the speed, so that an impact with any region and a lasting push stay
+  below the region's quasi-static limit (two-mass model of ISO 10218-2).
 * `separation`: stands while somebody is within the protective distance.
 * `admittance`: yields to the force that the momentum observer finds at the tool.
 * `ppo`, `ppo, budget`: trained by `examples/learn.py`, loaded from `examples/policies`.

@@ -21,7 +21,7 @@ from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, drawn, entity
 
 #: The only address that the viewer listens on; the longest wait for it [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
-#: Where a viewer was closed, or found no display after it had begun to listen.
+#: Message if the viewer was closed, or began to listen and then found no display.
 GONE = "the rerun viewer ended; without a display use --save FILE.rrd"
 #: Radius of a target's mark [m].
 MARK = 0.03

@@ -46,8 +46,8 @@ def ball_cloth(
         speed: speed of the ball, along -z [m/s].
         offset: by how much farther away it starts [m].
         impact: one of :data:`IMPACT_POINTS`, on a face in the middle of the cloth.
-        stiff: the cloth's contacts use :data:`STIFF`; otherwise MuJoCo's averaging of the cloth's
-            0.003 s with the ball's default 0.02 s.
+        stiff: the cloth's contacts use :data:`STIFF`; otherwise MuJoCo averages the time constants
+            of cloth (0.003 s) and ball (0.02 s).
         mode: one of :data:`MODES`.
         count: vertices along each side of the cloth.
         pinned: fixed vertices, see :class:`tauguard.models.Cloth`.

@@ -30,7 +30,7 @@ from tauguard.detectors.thresholds.speed_normalisation import (
 )
 from tauguard.traces.trace import Detection, Trace
 
-#: A signal that is finite but absurd has left numbers in the detector that are not.
+#: Message after an absurd sample has made the detector's state infinite or NaN.
 LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"
 
 

@@ -28,7 +28,7 @@ from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_thresh
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.traces.trace import Trace
 
-#: Fraction of the collision-free training traces that the threshold comes from without folds.
+#: Fraction of the collision-free training traces that is held out for the threshold, without folds.
 HELD_OUT = 0.34
 
 #: Parts of the training motion that are left out in turn.
@@ -194,7 +194,7 @@ def _with_rate(
 def normalised(
     detector: FittedDetector, found: Sequence[FreeScores], confirmation: float = CONFIRMATION
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
-    """An alarm that never comes, and what a threshold for it is chosen from.
+    """An alarm without a threshold yet (infinite), and the scores to choose one from.
 
     Args:
         detector: fitted.
@@ -202,7 +202,7 @@ def normalised(
         confirmation: t_c [s].
 
     Returns:
-        The alarm with its normalisation, and the scores after that.
+        The alarm with its normalisation, and the normalised scores.
     """
     levels, floor = normalisations(found)
     alarm = CollisionAlarm(detector, np.inf, confirmation, levels, floor=floor)

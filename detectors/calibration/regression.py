@@ -109,7 +109,7 @@ def filtered_columns(
 
     Args:
         trace: of the arm.
-        robot: what is believed of it.
+        robot: its nominal numbers.
         gain: N m per ampere, shape (n,).
         model: the columns of friction.
         rate: rate of the filter [1/s].
@@ -167,7 +167,7 @@ def body_deviations(robot: RobotNumbers, mass: float, centre: float, inertia: fl
     """Standard deviations of all inertial numbers, shape (10 n,).
 
     Args:
-        robot: what is believed.
+        robot: the arm's nominal numbers.
         mass: standard deviation of each link's mass, relative.
         centre: of each centre of mass [m].
         inertia: relative to the link's largest entry.

@@ -130,7 +130,7 @@ class Diagnoser:
         deviation than the residual itself, so the sensors' noise is a lower bound.
 
         Args:
-            arm: what is believed of the arm.
+            arm: the arm model.
             surface: its sampled surface.
             at_tool: contacts are known to be at the tool; their force is then sharper.
             load_known: what the arm carries is known, so no alarm is a change of it.

@@ -1,4 +1,4 @@
-"""The residual around an alarm, with what was known before it held fixed.
+"""The residual around an alarm, with payload, offsets and friction errors fixed before it.
 
 The estimator goes on adapting during a contact, and soon takes a lasting contact for a payload. A
 diagnosis therefore fixes payload, offsets and friction errors at the moment before the alarm, so
@@ -28,7 +28,7 @@ BEFORE = 0.02
 #: Length of the window after the alarm [s], and its least length in lags of the observer.
 AFTER, LAGS = 0.3, 10.0
 
-#: Time constants of the observer after which a payload's columns have forgotten their start.
+#: Time constants of the observer after which the start of a payload's columns has no effect.
 SETTLED = 10.0
 
 
@@ -58,7 +58,7 @@ class PostAlarmWindows:
         """Run the estimator over the trace.
 
         Args:
-            arm: what is believed of the arm.
+            arm: the arm model.
             noise_model: of its residual in free motion (default: the arm's noise at every speed).
             trace: of this arm.
         """

@@ -112,7 +112,7 @@ class Unknowns:
 
 @dataclass(frozen=True, eq=False)
 class ArmModel:
-    """What a detector believes about an arm."""
+    """The arm model that a detector assumes."""
 
     robot: RobotNumbers
     drive_gain: Array  #: N m per ampere at the joint, shape (n,)
@@ -175,8 +175,8 @@ class Estimator:
             gain: rate of the observer [1/s], a number or one per joint.
             dt: sample interval [s]; intervals of single samples may differ.
             unknowns: what to track (default: payload, offsets, friction).
-            sampled: currents are instants of a slow log, and between two of them torque and
-                friction count with their mean; else they act until the next sample.
+            sampled: for a slow log. Torque and friction between two samples are the mean of both;
+                without it those of a sample act until the next one.
         """
         self.arm = arm
         self.dt = float(intervals(dt, 2)[0])
@@ -184,7 +184,7 @@ class Estimator:
         joints = arm.robot.joints
         friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
         assert arm.noise is not None
-        # An error of the model lasts for fewer corrections where these are further apart.
+        # With rarer corrections, an error of the model lasts for fewer of them.
         rarer = max(1.0, self.dt / self.unknowns.every)
         self.native = _observer.Estimator(
             arm.robot.chain,
@@ -209,7 +209,7 @@ class Estimator:
     def run(
         self, t: ArrayLike, q: ArrayLike, qd: ArrayLike, current: ArrayLike, keep: bool = False
     ) -> Estimate:
-        """The whole series, from its first sample on; forgets what came before.
+        """Estimate over a whole series, starting anew at its first sample.
 
         Args:
             t: times [s], shape (T,), or a constant interval.

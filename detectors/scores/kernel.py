@@ -124,7 +124,7 @@ DEPENDENT = 1e-8
 def reduced_set(
     vectors: Array, coefficients: Array, sigma: float, count: int
 ) -> tuple[Array, Array]:
-    """``count`` of the vectors, or fewer where they depend on each other, and new coefficients.
+    """Pick ``count`` of the vectors, fewer if the others depend on them, with new coefficients.
 
     Args:
         vectors: support vectors, shape (S, d).
@@ -160,8 +160,8 @@ def reduced_set(
         distance -= column**2
         columns[:, k] = column
         picked.append(best)
-    # The columns are the factor of the picked vectors' kernel matrix: another one could fail where
-    # vectors nearly depend on each other.
+    # The columns already are the Cholesky factor of the picked vectors' kernel matrix. Computing it
+    # anew could fail for vectors that nearly depend on each other.
     lower = columns[picked, : len(picked)]
     new = solve_triangular(lower, values[picked], lower=True)
     new = solve_triangular(lower, new, lower=True, trans="T")

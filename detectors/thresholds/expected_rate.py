@@ -3,7 +3,7 @@
 Alarms are blocks of the merge gap whose peak exceeds the threshold. For alarms that are too rare to
 count, a generalised Pareto tail is fitted to the blocks' peaks. The interval comes from a bootstrap
 of whole episodes, because the moments of one episode are alike. Every draw has its own tail, and
-the tails differ most in rare alarms. A tail ends only if the peaks show this beyond chance.
+the tails differ most in rare alarms. A tail has an end only if the peaks show one significantly.
 
 A tail knows nothing of situations that no episode shows. Therefore an interval always contains the
 exact Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an

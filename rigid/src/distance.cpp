@@ -21,7 +21,7 @@ std::size_t extreme(const PointList& points, const Vec3& n) {
   return best;
 }
 
-// Ends the descent when no difference is nearer, to rounding.
+// Ends the descent when no difference is nearer by more than rounding errors.
 struct ToRounding {
   void visit(const Simplex<Rows>&) {}
   bool enough(const Vec3& v, const Vec3& next) const {

@@ -102,8 +102,8 @@ class PointDifferences {
     return true;
   }
 
-  // Whether a facet belongs to the whole hull; the farthest point is `excess` beyond it. A point
-  // that comes in twice does so by rounding alone, so the facet is final then too.
+  // Whether a facet belongs to the whole hull; the farthest point is `excess` beyond it. The facet
+  // is also final if that point was taken before: then the excess is a rounding error.
   bool is_final(const Number& excess, const Number&, const Source& farthest) {
     return !positive(excess) || !taken_.insert(farthest).second;
   }

@@ -30,7 +30,7 @@ class Pieces {
     const double skew = skewness(ma) + skewness(mb);
     const double largest =
         a.magnitude + b.magnitude + norm(ma.x0) + norm(mb.x0) + norm(ma.linear) + norm(mb.linear);
-    // As in Placement (mesh_boxes.hpp), for both rotations; an angle's rounding turns a body.
+    // The bounds of Placement (mesh_boxes.hpp), here for two rotations and the rounding of angles.
     coarse_ = 0x1p-16 + 12 * skew;
     fine_ = 0x1p-44 + 12 * skew;
     shift_ = 0x1p-44 * (largest + (ma.speed * arm_a + mb.speed * arm_b)) + 0x1p-140;

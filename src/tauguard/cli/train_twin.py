@@ -29,7 +29,7 @@ def twin_contacts(
     torque: bool,
     reading: Reading | None = None,
 ) -> None:
-    """Train on simulated contacts and real free logs, beside free motion; print what it aims at.
+    """Train a method on simulated contacts and free logs, to run beside ``free-motion``.
 
     Args:
         twin: description that `tauguard twin` wrote.
@@ -72,7 +72,7 @@ def twin_contacts(
             )
     names, logs = arm.robot.joint_names, list(read.traces.values())
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]
-    # The twin's own motion is no measure of how quiet the arm is: thresholds come from its logs.
+    # The threshold comes from the arm's logs alone: its noise is not that of the twin.
     learned, scores = train_and_score(method, [*struck, *logs], arm, per_hour)
     quiet = FreeMotion().fit(logs, arm)
     both = BesideFreeMotion(quiet, learned)
