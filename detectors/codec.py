@@ -44,7 +44,7 @@ def decode(
     known: Callable[[str], type],
     depth: int = 0,
 ) -> Any:
-    """What :func:`encode` took apart.
+    """The value that :func:`encode` has encoded.
 
     Args:
         content: of a file.
@@ -79,7 +79,7 @@ def decode(
 
 
 def type_name(kind: type) -> str:
-    """A class's name in files: that of ours, or module and name of another's."""
+    """A class's name in files: the name alone for tauguard's, module and name for others."""
     ours = kind.__module__.startswith("tauguard.")
     return kind.__qualname__ if ours else f"{kind.__module__}:{kind.__qualname__}"
 

@@ -21,7 +21,7 @@ INTERVALS, LONGEST_SETTLE = (1e-5, 1.0), 600.0
 MOST_SAMPLES = 100_000
 #: Torque per ampere [N m/A], mass of a link [kg] and gravity [m/s^2] that an arm can have.
 GAINS, HEAVIEST, GRAVITY = (1e-4, 1e4), 1e4, 100.0
-#: Blows that one of has to be noticed: torques at all joints [N m], their length and pause [s].
+#: Impacts of which one must raise an alarm: torques at all joints [N m], length and pause [s].
 IMPACTS, IMPACT, PAUSE = (5.0, 20.0, 80.0, 320.0), 0.3, 0.5
 
 
@@ -52,7 +52,7 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 
 
 def check_alarms(alarm: CollisionAlarm) -> None:
-    """Refuse a detector that no impact moves, or one that is never silent on an arm at rest.
+    """Refuse a detector without an alarm at any impact, or with one throughout on an arm at rest.
 
     A learned score and the plain thresholds that it contains are checked separately.
 

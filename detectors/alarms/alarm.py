@@ -36,7 +36,7 @@ LOST = "the score is not a number: a sample was out of any arm's range; begin an
 
 @dataclass(frozen=True, eq=False)
 class CollisionAlarm(Frozen):
-    """A fitted detector with what makes an alarm of its score.
+    """A fitted detector with its threshold, normalisation and confirmation time.
 
     The alarm is up where the score, normalised over the speed, has stayed above the threshold for
     the confirmation time; never before the detector has settled.
@@ -84,7 +84,7 @@ class CollisionAlarm(Frozen):
         return self.normalised(_finite(self.detector.scores(trace), trace), trace)
 
     def sustained(self, trace: Trace, score: Array | None = None) -> Array:
-        """What the normalised score has reached throughout the last t_c, shape (T,).
+        """Least normalised score within the last t_c, shape (T,).
 
         Above the threshold is an alarm; -inf before the detector has settled.
 
@@ -160,7 +160,7 @@ class AlarmStream:
     """An alarm as the samples of one recording come in.
 
     Attributes:
-        native: what does it.
+        native: the stream in C++.
     """
 
     def __init__(self, alarm: CollisionAlarm) -> None:
@@ -219,7 +219,7 @@ def _levels(speed: SpeedNormalisation | None) -> _observer.Levels:
 
 
 def native_scores(detector: FittedDetector) -> _observer.Scores:
-    """A new stream of the detector in native form; one that is Python's is called back."""
+    """A new native stream of the detector; it calls a stream that is written in Python."""
     stream = detector.stream()
     if isinstance(stream, NativeStream):
         return stream.native

@@ -1,4 +1,4 @@
-"""A learned alarm beside the free-motion detector of the same arm: what either finds is found."""
+"""A learned alarm and the free-motion detector of one arm: an alarm is up if either raises it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class BesideFreeMotion(Frozen):
 
     @property
     def arm(self) -> ArmModel:
-        """As the free motion showed it."""
+        """The arm model of the free-motion detector."""
         return self.free.arm
 
     @property
@@ -50,7 +50,7 @@ class BesideFreeMotion(Frozen):
 
     @property
     def settle(self) -> float:
-        """That of free motion [s]; the learned alarm waits for its own."""
+        """Settling time of free motion [s]; the learned alarm waits for its own."""
         return self.free.settle
 
     def carrying(self, load: Load) -> BesideFreeMotion:

@@ -18,7 +18,7 @@ from tauguard.traces.trace import Detection, Trace
 
 FREE, COLLISION, FAULT = "free", "collision", "fault"
 
-#: By the number that the native monitor answers.
+#: Reasons by the native monitor's number.
 STATES = (FREE, COLLISION, FAULT)
 
 #: This number of successive missing or faulty samples, or as many as SPAN holds, are interpolated;
@@ -88,7 +88,7 @@ class Monitor:
         return Answer(STATES[state], up, score, reason)
 
     def _reason(self, number: int, joint: int, value: float, settling: bool) -> str:
-        """What the native monitor says, in words."""
+        """The native monitor's reason as text."""
         if number not in FAULTS:
             return torque_fault(self._usual.joint_names, number, joint, value)
         fault = input_fault(self._usual, number, joint, value)
@@ -114,8 +114,8 @@ class Span:
 class Spans:
     """The spans so far.
 
-    A collision that began within 20 ms before a fault is attributed to the fault. Where the clock
-    begins anew, the open spans end, and what lasts opens new ones.
+    A collision that began within 20 ms before a fault is attributed to the fault. If the clock
+    begins anew, open spans end, and a state that lasts opens a new one.
     """
 
     found: list[Span] = field(default_factory=list)
@@ -135,7 +135,7 @@ class Spans:
         self.mark(FAULT, bool(answer.reason), t, answer.reason)
 
     def of(self, state: str) -> list[Span]:
-        """Those of one state, in order."""
+        """The spans of one state, in order."""
         return [span for span in self.found if span.state == state]
 
     def mark(self, state: str, up: bool, t: float, reason: str) -> None:

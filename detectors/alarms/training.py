@@ -117,8 +117,8 @@ def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
     """Which traces are left out together: all of some loads, so that the threshold bounds motion
     with loads that a detector has not seen.
 
-    With fewer loads than folds it is collision-free traces one by one. Collisions are left out with
-    their load, unless no other load has any.
+    With fewer loads than folds, collision-free traces are left out one by one. Collisions are left
+    out with their load, unless no other load has any.
 
     Args:
         traces: at least ``folds`` of them collision-free.
@@ -134,7 +134,7 @@ def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
 
 
 def _load(trace: Trace) -> float:
-    """The heaviest load that it carries [kg]; 0 where none is known."""
+    """Mass of its heaviest load [kg]; 0 if unknown."""
     return float(trace.truth.payload.max(initial=0.0)) if trace.truth else 0.0
 
 

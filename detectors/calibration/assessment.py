@@ -40,8 +40,8 @@ FAINT = 0.05
 #: multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of eight, 1.2
 #: without a load, and 4.5 where the others move single joints only.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
-#: A given load is refused if it differs from the torques' by more than this [kg] and by more than
-#: this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
+#: A given load is refused if the load that the torques show differs by more than this [kg] and by
+#: more than this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
 WRONG_LOAD = (0.8, 0.3)
 #: Largest product of two numbers of a joint: the unexplained fraction of its torque, and the 99 %
 #: quantile over the median of the unexplained torque. It is up to 1.8 in 20 free logs of five arms,
@@ -71,7 +71,7 @@ def residual_rms(arm: ArmModel, trace: Trace) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Unexplained:
-    """What a calibration leaves of a log's torque; rows are samples."""
+    """The torque of a log that a calibration does not explain; rows are samples."""
 
     trace: Trace
     left: Array  #: not explained [N m], shape (T, n)
@@ -80,7 +80,7 @@ class Unexplained:
 
 
 def unexplained(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, Unexplained]:
-    """What a calibration leaves of the torques of each log in which some joint moves.
+    """The unexplained torque of each log in which some joint moves.
 
     A load that is not known is tracked, so only what no load explains is left.
 
@@ -151,7 +151,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
 def explained(
     joints: Sequence[str], logs: Sequence[Unexplained], limit: float = UNEXPLAINED
 ) -> tuple[str, ...]:
-    """Notes on joints of whose torque in motion a calibration leaves much unexplained.
+    """Notes on joints with much unexplained torque in motion.
 
     Args:
         joints: names.
@@ -182,7 +182,7 @@ def explained(
 
 
 def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float] | None:
-    """Find the log that the others predict far worse than each other, and how many times worse.
+    """Find the log with by far the largest held-out error, and its multiple of the others'.
 
     Args:
         held: held-out residual of each log [N m], shape (n,) each.

@@ -1,10 +1,10 @@
 """Calibration of an arm model from collision-free motion, by one regularised least squares.
 
 The residual of the nominal observer is linear in the errors of the inertial numbers, in the weights
-of the friction columns, in the relative errors of the drive gains and in the payloads carried
-(four numbers a trace, not known). All pass through the same causal filter as in detection, so no
-acceleration is needed. Priors fix what motion does not excite, and the scale: without them a free
-fit of the gains collapses to zero, so the priors count as strong as thousands of samples.
+of the friction columns, in the relative errors of the drive gains and in the payloads carried (four
+numbers a trace, not known). All pass through the same causal filter as in detection, so no
+acceleration is needed. Priors determine what motion does not excite, and the scale: without them
+the gains collapse to zero. They weigh as much as thousands of samples.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DEFAULT = FrictionModel()
 
 @dataclass(frozen=True)
 class Priors:
-    """Standard deviations of what is identified around what is believed."""
+    """Standard deviations of the identified numbers around their nominal values."""
 
     mass: float = 0.04  #: relative
     centre: float = 4e-3  #: of the centre of mass, each axis [m]
@@ -57,7 +57,7 @@ class Calibration:
 
 
 def _deviations(robot: RobotNumbers, priors: Priors, columns: int, traces: int) -> Array:
-    """Standard deviations of all unknowns; what a trace does not tell is held: 0."""
+    """Standard deviations of all unknowns; 0 for those that keep their nominal value."""
     n = robot.joints
     return np.concatenate(
         [
@@ -141,7 +141,7 @@ def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> 
 def _solved(
     data: Sequence[Filtered], robot: RobotNumbers, model: FrictionModel, priors: Priors, rounds: int
 ) -> tuple[System, Array, Array]:
-    """The last round's equations, their solution, and what each joint's rms is then [N m]."""
+    """The last round's equations, their solution, and each joint's RMS with it [N m]."""
     deviations = _deviations(robot, priors, model.columns, len(data))
     squares = [((one.torque - one.current) ** 2).mean(axis=0) for one in data]
     level: Array = np.maximum(np.sqrt(np.mean(squares, axis=0)), 1e-6)

@@ -189,7 +189,7 @@ class Subsets:
     """Calibrations from some of the recordings, whose columns are filtered once; gains hold."""
 
     def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
-        """Take what is believed, with the friction to use if it has one, and all recordings."""
+        """Take the nominal arm, with its friction if it has any, and all recordings."""
         self._arm, self._recordings = arm, recordings
         self._friction = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
         self._data = filtered_logs(arm, recordings, self._friction)
@@ -207,7 +207,7 @@ class Subsets:
 def _identify_scale(
     arm: ArmModel, recordings: Sequence[Recording], scale: str, friction: FrictionModel
 ) -> Identified:
-    """As :func:`identify`, where gains are found, too."""
+    """Identify the drive gains as well, see :func:`identify`."""
     # A torque per ampere that changes with the current would explain a load, so it is left out
     # while the scale is sought.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))

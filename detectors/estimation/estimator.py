@@ -31,7 +31,7 @@ PAYLOAD = 4
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """How far, and how fast, what the model does not know may change.
+    """Priors of the unknowns: how far and how fast each may change.
 
     Each unknown is an Ornstein-Uhlenbeck process: a standard deviation and a time constant. A
     standard deviation of 0 leaves an unknown out.
@@ -143,7 +143,7 @@ class ArmModel:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the estimator says of a trace; rows are samples."""
+    """The estimator's output for a trace; rows are samples."""
 
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
     unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)

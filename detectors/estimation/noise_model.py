@@ -15,14 +15,14 @@ TERMS = 6
 
 @dataclass(frozen=True, eq=False)
 class NoiseModel:
-    """What free motion leaves of the residual of joint j: its standard deviation is
+    """The standard deviation of joint j's residual in free motion is
     a + b |qd_j| + c T_j + d |M_j| + e C_j + f S_j.
 
-    T_j is the torque that accelerations take (inertia is known to some percent), |M_j| the norm of
-    the joint's row of the mass matrix with the payload that it carries (the noise of velocities,
-    times inertia), C_j how far the joint's friction has lately changed (it starts, stops or turns),
-    and S_j half the change of its torque between two samples of a slow log, which is the largest
-    error of the mean that stands for what happens between them: the rows of
+    T_j is the torque of accelerations: inertia is known to some percent only. |M_j| is the norm of
+    the joint's row of the mass matrix, with the payload; it multiplies the noise of velocities. C_j
+    says how far the joint's friction has lately changed, as at starts, stops and turns. S_j is half
+    the change of the joint's torque between two samples of a slow log, since the torque in between
+    is taken to be their mean. T, M, C and S are the rows of
     :attr:`~tauguard.detectors.Estimate.motion`.
     """
 

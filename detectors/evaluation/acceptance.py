@@ -1,4 +1,4 @@
-"""What a calibration and a detector of free logs must hold to on those logs, left out in turn."""
+"""Checks by cross-validation of a calibration and of a detector from free logs."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import friction_levels
 from tauguard.report import poisson_rate
 
-#: Held-out error over the level that a joint's bounds are measured in, at most: a detector tracks a
-#: part of it. Up to 1.3 on three real arms (a wrist that moves in one log only).
+#: Largest held-out error, in the unit of a joint's bounds; a detector tracks a part of it. Up to
+#: 1.3 on three real arms (a wrist that moves in one log only).
 HELD_OUT = 2.0
 
 #: False alarms an hour that are accepted of logs without a contact.

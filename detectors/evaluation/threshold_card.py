@@ -24,16 +24,16 @@ from tauguard.traces.trace import Trace
 #: rises within 0.1 s, and if it takes 1 s. The observer (30/s) follows it while the baseline (0.15
 #: s) absorbs it.
 COUNTS, COUNTS_SLOWLY = 0.6, 0.15
-#: Pulses by which the number in motion is told [s], at so many places at least, and the share of
-#: the places where it is enough. An alarm needs as long above the bound [s].
+#: The number in motion: length of the pulses [s], least number of places, fraction of the places at
+#: which the torque suffices, and time above the bound until an alarm [s].
 PULSE, PLACES, SHARE, LASTS = 0.3, 40, 0.9, 0.04
-#: The detector takes a part of a pulse for a load or for friction: so many times the torque is
-#: needed. Of pulses added to logs left out, 97 % were then found on a UR10e, 90 % on a UR5 and 92 %
-#: on a UR3; without it 75 %, and with the median bound for the number, 40 %.
+#: The detector takes a part of a pulse for a load or for friction, so this factor is applied. With
+#: it 97 % of the pulses added to left-out logs were found on a UR10e, 90 % on a UR5 and 92 % on a
+#: UR3. Without it 75 % were found, and 40 % of pulses as large as the median bound.
 TRACKED = 1.25
-#: Where the logs have too few places: over the least bound in motion.
+#: The number in motion over the least bound, for logs with too few places.
 LITTLE = 1.5
-#: An upper threshold, from which on a robot is to stop, over the lower one of contact.
+#: The upper threshold, at which a robot stops, over the lower one, which reports a contact.
 UPPER = 1.5
 #: Joints of the arms that libfranka speaks to.
 FRANKA_JOINTS = 7

@@ -1,4 +1,4 @@
-"""Faults of samples: what is usual of an arm's samples, and what is not.
+"""Faults of samples, by the limits of an arm's usual samples.
 
 No model of the arm is needed. A frozen bus, a stuck encoder or a missing packet shows in the
 samples. A wrong gain or a swapped pair of currents does not; it looks like a contact.
@@ -58,7 +58,7 @@ FAULTS: dict[int, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class UsualInput:
-    """What is usual of one arm's samples, from motion with and without collisions."""
+    """Limits of one arm's usual samples, from motion with and without collisions."""
 
     joint_names: tuple[str, ...]
     dt: float  #: sample interval [s]
@@ -122,9 +122,8 @@ def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
 def _beyond(trace: Trace, window: int) -> Array:
     """Most that position and velocity differ by over ``window`` samples, beyond what is allowed.
 
-    Allowed are a fraction of the travel, and what a velocity or a time stamp that is late
-    differs by.
-    Shape (n,).
+    Allowed are a fraction of the travel and the effect of a late velocity or time stamp. Shape
+    (n,).
     """
     travel = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     error = np.diff(trace.q, axis=0) - travel

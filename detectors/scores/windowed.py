@@ -36,7 +36,7 @@ from tauguard.detectors.scores.baselines import FittedThresholds, MovingThreshol
 from tauguard.detectors.scores.kernel import KernelMachine
 from tauguard.traces.trace import Trace
 
-#: Fraction of the samples of collision-free motion that may be beyond what counts one.
+#: Fraction of the collision-free samples that may exceed the unit.
 RARE = 1e-3
 
 #: Windows that are evaluated at once: memory stays small.
@@ -61,7 +61,7 @@ class Windowed(ABC):
 
     windows: int = 20_000  #: training windows, a fifth of them from collisions
     mined: int = 2_000  #: collision-free moments added in each of two rounds
-    units: float = 5.0  #: standard deviations that count one before the asinh
+    units: float = 5.0  #: standard deviations that make 1 before the asinh
     seed: int = 0
     graded: bool = True  #: targets grow with the torque, and scores are severities; else 0 and 1
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
@@ -96,7 +96,7 @@ class Windowed(ABC):
         return FittedWindowed(self.name, front, scaling, shape, finished, self.graded, limits)
 
     def targets(self, traces: Sequence[Trace], front: FrontEnd) -> list[Array]:
-        """What the regressor should say of each trace, shape (T,)."""
+        """The regressor's targets for each trace, shape (T,)."""
         if self.graded:
             return severity_targets(traces, front.joints, front.gain)
         return [binary_target(trace) for trace in traces]
@@ -199,7 +199,7 @@ class FittedWindowed(OnFrontEnd):
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual: what passes them is an alarm, too.
+        """Plain thresholds on the same residual: a residual above them is an alarm too.
 
         A kernel machine has them: its native stream gives their score beside its own.
         """

@@ -85,7 +85,7 @@ class FreeScores:
     def over(
         self, levels: SpeedNormalisation, floor: SpeedNormalisation | None = None
     ) -> FreeScores:
-        """Normalised, the larger of score and floor: the speed hardly changes within a piece."""
+        """The larger of normalised score and floor; within a piece the speed hardly changes."""
         peaks, plain = levels(self.peaks, self.speeds), self.floor
         if floor is not None and plain is not None:
             peaks = np.maximum(peaks, floor(plain.peaks, plain.speeds))

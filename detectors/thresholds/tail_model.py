@@ -16,10 +16,10 @@ from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
 #: alarms come from arms with heavier tails: with 0.25 all arms together have as many as asked.
 USUAL_SHAPE = 0.25
 
-#: Standard errors that an estimated shape must be away from it before it counts.
+#: An estimated shape counts if it is this number of standard errors from the usual one.
 BEYOND_CHANCE = 3.0
 
-#: Bounds of an estimated shape: no finite end closer than that of a triangle's, and a variance.
+#: Bounds of an estimated shape: the tail ends no sooner than a triangle, and has a variance.
 SHAPES = (-0.5, 0.5)
 
 
@@ -46,7 +46,8 @@ class Tail:
     ) -> Tail:
         """From the ``count`` largest peaks and the next one.
 
-        Their excesses tell scale and shape by probability-weighted moments (Hosking & Wallis 1987).
+        Scale and shape follow from their excesses by probability-weighted moments (Hosking & Wallis
+        1987).
 
         Args:
             peaks: in descending order, shape (N,), N >= 1.
@@ -121,7 +122,7 @@ HEAVIER = 0.02
 
 
 def tail_fraction(interval: float) -> float:
-    """Fraction of the blocks in the tail of logs with so long between two samples [s]."""
+    """Fraction of the blocks in the tail, by the logs' sample interval [s]."""
     return SLOW_TAIL if interval > SLOW else TAIL
 
 
