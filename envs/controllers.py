@@ -37,7 +37,7 @@ def friction_torque(friction: Friction | None, qd_des: Array) -> Array:
     """Nominal friction at the wanted speed [N m], shape (n,); zero without a friction model.
 
     It takes the wanted speed, not the measured one: a compensation by the measured speed would
-    chatter at rest. ``scene.facts.nominal.friction`` is the friction that is known of an arm.
+    chatter at rest. ``scene.facts.nominal.friction`` is an arm's nominal friction.
     """
     if friction is None:
         return np.zeros_like(qd_des)

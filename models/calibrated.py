@@ -23,7 +23,7 @@ PRESLIDING = 1.5e-3
 
 
 def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str]) -> Robot:
-    """The robot with gains, rotor inertias and friction of a calibrated file, if it states none.
+    """The robot with its calibrated file's gains, rotor inertias and friction, unless it has gains.
 
     Args:
         robot: the user's description.

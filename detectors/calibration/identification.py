@@ -231,7 +231,11 @@ def _fit(
     data: Sequence[Filtered] | None,
     rounds: int,
 ) -> tuple[Identified, Array]:
-    """Iterate least squares with joints weighted by the last residual; also gains' deviations."""
+    """Iterate least squares, with each joint weighted by its last residual.
+
+    Returns:
+        The identified arm, and the standard deviations of its gains.
+    """
     robot, held = arm.robot, scale == "gains"
     gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)

@@ -13,7 +13,7 @@ namespace {
 using Numbers = std::vector<double>;
 using Source = std::shared_ptr<Scores>;
 
-// A stream that is Python's: `make` gives a new one, whose step is asked. It allocates.
+// A stream that is written in Python: `make` returns a new one. A step allocates.
 class PythonScores final : public Scores {
  public:
   PythonScores(nb::object make, std::size_t joints) : make_(std::move(make)), n_(joints) {

@@ -8,8 +8,8 @@
 namespace tauguard::rigid {
 namespace {
 
-// Radii below this fraction of the size are too small for the direction between the cores: a
-// contact is described to 1e-9 of the size, so this direction would be off by 1e-3 or more.
+// Radii below this fraction of the size give no direction between the cores. A contact is accurate
+// to 1e-9 of the size, so the direction would be off by 1e-3 or more.
 constexpr double small_radii = 1e-6;
 
 // A common point of overlapping grown bodies: on the segment between their cores' nearest points.
