@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
 from tauguard.arrays import Array
@@ -22,6 +23,8 @@ TURNING = (0.005, 0.1)
 GEAR = 101.0
 #: Least half width of an interval, relative to the largest joint's number: the error of the law.
 FORM = 0.02
+#: Samples of the running median of the model's error.
+MEDIAN = 9
 #: The identified numbers that have an interval.
 NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
 
@@ -164,8 +167,10 @@ def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Arra
 def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
     """Errors of the model along the logs, at even steps and without smoothing.
 
-    Each sample goes to the nearest even time with its impulse, error times step. A late sample and
-    the early one after it would else leave an impulse that neither the arm nor an observer saw.
+    The error's running median is interpolated. What exceeds it goes to the nearest even time with
+    its impulse, error times step: a late sample and the early one after it would else leave an
+    impulse that neither the arm nor an observer saw. The median has none: a constant error would
+    get the jitter of the steps.
 
     Args:
         arm: calibrated.
@@ -179,14 +184,16 @@ def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -
         error = bridged_stop(part, error)
         place = np.rint((part.t - part.t[0]) / dt).astype(np.int64)
         first = np.unique(place, return_index=True)[1]
-        impulse = np.cumsum(np.diff(part.t)[:, None] * error[:-1], axis=0)
+        level = median_filter(error, (MEDIAN, 1))
+        impulse = np.cumsum(np.diff(part.t)[:, None] * (error - level)[:-1], axis=0)
         impulse = np.vstack([0 * error[:1], impulse])[first]
         even = np.arange(place[-1] + 1)
+        slow = [np.interp(even[:-1] * dt, part.t - part.t[0], column) for column in level.T]
         sums = np.stack([np.interp(even, place[first], column) for column in impulse.T], axis=1)
         rows = first[np.searchsorted(place[first], even[:-1], side="right") - 1]
         log.append(np.full(len(rows), k))
         qd.append(part.qd[rows])
-        errors.append(np.diff(sums, axis=0) / dt)
+        errors.append(np.stack(slow, axis=1) + np.diff(sums, axis=0) / dt)
     return LeftOver(1 / dt, np.concatenate(log), np.concatenate(qd), np.concatenate(errors))
 
 

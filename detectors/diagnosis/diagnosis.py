@@ -43,6 +43,7 @@ class Diagnosis:
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: the measures that decided the kind
     severity: Severity  #: impulse and peak force, each with an interval
+    since: float  #: when the contact began, or shortly before [s]
     until: float  #: end of the observed window [s]
     joints: tuple[str, ...]  #: their names
 
@@ -144,12 +145,30 @@ class Diagnoser:
     def diagnose(
         self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
     ) -> list[Diagnosis]:
-        """A diagnosis for each alarm, in order; ``after`` is how long it is looked at [s]."""
-        looked = PostAlarmWindows(self.arm, self.noise_model, trace)
-        return [self.explain(alarm, looked.at(alarm.start, after)) for alarm in alarms]
+        """A diagnosis for each alarm, in order.
 
-    def explain(self, alarm: Alarm, after: PostAlarmWindow) -> Diagnosis:
-        """The diagnosis from the residual around an alarm."""
+        It is judged in the time ``after`` the alarm [s]; a force at the tool from the beginning of
+        the contact, which may be before the alarm, until the alarm ends.
+        """
+        looked = PostAlarmWindows(self.arm, self.noise_model, trace)
+        found, since = [], -np.inf
+        for alarm in alarms:
+            whole = looked.whole(alarm, since, after) if self.at_tool else None
+            found.append(self.explain(alarm, looked.at(alarm.start, after), whole))
+            since = alarm.end
+        return found
+
+    def explain(
+        self, alarm: Alarm, after: PostAlarmWindow, whole: PostAlarmWindow | None = None
+    ) -> Diagnosis:
+        """The diagnosis from the residual around an alarm.
+
+        Args:
+            alarm: explained.
+            after: what came with it shortly after.
+            whole: what came with the whole contact, for the force (default: ``after``).
+        """
+        whole = after if whole is None else whole
         robot, level = self.arm.robot, after.level
         last = max(ISOLATE, ISOLATE_LAGS * after.lag)
         first = np.flatnonzero((after.t >= -EARLY) & (after.t <= last))
@@ -162,9 +181,9 @@ class Diagnoser:
             robot, self.surface, after.q[peak], after.residual[peak], self._noise(after)[peak]
         )
         force, point = at_peak.weighted(belief.probability).on(link)
-        sized = severity(robot, self.surface, after, belief, len(rows), self.trust)
+        sized = severity(robot, self.surface, whole, belief, len(rows), self.trust)
         if self.at_tool:
-            sized, force = tool_severity(self.arm, after)
+            sized, force = tool_severity(self.arm, whole, self.surface)
             point = link_poses(robot, after.q[peak]).origin[-1]
         kinds = signs(after, force, self._velocity(link, point, after, peak))
         fractions = kinds.probabilities(self.load_known)
@@ -180,7 +199,8 @@ class Diagnoser:
             fractions,
             kinds,
             sized,
-            alarm.start + float(after.t[-1]),
+            alarm.start + float(whole.t[0]),
+            alarm.start + float(whole.t[-1]),
             robot.joint_names,
         )
 

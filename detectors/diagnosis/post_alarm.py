@@ -17,7 +17,7 @@ from tauguard.detectors.dynamics.robot import momentum_regressor
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
-from tauguard.traces.trace import Trace
+from tauguard.traces.trace import Alarm, Trace
 
 #: Largest observer gain, as a fraction of a log's rate.
 PER_SAMPLE = 0.2
@@ -30,6 +30,13 @@ AFTER, LAGS = 0.3, 10.0
 
 #: Time constants of the observer after which the start of a payload's columns has no effect.
 SETTLED = 10.0
+
+#: A contact may have begun this long before its alarm [s]: where the residual was last below this
+#: fraction of what it is at the alarm.
+BEGUN, RISE = 0.6, 0.2
+
+#: A contact is followed while its alarm lasts, at most this long [s].
+LONGEST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +77,37 @@ class PostAlarmWindows:
             trace.t, trace.q, trace.qd, trace.current, keep=True
         )
 
-    def at(self, start: float, after: float = AFTER) -> PostAlarmWindow:
+    def whole(self, alarm: Alarm, since: float = -np.inf, after: float = AFTER) -> PostAlarmWindow:
+        """The samples of a contact from its beginning until its alarm ends.
+
+        Args:
+            alarm: of the trace.
+            since: the contact has not begun before [s].
+            after: least time after the alarm's start [s].
+        """
+        before = alarm.start - max(self._begun(alarm.start), since) + BEFORE
+        lasts = min(alarm.end - alarm.start, LONGEST)
+        return self.at(alarm.start, max(after, lasts), max(before, BEFORE))
+
+    def _begun(self, start: float) -> float:
+        """When the rise of the residual that led to an alarm began [s]."""
+        t = self.trace.t
+        assert self.arm.noise is not None
+        rows = slice(*np.searchsorted(t, (start - BEGUN, start + 0.5 * self.trace.dt)))
+        seen, at = self._estimate.residual[rows], t[rows]
+        if len(at) < 4:
+            return start
+        seen = (seen - np.median(seen[: len(at) // 3], axis=0)) / self.arm.noise
+        level = seen @ seen[-1] / max(float(seen[-1] @ seen[-1]), 1e-12)
+        return float(at[np.flatnonzero(level < RISE)[-1:]].max(initial=at[0]))
+
+    def at(self, start: float, after: float = AFTER, before: float = BEFORE) -> PostAlarmWindow:
         """The samples around an alarm that starts at ``start`` [s].
+
+        Args:
+            start: of the alarm [s].
+            after: time that is looked at after it [s].
+            before: what was known this long before it is held [s].
 
         Raises:
             ValueError: not within the trace.
@@ -82,7 +118,7 @@ class PostAlarmWindows:
             raise ValueError(f"start {start} s: the trace goes from {trace.t[0]} to {trace.t[-1]}")
         assert known.unknowns is not None
         begin, first, at, last = np.searchsorted(
-            trace.t, (start - BEFORE - SETTLED * lag, start - BEFORE, start, start + after)
+            trace.t, (start - before - SETTLED * lag, start - before, start, start + after)
         )
         # Slow logs: at least the sample before the alarm's, where there is one.
         first, begin = min(first, max(at - 1, 0)), min(begin, max(at - 1, 0))

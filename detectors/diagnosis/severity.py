@@ -110,6 +110,9 @@ COVERAGE = 0.9
 #: The torque is averaged over this number of lags to both sides before its peak is taken.
 SMOOTHED = 0.3
 
+#: Of a long contact, the average is over this fraction of its time: joints that slip give peaks.
+LONG = 0.1
+
 #: The contact lasts while the torque is above this fraction of its peak.
 CONTACT_FRACTION = 0.15
 
@@ -160,6 +163,8 @@ class ContactTorque:
     shape: float  #: peak over mean
     hidden: float  #: fraction of the duration that the samples do not resolve
     goes_on: bool = False  #: the contact lasted at the end of the window
+    first: int = 0  #: row at which the contact begins
+    last: int = -1  #: and at which it ends
 
     @property
     def mean(self) -> Array:
@@ -175,19 +180,18 @@ class ContactTorque:
     @classmethod
     def of(cls, after: PostAlarmWindow) -> ContactTorque:
         """The torques from the residual around an alarm."""
-        width, torque = _without_lag(after)
-        top = int(np.linalg.norm(torque / after.deviation, axis=1).argmax())
-        along = torque @ (torque[top] / after.deviation[top] ** 2)
-        first, last = _contact(along, top)
+        width, torque, top, along, first, last = _followed(after, 0.0)
+        wider = LONG * float(after.t[last] - after.t[first])
+        if wider > 2 * width:
+            width, torque, top, along, first, last = _followed(after, wider)
         part = slice(first, last + 1)
         seconds = float(after.t[last] - after.t[first])
         step = after.residual[last] - after.residual[first]
         whole = np.trapezoid(after.residual[part], after.t[part], axis=0) + after.lag * step
         shape = along[top] / max(float(along[part].mean()), 1e-12)
         hidden = min(width / seconds, UNRESOLVED)
-        return cls(
-            top, seconds, whole, torque[top], float(shape), hidden, bool(last == len(after.t) - 1)
-        )
+        goes_on = bool(last == len(after.t) - 1)
+        return cls(top, seconds, whole, torque[top], float(shape), hidden, goes_on, first, last)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,10 +251,18 @@ def severity(
     )
 
 
-def _without_lag(after: PostAlarmWindow) -> tuple[float, Array]:
+def _followed(after: PostAlarmWindow, least: float) -> tuple[float, Array, int, Array, int, int]:
+    """The torque averaged over ``least`` [s], its peak's row, first and last row of the contact."""
+    width, torque = _without_lag(after, least)
+    top = int(np.linalg.norm(torque / after.deviation, axis=1).argmax())
+    along = torque @ (torque[top] / after.deviation[top] ** 2)
+    return width, torque, top, along, *_contact(along, top)
+
+
+def _without_lag(after: PostAlarmWindow, least: float) -> tuple[float, Array]:
     """Time that is averaged over [s], and tau_ext without the observer's lag [N m], (M, n)."""
     dt = float(np.median(np.diff(after.t)))
-    half = max(1, round(SMOOTHED * after.lag / dt))
+    half = max(1, round(max(SMOOTHED * after.lag, least / 2) / dt))
     raw = after.residual + after.lag * np.gradient(after.residual, after.t, axis=0)
     kernel = np.full(2 * half + 1, 1 / (2 * half + 1))
     padded = np.pad(raw, ((half, half), (0, 0)), mode="edge")

@@ -1,8 +1,11 @@
 """The force of a contact whose place is known: the tool, as in most handling and pushing.
 
-If the place is known, the torques of six joints determine the three components of the force. These
-torques are uncertain, because static friction at a joint at rest hides a part of the push. The
-prior of the force is a mixture of Gaussians of several sizes, weighted by their likelihood.
+If the place is known, the torques of six joints determine the three components of the force. The
+uncertainty is in the torques: friction of a joint at rest takes part of a push or, where the servo
+drives the joint back against the push, adds to it. The displacement since the contact began says
+which of the two (the joint is measured to 1e-5 rad, and friction turns around within 1e-4 rad);
+what friction was before is unknown. The prior of the force is a mixture of Gaussians of several
+sizes, weighted by their likelihood.
 """
 
 from __future__ import annotations
@@ -20,22 +23,32 @@ from tauguard.detectors.diagnosis.severity import (
     Severity,
 )
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.models.link_surface import LinkSurface
 
 #: Sizes of the force that the prior weighs equally [N].
 SIZES = np.geomspace(5.0, 400.0, 9)
-#: Standard deviations: of any joint's torque [N m]; of a torque, relative; of the torque that
-#: static friction hides, relative to that friction; of gains and levers (log).
-LEAST, OWN, HIDDEN, SCALE = 0.15, 0.05, 0.5, 0.15
-#: Speed below which a joint counts as at rest [rad/s].
+#: Standard deviations: of any joint [N m], of a torque relative to itself, of the friction of a
+#: joint at rest before the contact relative to its largest, of the drives' gains and levers (log).
+LEAST, OWN, HIDDEN, SCALE = 0.15, 0.05, 0.58, 0.15
+#: A joint that is slower is at rest [rad/s].
 AT_REST = 0.02
+#: The tool reaches so far [m]; number of places along it that are equally likely before.
+TOOL, PLACES = 0.2, 5
+#: Displacement over which friction at rest turns around [rad].
+PRESLIDING = 1e-4
 
 
-def tool_severity(arm: ArmModel, after: PostAlarmWindow) -> tuple[Severity, Array]:
-    """Impulse and peak of a contact at the origin of the last link, and its mean force.
+def tool_severity(
+    arm: ArmModel, after: PostAlarmWindow, surface: LinkSurface | None = None
+) -> tuple[Severity, Array]:
+    """Impulse and peak of a contact at the tool, and its mean force.
+
+    The tool is along the last joint's axis, up to :data:`TOOL` beyond the end of the last link.
 
     Args:
         arm: with friction, if joints are geared.
         after: the residual around the alarm.
+        surface: of the last link, which says where it ends (default: at its joint).
 
     Returns:
         The severity, and the force on the arm at its peak, world frame [N], shape (3,).
@@ -43,36 +56,60 @@ def tool_severity(arm: ArmModel, after: PostAlarmWindow) -> tuple[Severity, Arra
     torque = ContactTorque.of(after)
     q, row, n = after.q[torque.row], torque.row, arm.robot.joints
     poses = link_poses(arm.robot, q)
-    jacobian = point_jacobians(arm.robot, poses, np.array([n - 1]), poses.origin[-1:])[0]
-    rest = np.abs(after.qd[row]) < AT_REST
-    friction = np.zeros(n) if arm.friction is None else arm.friction.coulomb()
-    deviation = np.sqrt(
-        LEAST**2 + (OWN * np.abs(torque.peak)) ** 2 + (HIDDEN * friction * rest) ** 2
-    )
-    force = _draws(jacobian, torque.peak, deviation)
+    heights = np.zeros(1) if surface is None else surface.point @ arm.robot.axis[-1]
+    side = 1.0 if heights.mean() >= 0 else -1.0
+    levers = side * (np.max(side * heights) + np.linspace(0.0, TOOL, PLACES))
+    places = poses.origin[-1] + levers[:, None] * poses.axis[-1]
+    jacobians = point_jacobians(arm.robot, poses, np.full(PLACES, n - 1), places)
+    rest = (np.abs(after.qd[: row + 1]) < AT_REST).all(axis=0)
+    friction = rest * (0.0 if arm.friction is None else arm.friction.coulomb())
+    turned = friction * _turned(after.q)
+    turned = turned - rest * after.residual[0]  # what a joint at rest holds is no contact
+    peak = torque.peak + turned[row]
+    mean = torque.mean + turned[torque.first : torque.last + 1].mean(axis=0)
+    deviation = np.sqrt(LEAST**2 + (OWN * np.abs(torque.peak)) ** 2 + (HIDDEN * friction) ** 2)
+    along = peak / deviation**2
+    shape = max(float(peak @ along) / max(float(mean @ along), 1e-12), 1.0)
+    force = _draws(jacobians, peak, deviation)
     rng = np.random.default_rng((SEED, 2))
-    peak = np.linalg.norm(force, axis=1) * np.exp(SCALE * rng.standard_normal(len(force)))
-    mean = peak / torque.shape * torque.seconds
-    return Severity(Interval90.of(mean), Interval90.of(peak), torque), force.mean(axis=0)
+    size = np.linalg.norm(force, axis=1) * np.exp(SCALE * rng.standard_normal(len(force)))
+    impulse = size / shape * torque.seconds
+    return Severity(Interval90.of(impulse), Interval90.of(size), torque), force.mean(axis=0)
 
 
-def _draws(jacobian: Array, torque: Array, deviation: Array) -> Array:
+def _turned(q: Array) -> Array:
+    """Friction of joints at rest, from -1 to 1 of its largest, 0 at first, shape (M, n).
+
+    Args:
+        q: positions [rad], shape (M, n).
+    """
+    state, before = np.zeros(q.shape[1]), q[0]
+    out = np.empty_like(q)
+    for k, now in enumerate(q):
+        state = np.clip(state + (now - before) / PRESLIDING, -1, 1)
+        out[k], before = state, now
+    return out
+
+
+def _draws(jacobians: Array, torque: Array, deviation: Array) -> Array:
     """Forces [N] that joint torques [N m] may come from, shape (DRAWS, 3).
 
     Args:
-        jacobian: of the place, shape (3, n).
+        jacobians: of the places, shape (P, 3, n).
         torque: shape (n,).
         deviation: deviation of the torques [N m], shape (n,).
     """
-    rng, columns, seen = np.random.default_rng(SEED), (jacobian / deviation).T, torque / deviation
-    known, logs, drawn = columns.T @ columns, [], []
-    for size in SIZES:
-        covariance = size**2 * columns @ columns.T + np.eye(len(seen))
-        logs.append(-0.5 * (seen @ np.linalg.solve(covariance, seen)))
-        logs[-1] -= 0.5 * np.linalg.slogdet(covariance)[1]
-        spread = np.linalg.inv(known + np.eye(3) / size**2)
-        drawn.append(rng.multivariate_normal(spread @ columns.T @ seen, spread, DRAWS))
-    weight = np.exp(np.array(logs) - max(logs))
-    chosen = rng.choice(len(SIZES), size=DRAWS, p=weight / weight.sum())
-    forces: Array = np.array(drawn)[chosen, np.arange(DRAWS)]
+    rng, columns, seen = np.random.default_rng(SEED), jacobians / deviation, torque / deviation
+    known = columns @ np.swapaxes(columns, 1, 2)
+    precision = known[:, None] + np.eye(3) / SIZES[:, None, None] ** 2  # (P, S, 3, 3)
+    covariance = np.linalg.inv(precision)
+    toward = columns @ seen
+    mean = np.einsum("psij,pj->psi", covariance, toward)
+    logs = np.einsum("psi,pi->ps", mean, toward) - np.linalg.slogdet(precision)[1]
+    logs = (0.5 * logs - 3 * np.log(SIZES)).ravel()
+    weight = np.exp(logs - logs.max())
+    chosen = rng.choice(len(logs), size=DRAWS, p=weight / weight.sum())
+    spread = np.linalg.cholesky(covariance).reshape(-1, 3, 3)[chosen]
+    about = np.einsum("kij,kj->ki", spread, rng.standard_normal((DRAWS, 3)))
+    forces: Array = mean.reshape(-1, 3)[chosen] + about
     return forces

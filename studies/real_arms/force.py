@@ -2,9 +2,10 @@
 
 A UR5 stands and is pushed at the tool; a sensor there gives the force. Its logs without contact
 make the detector and the twin. A row an alarm: peak, impulse, contact time and loudest joint as
-``detect --at-tool`` gives them, beside the sensor's in the time that the diagnosis looks at. And a
-row a push: the twin, standing as the arm stood and pushed with the sensor's force, beside the joint
-torques that the arm's currents changed by.
+``detect --at-tool`` gives them, beside the sensor's in the time that the diagnosis looks at: from
+the beginning of the contact, which may be before the alarm, until the alarm ends. And a row a push:
+the twin, standing as the arm stood and pushed with the sensor's force, beside the joint torques
+that the arm's currents changed by.
 
 How the sensor was mounted is not documented. Its rotation against the flange is fitted, to the
 joint torques of every second push; the row says which ones. Its lever is not: all pushes are in one
@@ -43,16 +44,14 @@ Array = NDArray[np.float64]
 
 #: Arm and log with a sensor.
 ARM, LOG = "ur5", "no10_standing_force"
-#: Window of the diagnosis before and after an alarm [s].
-LOOKED = (0.1, 0.3)
 #: Least force of a strong push in the medians [N].
 STRONG = 20.0
 #: Time before a push with whose currents the push is compared [s].
 BEFORE = 0.1
 NOTES = {
-    "force": "pushes at the tool, with --at-tool; low, high: 90 % interval; sensor: peak from "
-    "0.1 s before to 0.3 s after the alarm, the diagnosis's window. Joints that move by "
-    "themselves after a push raise alarms without a force, which have no row.",
+    "force": "pushes at the tool, with --at-tool; low, high: 90 % interval; sensor: in the "
+    "diagnosis's window, from the beginning of the contact to the end of the alarm. Joints that "
+    "move by themselves after a push raise alarms without a force, which have no row.",
     "pushed twin": "change of the drives' torques at the sensor's peak, for the three joints "
     "with the largest change [N m]; missed: norm of the difference over the norm of the arm's "
     "change; fitted: the sensor's rotation was fitted to this push, so only the other rows are a "
@@ -89,15 +88,15 @@ def sensor() -> Array:
 
 
 def _beside(t: Array, size: Array, cause: Diagnosis) -> Row | None:
-    """The diagnosis beside the sensor; None if the sensor shows no push."""
-    start, severity = cause.alarm.start, cause.severity
-    look = (t >= start - LOOKED[0]) & (t <= start + LOOKED[1])
+    """What a diagnosis says, beside the sensor; None where that shows no push."""
+    severity = cause.severity
+    look = (t >= cause.since) & (t <= cause.until)
     if size[look].max() < BEGINS:
         return None
     peak, impulse = severity.peak, severity.impulse
     return {
         "study": "force",
-        "alarm s": float(start - t[0]),
+        "alarm s": float(cause.alarm.start - t[0]),
         "sensor N": float(size[look].max()),
         "found N": peak.value,
         "low N": peak.low,
@@ -106,7 +105,7 @@ def _beside(t: Array, size: Array, cause: Diagnosis) -> Row | None:
         "found N s": impulse.value,
         "low N s": impulse.low,
         "high N s": impulse.high,
-        "sensor s": float((size[look] > ENDS).mean() * sum(LOOKED)),
+        "sensor s": float((size[look] > ENDS).mean() * (cause.until - cause.since)),
         "found s": severity.torque.seconds,
         "joint": int(np.abs(severity.torque.peak).argmax()) + 1,
     }

@@ -119,6 +119,17 @@ def test_the_left_over_has_the_impulse_of_the_logs_error_at_uneven_samples(arm, 
         np.testing.assert_allclose(got[round(seconds * 100) - 1], given[k - 1], atol=0.08)
 
 
+def test_a_constant_error_does_not_get_the_jitter_of_the_samples(arm, logs, twin):
+    rng = np.random.default_rng(4)
+    log = replace(logs[0], t=logs[0].t + 0.003 * rng.uniform(-1, 1, len(logs[0].t)))
+    noise = 0.1 * rng.normal(size=log.q.shape)
+    model = modelled(arm, twin.drive.friction, twin.drive.gain, log)
+    found = left_over(arm, twin.drive, [(0, replace(log, current=model + 5.0 + noise))])
+    middle = found.current[200:-200]
+    np.testing.assert_allclose(middle.mean(axis=0), 5.0, atol=0.02)
+    np.testing.assert_allclose(middle.std(axis=0), 0.1, rtol=0.15)
+
+
 def test_the_error_of_a_programs_cut_off_is_bridged(logs):
     qd = np.zeros_like(logs[0].qd)
     qd[100:500] = 0.3

@@ -150,6 +150,19 @@ def test_what_was_known_before_the_alarm_is_kept(trace):
     assert looked.t[-1] == pytest.approx(0.3, abs=2e-3)
 
 
+def test_the_force_of_a_late_alarm_is_that_of_the_whole_contact(trace):
+    looked = PostAlarmWindows(ARM, None, trace)
+    late = Alarm(4.4, 4.9)
+    truth = payload_torque(trace.q[np.searchsorted(trace.t, 4.5)], 2.0, [0, 0.098, 0])
+    whole = looked.whole(late)
+    assert 4.1 < late.start + whole.t[0] < 4.2
+    assert late.start + whole.t[-1] == pytest.approx(late.end, abs=2e-3)
+    peak = whole.residual[np.abs(whole.residual[:, 1]).argmax()]
+    np.testing.assert_allclose(peak, truth, atol=3.0)
+    # Not before the end of the alarm that came first.
+    assert looked.whole(late, 4.3).t[0] == pytest.approx(-0.12, abs=2e-3)
+
+
 def test_alarms_of_any_detector_are_explained(trace, alarm):
     explained = diagnose(alarm, trace)
     assert len(explained) == len(alarm.detect(trace).alarms)

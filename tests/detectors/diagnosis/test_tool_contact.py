@@ -1,5 +1,7 @@
 """The force of a contact at the tool, from torques of which friction hides a part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,37 @@ def test_intervals_hold_what_friction_hides():
         wide.append(peak.high / peak.low)
     assert held >= 45
     assert np.median(wide) < 6
+
+
+def test_a_tool_of_unknown_length_is_allowed_for():
+    rng, held, wide = np.random.default_rng(6), 0, []
+    poses = link_poses(ROBOT, HOME)
+    tip = SURFACE.only([6])
+    side = np.sign((tip.point @ ROBOT.axis[-1]).mean())
+    end = np.max(side * (tip.point @ ROBOT.axis[-1]))
+    for _ in range(40):
+        place = poses.origin[-1] + side * (end + rng.uniform(0, 0.2)) * poses.axis[-1]
+        jacobian = point_jacobians(ROBOT, poses, np.array([5]), place[None])[0]
+        force = rng.normal(size=3)
+        force *= rng.uniform(15, 120) / np.linalg.norm(force)
+        peak = tool_severity(DIRECT, seen(jacobian.T @ force, 0.3, 0.005), tip)[0].peak
+        held += peak.low <= np.linalg.norm(force) <= peak.high
+        wide.append(peak.high / peak.low)
+    assert held >= 35
+    assert np.median(wide) < 2.5
+
+
+def test_friction_of_a_joint_that_the_servo_drives_back_is_no_force():
+    force = np.array([0.0, -60.0, 20.0])
+    torque = pushed(force)
+    window = seen(torque + np.sign(torque) * FRICTION, 0.3, 0.005)
+    # Against the push, by three times the displacement over which friction turns around.
+    moved = -3e-4 * np.sign(torque) * np.linspace(0, 1, len(window.t))[:, None]
+    found = tool_severity(GEARED, window)[0].peak
+    back = tool_severity(GEARED, replace(window, q=window.q + moved))[0].peak
+    size = np.linalg.norm(force)
+    assert abs(back.value / size - 1) < 0.6 * abs(found.value / size - 1)
+    assert back.low < size < back.high
 
 
 def test_a_diagnoser_that_is_told_the_tool_names_the_last_link():

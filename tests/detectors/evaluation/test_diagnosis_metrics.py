@@ -37,7 +37,7 @@ def said(start, link, kind="impact"):
     alarm = Alarm(start, start + 0.1)
     return Diagnosis(
         *(alarm, link, np.ones(6) / 6, 1, start + 0.01, force, point, kind, {}, SIGNS),
-        *(SIZE, start + 0.3, ("j",)),
+        *(SIZE, start - 0.02, start + 0.3, ("j",)),
     )
 
 
