@@ -1,4 +1,4 @@
-"""Model files: one container with a kind, a version and what it was made with, written by skops.
+"""Model files: one container with a kind, a version and what it was made with, in skops' format.
 
 The content is dictionaries, arrays, numbers and text only: nothing in a file is code, and a class
 is built only if it is one of ours or of a module that the user has named. A checksum over the
@@ -36,6 +36,8 @@ FORMAT, VERSION = "tauguard model", 6
 ALARM = "collision-alarm"
 #: Versions that are written into a file.
 MADE_WITH = ("tauguard", "mujoco", "numpy", "scikit-learn")
+#: Protocol of skops' files, and the version of skops that they are written as.
+PROTOCOL, SKOPS = 2, "0.13"
 #: Unpacked bytes of a file: no detector is larger.
 LARGEST = 256 * 2**20
 #: What a file of another format or version needs.
@@ -84,8 +86,6 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     Raises:
         ValueError: it cannot be in a file, or the folder cannot be written.
     """
-    import skops.io
-
     content, key = encode(value), key_of_user()
     own = checksum(content)
     container = {
@@ -98,7 +98,7 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
         "content": content,
     }
     try:
-        write_atomic(Path(path), skops.io.dumps(container))
+        write_atomic(Path(path), _archive(container))
     except OSError as error:
         raise ValueError(f"{path}: cannot be written ({error.strerror})") from None
 
@@ -126,6 +126,35 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
         return READERS[kind](content)
     except (ValueError, TypeError, KeyError, AttributeError, IndexError, RecursionError) as error:
         raise ValueError(f"{path}: {_line(error)}") from None
+
+
+def _archive(container: Mapping[str, Any]) -> bytes:
+    """What ``skops.io.dumps`` makes of a container, without its imports, which take seconds."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        schema = _node(container, archive) | {"protocol": PROTOCOL, "_skops_version": SKOPS}
+        archive.writestr("schema.json", json.dumps(schema))
+    return data.getvalue()
+
+
+def _node(value: Any, archive: zipfile.ZipFile) -> dict[str, Any]:
+    """The node of a skops schema that :func:`_value` reads; arrays are added to the archive."""
+    of = {"__class__": type(value).__name__, "__module__": "builtins"}
+    if isinstance(value, Mapping):
+        parts = {name: _node(part, archive) for name, part in value.items()}
+        text = {"__class__": "str", "__module__": "builtins", "__loader__": "TypeNode"}
+        types = {"__class__": "list", "__module__": "builtins", "__loader__": "ListNode"}
+        keys = types | {"content": [text] * len(parts)}
+        return of | {"__loader__": "DictNode", "content": parts, "key_types": keys}
+    if isinstance(value, list):
+        return of | {"__loader__": "ListNode", "content": [_node(part, archive) for part in value]}
+    if isinstance(value, np.ndarray):
+        name, own = f"{len(archive.namelist())}.npy", io.BytesIO()
+        np.save(own, value, allow_pickle=False)
+        archive.writestr(name, own.getvalue())
+        numpy = {"__module__": "numpy", "__loader__": "NdArrayNode", "type": "numpy"}
+        return of | numpy | {"file": name}
+    return of | {"__loader__": "JsonNode", "content": json.dumps(value), "is_json": True}
 
 
 def _container(path: Path) -> Mapping[str, Any]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import subprocess
 import sys
 import types
 import zipfile
@@ -71,6 +72,19 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
         6,
     )
     assert set(container["made_with"]) == {"tauguard", "mujoco", "numpy", "scikit-learn"}
+
+
+def test_skops_reads_what_is_written_without_it(tmp_path):
+    value = {"a": np.arange(6.0).reshape(2, 3), "b": [1, 2.5e-300, None, True, "x"], "c": {}}
+    found = skops.io.loads(files._archive(value | {"d": np.array([True, False])}), trusted=[])
+    np.testing.assert_array_equal(found.pop("a"), value.pop("a"))
+    np.testing.assert_array_equal(found.pop("d"), [True, False])
+    assert found == value
+    path = tmp_path / "model.skops"
+    code = "import sys; from tauguard.detectors.model_file import write_model as write; "
+    code += f"write({str(path)!r}, 'numbers', (1, 2)); assert 'skops' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert skops.io.load(path)["content"] == {"tuple": [1, 2]}
 
 
 def test_a_module_of_another_is_built_only_if_it_was_named(small, named, tmp_path, unseen):
