@@ -103,6 +103,8 @@ class Bound:
     low: Array
     """Least position of joints that move in no log [rad], -ANYWHERE for others, shape (n,)."""
     high: Array  #: their largest position, ANYWHERE for others
+    fast: Array  #: speed that the logs show, :data:`ANYWHERE` for any [rad/s], (n,)
+    hard: Array  #: the same of the acceleration [rad/s^2], (n,)
     scale: Array
     """Factors from held-out logs on the prior bounds: at rest, added by motion, and in motion,
     shape (3, n)."""
@@ -117,6 +119,8 @@ class Bound:
             friction[:, None] * PRIOR,
             low,
             high,
+            np.full(len(friction), ANYWHERE),
+            np.full(len(friction), ANYWHERE),
             np.ones((3, len(friction))),
         )
 
@@ -230,6 +234,9 @@ def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMo
         bound.moving.ravel().tolist(),
         bound.start.tolist(),
         (TURNED * bound.static).tolist(),
+        bound.fast.tolist(),
+        bound.hard.tolist(),
+        bound.friction.tolist(),
         bound.low.tolist(),
         bound.high.tolist(),
     )

@@ -61,6 +61,10 @@ WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
 #: Time between two rows of the regression [s].
 EVERY = 0.04
 
+#: A speed or an acceleration counts as shown if it was exceeded for so long in all [s]; the least
+#: that does in any case [rad/s, rad/s^2].
+SHORTLY, LEAST_SHOWN = 0.5, 0.05
+
 #: Largest number of calibrations with held-out logs.
 FOLDS = 5
 
@@ -272,7 +276,15 @@ def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
     """The prior bounds moved by what left-out logs show."""
     quantile = _quantiles(judged, prior.friction)
     bound = replace(prior, noise=_noise(judged, prior.noise), quantile=quantile)
-    return replace(bound, scale=_scale(prior, bound, judged))
+    fast, hard = (_shown(judged, name) for name in ("qd", "qdd"))
+    return replace(bound, scale=_scale(prior, bound, judged), fast=fast, hard=hard)
+
+
+def _shown(judged: Sequence[Judged], name: str) -> Array:
+    """The size of qd or qdd that each joint exceeds for :data:`SHORTLY` in all, shape (n,)."""
+    ranked = np.sort(np.concatenate([np.abs(getattr(p, name))[:: _stride(p)] for p in judged]), 0)
+    shown: Array = np.maximum(ranked[-min(len(ranked), round(SHORTLY / EVERY))], LEAST_SHOWN)
+    return shown
 
 
 def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:

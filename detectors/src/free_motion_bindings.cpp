@@ -14,13 +14,15 @@ using Numbers = std::vector<double>;
 
 FreeMotion* make(const Estimator& estimator, const Numbers& rest, const Numbers& stop,
                  const Numbers& least, const Numbers& moving, const Numbers& start,
-                 const Numbers& turned, const Numbers& low, const Numbers& high) {
+                 const Numbers& turned, const Numbers& fast, const Numbers& hard,
+                 const Numbers& beyond, const Numbers& low, const Numbers& high) {
   const std::size_t n = estimator.joints();
   require(n > 0 && rest.size() == n && stop.size() == n && least.size() == n && start.size() == n &&
-              turned.size() == n && low.size() == n && high.size() == n &&
-              moving.size() == RegimeBounds::terms * n,
+              turned.size() == n && fast.size() == n && hard.size() == n && beyond.size() == n &&
+              low.size() == n && high.size() == n && moving.size() == RegimeBounds::terms * n,
           "FreeMotion: array lengths differ");
-  return new FreeMotion(estimator, {rest, stop, least, moving, start, turned, low, high});
+  return new FreeMotion(estimator,
+                        {rest, stop, least, moving, start, turned, fast, hard, beyond, low, high});
 }
 
 void copy(const std::vector<double>& from, double* to) { std::copy(from.begin(), from.end(), to); }
@@ -51,7 +53,7 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
 void bind_free_motion(nb::module_& m) {
   nb::class_<FreeMotion>(m, "FreeMotion")
       .def(nb::new_(&make), "estimator"_a, "rest"_a, "stop"_a, "least"_a, "moving"_a, "start"_a,
-           "turned"_a, "low"_a, "high"_a)
+           "turned"_a, "fast"_a, "hard"_a, "beyond"_a, "low"_a, "high"_a)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "ratio"_a.noconvert(),
            "bound"_a.noconvert(), "residual"_a.noconvert(), "qdd"_a.noconvert(),
            "rest"_a.noconvert());

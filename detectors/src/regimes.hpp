@@ -16,7 +16,8 @@
 //
 // In motion the signal is the residual without slow errors. The bound is linear in speed,
 // accelerations and slowness; slowness covers friction between static and sliding near standstill.
-// A joint that starts gets a higher bound.
+// A joint that starts gets a higher bound, and so does one that is faster or accelerates harder
+// than the training logs show: friction and inertia beyond them are extrapolated.
 //
 // A joint that moves in no training log has `low` and `high`, the positions at which it stood.
 // While it moves, and soon after, nothing is judged. While it stands elsewhere, moving joints are
@@ -38,13 +39,15 @@ namespace tauguard::detectors {
 
 struct RegimeBounds {
   static constexpr std::size_t terms = 5;  // of the bound in motion
-  std::vector<double> rest;       // bound of a joint that has been at rest for long [N m], n
-  std::vector<double> stop;       // added by motion of any joint, also recent [N m], n
-  std::vector<double> least;      // least bound in motion [N m], n
-  std::vector<double> moving;     // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
-  std::vector<double> start;      // added at a start [N m], n
-  std::vector<double> turned;     // added after a contact has turned the joint [N m], n
-  std::vector<double> low, high;  // positions of joints whose motion is not known [rad], n
+  std::vector<double> rest;        // bound of a joint that has been at rest for long [N m], n
+  std::vector<double> stop;        // added by motion of any joint, also recent [N m], n
+  std::vector<double> least;       // least bound in motion [N m], n
+  std::vector<double> moving;      // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
+  std::vector<double> start;       // added at a start [N m], n
+  std::vector<double> turned;      // added after a contact has turned the joint [N m], n
+  std::vector<double> fast, hard;  // speed and acceleration that logs show [rad/s, rad/s^2], n
+  std::vector<double> beyond;      // added by each multiple of `fast` above it [N m], n
+  std::vector<double> low, high;   // positions of joints whose motion is not known [rad], n
   static constexpr double anywhere = 1e6;  // `high` of all others [rad]
 };
 
@@ -59,6 +62,8 @@ class Regimes {
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double after = 1.0;       // only change away counts, after a contact [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
+  static constexpr double harder = 0.5;      // of `beyond`, by each multiple of `hard` above it
+  static constexpr double farthest = 3.0;    // times `beyond` are added at most
   static constexpr double released = 0.5;    // of a contact's peak
   static constexpr double kept = 1.0;  // unchanged for this time: static friction keeps it [s] ...
   static constexpr double remembers =
@@ -165,7 +170,10 @@ class Regimes {
     const double speed = std::fabs(qd);
     const double linear = per[0] + per[1] * speed + per[2] * std::fabs(qdd) + per[3] * hardest +
                           per[4] * std::exp(-speed / creep);
-    return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-joints_[j].moved / starts);
+    const double more = std::max(speed / of_.fast[j] - 1.0, 0.0) +
+                        harder * std::max(std::fabs(qdd) / of_.hard[j] - 1.0, 0.0);
+    return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-joints_[j].moved / starts) +
+           of_.beyond[j] * std::min(more, farthest);
   }
 
   double confirmed(Joint& one, double ratio, double dt) const {

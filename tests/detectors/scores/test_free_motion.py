@@ -41,6 +41,31 @@ def test_pushes_in_motion_and_at_rest_are_found(alarm):
         assert start < first < start + 0.3
 
 
+def test_speeds_that_training_exceeds_for_half_a_second_count_as_shown(fitted):
+    speed = np.concatenate([np.abs(record(seed).qd) for seed in range(3)])
+    seconds = 0.01 * (speed > fitted.bound.fast).sum(axis=0)
+    assert (seconds > 0.3).all()
+    assert (seconds < 0.7).all()
+    assert (fitted.bound.hard > 0.3).all()
+    assert (fitted.bound.hard < 10).all()
+
+
+@pytest.mark.parametrize(("field", "part"), [("fast", 1.0), ("hard", 0.5)])
+def test_the_bound_grows_beyond_what_training_shows(fitted, field, part):
+    """By a friction level for each multiple of the speed, half of one for accelerations."""
+    known = {"fast": np.full(3, 1e6), "hard": np.full(3, 1e6)}
+    wide, narrow = (
+        replace(fitted, bound=replace(fitted.bound, **(known | own))).judge(record(7))
+        for own in ({}, {field: getattr(fitted.bound, field) / 4})
+    )
+    size = {"fast": np.abs(record(7).qd[:-1]), "hard": narrow.qdd[1:]}[field]  # a sample later
+    times = np.clip(4 * size / getattr(fitted.bound, field) - 1, 0.0, None)
+    grown = fitted.bound.friction * np.minimum(part * times, 3.0)
+    moving = ~narrow.rest[1:]
+    assert grown[moving].max() > fitted.bound.friction.min()
+    np.testing.assert_allclose((narrow.bound - wide.bound)[1:][moving], grown[moving], atol=1e-9)
+
+
 def test_each_push_of_a_series_on_a_standing_arm_is_an_alarm_and_ends(alarm):
     trace = record(7, dwell=(6.0, 24.0))
     for start in (12.0, 14.0, 16.0):
