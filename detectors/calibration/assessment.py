@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
@@ -47,6 +48,9 @@ WRONG_LOAD = (0.8, 0.3)
 #: quantile over the median of the unexplained torque. It is up to 1.8 in 20 free logs of five arms,
 #: and 4 to 9 in three logs of arms that were pushed.
 BURSTS = 2.5
+#: A residual above its median counts less by this fraction of the largest torque that accelerations
+#: took within so long [s]. A KUKA whose commands jerk has 4.2 without this and 0.9 with it.
+SWING, SWINGS = 0.5, 0.1
 #: Least motion of a joint for this check [s], and number of times that a message lists.
 ENOUGH, SAID = 3.0, 6
 #: Least speed of a checked joint [rad/s]; below it static friction hides the torque.
@@ -77,6 +81,16 @@ class Unexplained:
     left: Array  #: not explained [N m], shape (T, n)
     torque: Array  #: [N m], shape (T, n)
     moves: Bools  #: where a joint is fast enough to be judged, shape (T, n)
+    swing: Array  #: largest torque of accelerations within :data:`SWINGS` [N m], shape (T, n)
+
+    def beside_swings(self) -> Array:
+        """Sizes of ``left``, less where accelerations can explain them [N m], shape (T, n)."""
+        size = np.abs(self.left)
+        least = np.zeros(size.shape[1])
+        for j in np.flatnonzero(self.moves.any(axis=0)):
+            least[j] = np.median(size[self.moves[:, j], j])
+        less: Array = np.minimum(size, np.maximum(least, size - SWING * self.swing))
+        return less
 
 
 def unexplained(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, Unexplained]:
@@ -101,7 +115,17 @@ def _unexplained(arm: ArmModel, recording: Recording) -> Unexplained:
     estimator = Estimator(arm, RATE, trace.dt, unknowns)
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
     fast = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
-    return Unexplained(trace, left, trace.current * arm.drive_gain, fast)
+    return Unexplained(trace, left, trace.current * arm.drive_gain, fast, _swing(arm, trace))
+
+
+def _swing(arm: ArmModel, trace: Trace) -> Array:
+    """The largest torque of accelerations within :data:`SWINGS` [N m], shape (T, n)."""
+    p = momentum_terms(arm.robot, trace.q, trace.qd)[0]
+    rates, rows = np.full(arm.robot.joints, RATE), round(SWINGS / trace.dt)
+    change = np.abs(low_pass(rates, intervals(trace.t, len(p)), p, np.zeros_like(p)))
+    padded = np.pad(change, ((rows, rows), (0, 0)))
+    largest: Array = sliding_window_view(padded, 2 * rows + 1, axis=0).max(axis=2)
+    return largest
 
 
 def _size(values: Array, rows: Bools) -> Array:
@@ -123,17 +147,17 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
     """
     found = []
     for name, log in logs.items():
-        t, left, rows = log.trace.t, log.left, log.moves
+        t, left, rows = log.trace.t, log.beside_swings(), log.moves
         whole = _size(log.torque, rows)
         fraction = _size(left, rows) / np.maximum(whole, FAINT * whole.max() + 1e-12)
         judged = rows.sum(axis=0) * log.trace.dt > ENOUGH
         burst, level = np.zeros(len(joints)), np.full(len(joints), np.inf)
         for j in np.flatnonzero(judged):
-            usual, level[j] = np.quantile(np.abs(left[rows[:, j], j]), (0.5, 0.99))
+            usual, level[j] = np.quantile(left[rows[:, j], j], (0.5, 0.99))
             burst[j] = fraction[j] * level[j] / max(usual, 1e-12)
         worst = int(np.argmax(burst))
         if burst[worst] > BURSTS:
-            peaks = rows[:, worst] & (np.abs(left[:, worst]) > 0.5 * level[worst])
+            peaks = rows[:, worst] & (left[:, worst] > 0.5 * level[worst])
             starts = [f"{alarm.start - t[0]:.1f}" for alarm in find_alarms(t, peaks)]
             said = ", ".join(starts[:SAID]) + (", ..." if len(starts) > SAID else "")
             found.append(

@@ -120,6 +120,24 @@ def test_free_logs_and_untold_loads_have_no_bursts(logs, found):
     check_bursts(found.arm.robot.joint_names, unexplained(found.arm, given))
 
 
+@pytest.mark.parametrize("jerks", [True, False])
+def test_bursts_while_the_arm_itself_jerks_are_no_contacts(found, jerks):
+    """Speeds of the last joint swing, and its model lacks a part of the torque that this takes."""
+    log, at = record(7), np.arange(3.0, 22.0, 3.0)
+    size = np.exp(-(((log.t[:, None] - at) / 0.1) ** 2)).sum(axis=1)
+    shake = 1.5 * size * np.sin(20 * log.t)
+    torque = np.gradient(shake, log.t)[:, None] * mass_matrix(found.arm.robot, log.q)[:, :, 2]
+    qd = log.qd + jerks * np.column_stack([0 * shake, 0 * shake, shake])
+    slides = COULOMB * (np.tanh(qd / 0.02) - np.tanh(log.qd / 0.02)) + VISCOUS * (qd - log.qd)
+    shaken = dataclasses.replace(log, qd=qd, current=log.current + (1.4 * torque + slides) / GAIN)
+    given = found.arm.robot.joint_names, unexplained(found.arm, {"log": Recording(shaken)})
+    if jerks:
+        check_bursts(*given)
+        return
+    with pytest.raises(ValueError, match="bursts, as contacts do, at"):
+        check_bursts(*given)
+
+
 def test_each_log_left_out_once(logs, found):
     held = left_out(ArmModel(nominal(), GAIN), [Recording(log) for log in logs])
     assert len(held) == 3
