@@ -256,9 +256,9 @@ class MeshCCD:
     ) -> dict[str, Any]:
         """Replace the faces: some removed, added or split (cutting, tearing).
 
-        The hierarchy is updated, not rebuilt, and the front is reused. Later answers, and the
-        numbers of edges and faces, are those of a new ``MeshCCD`` of ``faces``. The number of
-        vertices may change.
+        The hierarchy is updated and the front is reused; only the first change that adds features
+        rebuilds it, with room for more. Later answers, and the numbers of edges and faces, are
+        those of a new ``MeshCCD`` of ``faces``. The number of vertices may change.
 
         Args:
             faces: Shape (F', 3), the complete new list. Rows that were there before count

@@ -28,7 +28,7 @@ struct CandidateBlock {
 // tested against isolated features, and each pair of isolated vertices is tested once.
 struct Isolated {
   std::int32_t first;
-  const std::uint8_t* point;
+  const std::uint8_t* point;  // null: there are none
   bool meet(std::int32_t vertex, std::int32_t face, std::int32_t a, std::int32_t b) const {
     return face < first || (point[vertex] && (a != b || vertex < a));
   }

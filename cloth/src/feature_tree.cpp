@@ -15,10 +15,9 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Features that a leaf of 16 slots gets at a build. Halves are rounded down to the left at every
-// level, so a leaf may receive up to 2 more (1 + 1/2 + 1/4 + ...). The remaining slots are for
-// features that come later.
-constexpr std::size_t fill = 13;
+// Most features that a leaf gets at a build: all slots of a mesh whose topology never changed. In
+// one that has changed, slots are left for features that come later.
+constexpr std::size_t full = lanes, with_room = 13;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 struct Centroid {
@@ -62,9 +61,9 @@ std::vector<Centroid> centroids(const Features& features, const Ends& x, const G
 void FeatureTree::build(const Features& features, const Ends& x, const Groups& groups,
                         int threads) {
   arity_ = features.arity;
-  leaves_ =
-      static_cast<std::int32_t>(std::max<std::size_t>(1, (features.size() + fill - 1) / fill));
-  const std::size_t n = leaves_;
+  const std::size_t fill = changed_ ? with_room : full;
+  const std::size_t n = std::max<std::size_t>(1, (features.size() + fill - 1) / fill);
+  leaves_ = static_cast<std::int32_t>(n);
   ids_.assign(n * lanes, -1);
   vertices_.assign(n * lanes * arity_, -1);
   occupied_.assign(n, 0);
@@ -75,7 +74,9 @@ void FeatureTree::build(const Features& features, const Ends& x, const Groups& g
   const auto at = centroids(features, x, groups);
   std::vector<std::int32_t> order(features.size());
   std::iota(order.begin(), order.end(), 0);
-  std::vector<std::size_t> count(2 * n, 1), begin(2 * n, 0), end(2 * n, 0);
+  // The leaves below each node, the first of them from the left, and their features. Leaf i from
+  // the left starts with feature i * size / n, so that leaves differ by one feature at most.
+  std::vector<std::size_t> count(2 * n, 1), first(2 * n, 0), begin(2 * n, 0), end(2 * n, 0);
   for (std::size_t i = n - 1; i >= 1; --i) count[i] = count[2 * i] + count[2 * i + 1];
   end[1] = order.size();
   for (std::size_t level = 1; level < 2 * n; level *= 2) {
@@ -88,10 +89,12 @@ void FeatureTree::build(const Features& features, const Ends& x, const Groups& g
                 features);
           continue;
         }
-        const std::size_t left = (end[i] - begin[i]) * count[2 * i] / count[i];
-        if (left < end[i] - begin[i]) split(order, begin[i], left, end[i], at);
+        first[2 * i] = first[i];
+        first[2 * i + 1] = first[i] + count[2 * i];
+        const std::size_t middle = first[2 * i + 1] * order.size() / n;
+        if (middle < end[i]) split(order, begin[i], middle - begin[i], end[i], at);
         begin[2 * i] = begin[i];
-        end[2 * i] = begin[2 * i + 1] = begin[i] + left;
+        end[2 * i] = begin[2 * i + 1] = middle;
         end[2 * i + 1] = end[i];
       }
     });
@@ -281,6 +284,7 @@ std::int32_t FeatureTree::free_leaf_near(std::int32_t leaf) const {
 
 bool FeatureTree::update(const Features& features, const std::vector<std::int32_t>& new_id,
                          const Groups& groups) {
+  changed_ = true;
   std::vector<std::int32_t> missing;
   std::vector<std::uint8_t> placed(features.size(), 0);
   for (const auto id : new_id)

@@ -47,6 +47,7 @@ class FeatureTree {
               const Groups& groups);
 
   std::int32_t leaves() const { return leaves_; }
+  int arity() const { return arity_; }
   int times() const { return times_; }
   int axes() const { return axes_; }
   int slots() const { return slots_; }
@@ -84,6 +85,7 @@ class FeatureTree {
 
   int arity_ = 1, axes_ = 0, slots_ = 0, times_ = 0;
   std::int32_t leaves_ = 0;
+  bool changed_ = false;  // by update()
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;
   std::vector<std::int32_t> ids_, vertices_,

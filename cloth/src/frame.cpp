@@ -20,39 +20,19 @@ double seconds(Instant from, Instant to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// One collision before its point and normal are computed, and the collisions of one chunk of
-// candidates.
-struct Row {
-  std::int32_t pair[2], vertices[4];
+// One collision before its point and normal are computed: its pair as one number, and its time.
+struct Hit {
+  std::uint64_t pair;
   double toi;
+  std::int32_t first() const { return static_cast<std::int32_t>(pair >> 32); }
+  std::int32_t second() const { return static_cast<std::int32_t>(pair); }
 };
+// The collisions of one chunk of candidates.
 struct Part {
-  std::vector<Row> rows;
+  std::vector<Hit> hits;
   Stats stats;
   double narrow_s = 0;
 };
-
-// Where a collision lies before sorting.
-struct Place {
-  std::uint64_t key;
-  const Row* row;
-};
-
-// Radix sort by key, from the last digit.
-void sort(std::vector<Place>& places) {
-  constexpr int digit = 11;
-  std::vector<Place> other(places.size());
-  std::uint64_t used = 0;
-  for (const auto& at : places) used |= at.key;
-  for (int shift = 0; shift < 64 && used >> shift != 0; shift += digit) {
-    const auto value = [shift](std::uint64_t key) { return key >> shift & ((1u << digit) - 1); };
-    std::size_t start[(1 << digit) + 1] = {};
-    for (const auto& at : places) ++start[value(at.key) + 1];
-    for (int i = 0; i < 1 << digit; ++i) start[i + 1] += start[i];
-    for (const auto& at : places) other[start[value(at.key)]++] = at;
-    places.swap(other);
-  }
-}
 
 // What the narrow phase writes for a block of candidates.
 struct Answers {
@@ -60,42 +40,61 @@ struct Answers {
   double toi[CandidateBlock::capacity];
 };
 
-// Sorts by pair. A pair occurs once, so that the order is unique.
-std::vector<Place> in_order(const std::vector<Part>& parts) {
+// All collisions in the order of their pairs. A pair occurs once, so that the order is unique.
+// Radix sort from the last digit; bits that no pair uses are skipped.
+SpareArray<Hit> in_order(const std::vector<Part>& parts,
+                         const std::shared_ptr<SpareMemory>& spare) {
+  constexpr int digit = 11;
   std::size_t n = 0;
-  std::uint32_t largest = 0;
+  for (const auto& part : parts) n += part.hits.size();
+  SpareArray<Hit> hits(spare, n), other(spare, n);
+  std::uint64_t used = 0;
+  Hit* next = hits.data();
   for (const auto& part : parts) {
-    n += part.rows.size();
-    for (const auto& row : part.rows) largest = std::max(largest, std::uint32_t(row.pair[1]));
+    for (const auto& hit : part.hits) used |= hit.pair;
+    next = std::copy(part.hits.begin(), part.hits.end(), next);
   }
-  // The second number gets no more bits than it needs, which leaves fewer digits to sort by.
-  const int bits = largest == 0 ? 0 : 32 - __builtin_clz(largest);
-  std::vector<Place> places;
-  places.reserve(n);
-  for (const auto& part : parts)
-    for (const auto& row : part.rows)
-      places.push_back(
-          {std::uint64_t(std::uint32_t(row.pair[0])) << bits | std::uint32_t(row.pair[1]), &row});
-  sort(places);
-  return places;
+  for (int shift = 0; shift < 64 && used >> shift != 0; shift += digit) {
+    shift += __builtin_ctzll(used >> shift);
+    const auto value = [shift](const Hit& hit) { return hit.pair >> shift & ((1u << digit) - 1); };
+    const Hit *begin = hits.data(), *end = begin + n;
+    std::size_t start[(1 << digit) + 1] = {};
+    for (const Hit* hit = begin; hit < end; ++hit) ++start[value(*hit) + 1];
+    for (int i = 0; i < 1 << digit; ++i) start[i + 1] += start[i];
+    for (const Hit* hit = begin; hit < end; ++hit) other[start[value(*hit)]++] = *hit;
+    std::swap(hits, other);
+  }
+  return hits;
 }
 
-// Writes points, normals and weights of the collisions to the final arrays.
+// Writes pairs, times, points, normals and weights to the final arrays. a, b: the features of the
+// pairs' first and second numbers; the first of a vertex and a face is the vertex itself.
 template <bool vf>
-void describe_all(const Ends& x, const std::vector<Place>& places, int threads, Collisions& out) {
+void describe_all(const Ends& x, const Features& a, const Features& b, const SpareArray<Hit>& hits,
+                  int threads, Collisions& out) {
   constexpr std::size_t grain = 2048;
   const ImpactArrays impacts{out.toi.data(), out.point.data(), out.normal.data(),
                              out.weights.data()};
-  geometry::interruptible_for(places.size(), threads, grain, [&](auto begin, auto end, auto) {
+  const auto fill = [&](const Hit& hit, std::int32_t* row) {
+    vf ? void(row[0] = hit.first()) : void(std::copy_n(a.of(hit.first()), 2, row));
+    std::copy_n(b.of(hit.second()), vf ? 3 : 2, row + (vf ? 1 : 2));
+  };
+  geometry::interruptible_for(hits.size(), threads, grain, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
-      // Rows and their vertices are scattered in memory, so both are prefetched.
-      const auto next = [&](int steps) { return places[std::min(i + steps * ahead, end - 1)].row; };
-      __builtin_prefetch(next(2));
-      prefetch<true>(x, next(1)->vertices);
-      const Row& row = *places[i].row;
-      std::copy_n(row.pair, 2, &out.pairs[2 * i]);
-      out.toi[i] = row.toi;
-      describe<vf>(x, row.vertices, row.toi, impacts, i);
+      // Features and their vertices are scattered in memory, so both are prefetched.
+      const auto next = [&](int steps) -> const Hit& {
+        return hits[std::min(i + steps * ahead, end - 1)];
+      };
+      std::int32_t row[4];
+      __builtin_prefetch(b.of(next(2).second()));
+      fill(next(1), row);
+      prefetch<true>(x, row);
+      const Hit& hit = hits[i];
+      fill(hit, row);
+      out.pairs[2 * i] = hit.first();
+      out.pairs[2 * i + 1] = hit.second();
+      out.toi[i] = hit.toi;
+      describe<vf>(x, row, hit.toi, impacts, i);
     }
   });
 }
@@ -106,15 +105,17 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
     all.stats += part.stats;
     all.narrow_s += part.narrow_s;
   }
-  const auto places = in_order(parts);
-  const std::size_t n = places.size();
+  const auto hits = in_order(parts, ccd.spare());
+  const std::size_t n = hits.size();
   all.pairs = {ccd.spare(), 2 * n};
   all.toi = {ccd.spare(), n};
   all.point = {ccd.spare(), 3 * n};
   all.normal = {ccd.spare(), 3 * n};
   all.weights = {ccd.spare(), 4 * n};
-  (kind == MeshCcd::Kind::vf ? describe_all<true> : describe_all<false>)(ccd.ends(), places,
-                                                                         ccd.threads(), all);
+  const bool vf = kind == MeshCcd::Kind::vf;
+  const Topology& of = ccd.topology();
+  const Features &a = vf ? of.vertices : of.edges, &b = vf ? of.faces : of.edges;
+  (vf ? describe_all<true> : describe_all<false>)(ccd.ends(), a, b, hits, ccd.threads(), all);
   return all;
 }
 
@@ -150,10 +151,9 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& 
     if ((found += hits) > limit) throw TooMany("collisions of a kind", limit);
     for (std::size_t i = 0; i < block.size; ++i) {
       if (!answers.hit[i]) continue;
-      Row& row = part.rows.emplace_back();
-      std::copy_n(&block.pairs[2 * i], 2, row.pair);
-      std::copy_n(&block.rows[4 * i], 4, row.vertices);
-      row.toi = answers.toi[i];
+      const std::int32_t* pair = &block.pairs[2 * i];
+      const std::uint64_t first = std::uint32_t(pair[0]), second = std::uint32_t(pair[1]);
+      part.hits.push_back({first << 32 | second, answers.toi[i]});
     }
     part.narrow_s += seconds(begin, std::chrono::steady_clock::now());
   });

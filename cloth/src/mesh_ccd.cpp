@@ -18,13 +18,15 @@ constexpr double worn = 2;
 // The limit of leaf pairs of a step, for each collision that is allowed.
 constexpr std::size_t leaf_pairs = 8;
 
-// Prefetches the volumes of a leaf.
+// Prefetches the volumes and vertices of a leaf.
 void prefetch(const FeatureTree& tree, std::int32_t leaf) {
   constexpr int line = 16;  // floats of a cache line
   const int values = 2 * lanes * tree.axes() * tree.times();
   for (int i = 0; i < values; i += line) __builtin_prefetch(tree.block(leaf) + i);
   for (int i = 0; i < 2 * tree.slots() * tree.times(); i += line)
     __builtin_prefetch(tree.node(tree.leaves() + leaf) + i);
+  for (int i = 0; i < lanes * tree.arity(); i += line) __builtin_prefetch(tree.vertices(leaf) + i);
+  __builtin_prefetch(tree.ids(leaf));
 }
 
 class Clock {
@@ -138,7 +140,8 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
   const auto& pairs = vf ? *vf_pairs_ : *ee_pairs_;
   const FeatureTree &a = vf ? vertices_ : edges_, &b = vf ? faces_ : edges_;
   BroadCounts& counts = vf ? stats_.vf : stats_.ee;
-  const Isolated isolated{static_cast<std::int32_t>(topology_.triangles), isolated_.data()};
+  const Isolated isolated{static_cast<std::int32_t>(topology_.triangles),
+                          isolated_.empty() ? nullptr : isolated_.data()};
   std::mutex mutex;
   geometry::interruptible_for(
       pairs.size(), threads_, chunk_pairs, [&](auto begin, auto end, auto chunk) {

@@ -103,6 +103,7 @@ template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
                                                 int axes, Mask wanted) {
   __m256 left = _mm256_setzero_ps(), right = left;
+#pragma GCC unroll 7
   for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times) {
     left = _mm256_or_ps(left, apart8<times>(row, s, b));
     right = _mm256_or_ps(right, apart8<times>(row, s, b + 8));
@@ -136,19 +137,21 @@ TAUGUARD_AVX2 TAUGUARD_INLINE void pair_avx2(const LeafLanes& a, const LeafLanes
     const Mask near = overlap_avx2<times>(a.block + row, in_block(times), b.block, axes,
                                           lanes_after(same, row, b));
     const Mask shared = near & sharing_avx2<arity_a, arity_b>(a, row, b);
-    out.adjacent += count_of(shared);
+    out.adjacent += __builtin_popcount(shared);
     out.set(row, near & ~shared);
   }
 }
+template <int times>
+TAUGUARD_AVX2 TAUGUARD_INLINE void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes,
+                                             bool same, Overlaps& out) {
+  a.arity == 1 ? pair_avx2<times, 1, 3>(a, b, axes, same, out)
+               : pair_avx2<times, 2, 2>(a, b, axes, same, out);
+}
 TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
                              Overlaps& out) {
-  if (a.arity == 1) {
-    times == 1 ? pair_avx2<1, 1, 3>(a, b, axes, same, out)
-               : pair_avx2<2, 1, 3>(a, b, axes, same, out);
-  } else {
-    times == 1 ? pair_avx2<1, 2, 2>(a, b, axes, same, out)
-               : pair_avx2<2, 2, 2>(a, b, axes, same, out);
-  }
+  constexpr int usual = 7;  // a loop of known length is faster
+  if (times == 1) return pair_avx2<1>(a, b, axes, same, out);
+  axes == usual ? pair_avx2<2>(a, b, usual, same, out) : pair_avx2<2>(a, b, axes, same, out);
 }
 
 // Compares 16 volumes on one axis.

@@ -61,7 +61,7 @@ class SpareMemory {
   }
 
  private:
-  static constexpr std::size_t most = 10;  // five arrays of two kinds of collisions
+  static constexpr std::size_t most = 12;  // five arrays of two kinds of collisions, two to sort
   mutable std::mutex mutex_;
   std::vector<Block> blocks_;
 };

@@ -93,6 +93,18 @@ def test_a_small_cut_keeps_the_hierarchy_and_the_front():
     assert abs(ccd.broad_stats["ee"]["front"] - before) < 0.05 * before
 
 
+def test_only_the_first_new_features_rebuild_the_hierarchy():
+    faces, *x = sheet(40, np.random.default_rng(6))
+    ccd = MeshCCD(faces)
+    ccd.candidates(*x)
+    rebuilt = []
+    for face in (100, 500, 900):
+        faces, x = split_face(faces, x, face)
+        rebuilt.append(ccd.update_topology(faces)["rebuilt"] > 0)
+        assert_like_new(ccd, faces, *x)
+    assert rebuilt == [True, False, False]
+
+
 def test_repeated_and_reordered_faces():
     faces, *x = sheet(5, np.random.default_rng(3))
     ccd = MeshCCD(faces)
