@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.estimation.estimator import Estimator
 from tauguard.detectors.events import find_alarms
 from tauguard.detectors.faults.inputs import FAULTS, SPAN, FaultCheck, UsualInput, input_fault
 from tauguard.detectors.faults.torques import TorqueCheck, torque_fault
@@ -86,6 +87,36 @@ class Monitor:
         state, up, score, number, joint, value, settling = self._native.step(t, q, qd, current)
         reason = self._reason(number, joint, value, settling) if number else ""
         return Answer(STATES[state], up, score, reason)
+
+    def steps(
+        self,
+        t: Array,
+        signals: tuple[Array, Array, Array],
+        estimator: Estimator,
+        last: Array,
+        residuals: Array,
+        alarms: Bools,
+    ) -> str:
+        """Judge a block of T samples in turn, without Python between them.
+
+        Args:
+            t: time stamps [s], shape (T,).
+            signals: q [rad], qd [rad/s] and current [A], shape (T, n) each.
+            estimator: gives the residuals that are written; it steps at finite samples.
+            last: its last residual [N m], shape (n,); updated.
+            residuals: written, shape (T, n).
+            alarms: written, shape (T,).
+
+        Returns:
+            The reason of the first fault, "" without one.
+
+        Raises:
+            ValueError: wrong shapes.
+        """
+        number, joint, value, settling = self._native.steps(
+            t, *signals, estimator.native, estimator.dt, last, residuals, alarms
+        )
+        return self._reason(number, joint, value, settling) if number else ""
 
     def _reason(self, number: int, joint: int, value: float, settling: bool) -> str:
         """The native monitor's reason as text."""

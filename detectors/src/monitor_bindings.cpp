@@ -2,6 +2,7 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "bindings.hpp"
@@ -12,6 +13,7 @@ namespace {
 
 using Numbers = std::vector<double>;
 using Source = std::shared_ptr<Scores>;
+using Flags = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // A stream that is written in Python: `make` returns a new one. A step allocates.
 class PythonScores final : public Scores {
@@ -105,6 +107,35 @@ nb::typed<nb::tuple, int, bool, double, int, int, double, bool> step(Monitor& mo
                         said.settling);
 }
 
+// A block of samples in turn, (T, n): alarms (T,), and residuals (T, n) of another estimator. A
+// residual stays, from `last` on, where a sample is not finite. Returns the first fault: its number
+// or 0, joint, value, settling.
+nb::typed<nb::tuple, int, int, double, bool> steps(Monitor& monitor, In1 t, In2 q, In2 qd,
+                                                   In2 current, Estimator& estimator, double dt,
+                                                   Out1 last, Out2 residuals, Flags alarms) {
+  const std::size_t n = monitor.joints(), rows = t.shape(0);
+  for (const auto* array : {&q, &qd, &current})
+    require(array->shape(0) == rows && array->shape(1) == n, "q, qd, current: another shape");
+  require(estimator.joints() == n && last.shape(0) == n && residuals.shape(0) == rows &&
+              residuals.shape(1) == n && alarms.shape(0) == rows,
+          "estimator, last, residuals, alarms: another shape");
+  std::vector<double> out((2 + motion_numbers) * n);
+  Thought first;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double *a = q.data() + i * n, *b = qd.data() + i * n, *c = current.data() + i * n;
+    const Thought& said = monitor.step(t.data()[i], a, b, c);
+    alarms.data()[i] = said.alarm;
+    if (first.why.fault == Fault::none) first = said;
+    if (finite(a, n) && finite(b, n) && finite(c, n)) {
+      estimator.step(a, b, c, dt, out.data(), out.data() + n, out.data() + 2 * n);
+      std::copy_n(out.data(), n, last.data());
+    }
+    std::copy_n(last.data(), n, residuals.data() + i * n);
+  }
+  return nb::make_tuple(static_cast<int>(first.why.fault), first.why.joint, first.why.value,
+                        first.settling);
+}
+
 }  // namespace
 
 void bind_monitor(nb::module_& m) {
@@ -150,7 +181,9 @@ void bind_monitor(nb::module_& m) {
       .def(nb::new_(&make_monitor), "check"_a, "alarm"_a, "observer"_a, "torques"_a, "dt"_a,
            "settle"_a, "span"_a, "window"_a, "bridged"_a)
       .def_prop_ro("settled", &Monitor::settled)
-      .def("step", &step, "t"_a, "q"_a, "qd"_a, "current"_a);
+      .def("step", &step, "t"_a, "q"_a, "qd"_a, "current"_a)
+      .def("steps", &steps, "t"_a, "q"_a, "qd"_a, "current"_a, "estimator"_a, "dt"_a, "last"_a,
+           "residuals"_a, "alarms"_a);
 }
 
 }  // namespace tauguard::detectors

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -147,38 +146,30 @@ class AlarmListener:
         arm = alarm.detector.arm
         self.name, self.settle = alarm.detector.name, alarm.settle
         self.bounds: Array = SIGMAS * np.asarray(arm.noise)
-        self._step = self._monitored(alarm)
+        self._dt, self._count = alarm.detector.dt, 0
+        self._alarm = alarm.stream()
+        #: A model with checks of its input also names faults.
+        self._monitor = Monitor(alarm, alarm.inputs) if alarm.inputs is not None else None
         self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
         self._last = np.zeros(arm.robot.joints)
         self.fault = ""
 
-    def _monitored(self, alarm: CollisionAlarm) -> Callable[[Array, Array, Array], bool]:
-        """The alarm at one sample. A model with checks of its input also names faults."""
-        if alarm.inputs is None:
-            return alarm.stream().step
-        monitor, times = Monitor(alarm, alarm.inputs), itertools.count()
-
-        def step(q: Array, qd: Array, current: Array) -> bool:
-            answer = monitor.step(next(times) * alarm.detector.dt, q, qd, current)
-            self.fault = answer.reason
-            return answer.alarm
-
-        return step
-
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """See :class:`Listener`; a residual stays where a sample is not finite."""
         residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
-        out, faults = np.empty((2 + MOTION, q.shape[1])), ""
-        for row in range(len(q)):
-            sample = (q[row], qd[row], current[row])
-            alarms[row] = self._step(*sample)
-            faults = faults or self.fault
-            residuals[row] = self._last
-            if not self.fault or np.isfinite(sample).all():
-                self._observer.step(*sample, out)
-                residuals[row] = out[0]
-            self._last = residuals[row]
-        self.fault = faults
+        if self._monitor is not None:
+            t = self._dt * np.arange(self._count, self._count + len(q), dtype=np.float64)
+            self._count += len(q)
+            signals = (q, qd, current)
+            self.fault = self._monitor.steps(
+                t, signals, self._observer, self._last, residuals, alarms
+            )
+            return residuals, alarms
+        out = np.empty((2 + MOTION, q.shape[1]))
+        for row, sample in enumerate(zip(q, qd, current, strict=True)):
+            alarms[row] = self._alarm.step(*sample)
+            self._observer.step(*sample, out)
+            residuals[row] = out[0]
         return residuals, alarms
 
     def get_state(self) -> Any:

@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tauguard.detectors import Estimator, Unknowns
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Monitor
+from tauguard.detectors.estimation.estimator import MOTION
+from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.live.packets import Fault, Packets
 
 #: Faults that the samples show by themselves. Others look like a contact.
@@ -52,6 +55,31 @@ def test_without_a_fault_it_says_what_the_detector_says(alarm, struck):
     assert [a.alarm for a in said] == found.alarm[:rows].tolist()
     assert np.array([a.score for a in said]).tobytes() == found.score[:rows].tobytes()
     assert not any(a.reason for a in said)
+
+
+@pytest.mark.parametrize("name", ["nan", "frozen"])
+def test_a_block_of_samples_says_what_single_samples_say(alarm, struck, quiet, name):
+    start = quiet - struck.t[0]
+    packets = part(Fault(name, start, 0.5).apply(Packets.of(struck)), start - 1, start + 1)
+    said, arm = answers(alarm, packets), alarm.detector.arm
+    made = [Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none()) for _ in range(2)]
+    last, single = np.zeros(6), []
+    for row in zip(packets.q, packets.qd, packets.current, strict=True):
+        out = np.zeros((2 + MOTION, 6))
+        if np.isfinite(row).all():
+            made[0].step(*row, out)
+            last = out[0]
+        single.append(last)
+    monitor, last = Monitor(alarm, alarm.inputs), np.zeros(6)
+    for block in np.array_split(np.arange(len(said)), 97):
+        residuals, alarms = np.empty((len(block), 6)), np.empty(len(block), dtype=bool)
+        signals = packets.q[block], packets.qd[block], packets.current[block]
+        times = packets.t[block].astype(float)
+        reason = monitor.steps(times, signals, made[1], last, residuals, alarms)
+        assert reason == next((said[k].reason for k in block if said[k].reason), "")
+        assert alarms.tolist() == [said[k].alarm for k in block]
+        assert residuals.tobytes() == np.array([single[k] for k in block]).tobytes()
+    assert any(a.reason for a in said)
 
 
 @pytest.mark.parametrize("name", SEEN)
