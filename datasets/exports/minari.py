@@ -1,5 +1,6 @@
 """Write Minari datasets (extra ``export``): each sample is one step."""
 
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -42,14 +43,16 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
         buffer = _buffer(trace, count)
         if dataset is None:
             n = len(trace.joint_names)
-            dataset = minari.create_dataset_from_buffers(
-                name,
-                [buffer],
-                observation_space=Box(-np.inf, np.inf, (3 * n,), np.float32),
-                action_space=Box(-np.inf, np.inf, (2 * n,), np.float32),
-                algorithm_name="tauguard",
-                description=f"Simulated arm motion with labelled collisions, {rate} Hz.",
-            )
+            with warnings.catch_warnings():  # of an author and environments that are not given
+                warnings.simplefilter("ignore", UserWarning)
+                dataset = minari.create_dataset_from_buffers(
+                    name,
+                    [buffer],
+                    observation_space=Box(-np.inf, np.inf, (3 * n,), np.float32),
+                    action_space=Box(-np.inf, np.inf, (2 * n,), np.float32),
+                    algorithm_name="tauguard",
+                    description=f"Simulated arm motion with labelled collisions, {rate} Hz.",
+                )
         else:
             dataset.update_dataset_from_buffer([buffer])
         count += 1
