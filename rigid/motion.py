@@ -1,6 +1,7 @@
 """Checked rigid poses and motions."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,6 +60,11 @@ class Motion(Rebuilt):
     pose_t0: NDArray[np.float64]
     linear: NDArray[np.float64]
     angular: NDArray[np.float64]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, pose_t0: ArrayLike, linear: ArrayLike, angular: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
 
     def __post_init__(self) -> None:
         pose = poses("pose_t0", self.pose_t0)

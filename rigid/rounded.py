@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,6 +50,13 @@ class Rounded(Rebuilt):
     core: Tetrahedra | Boxes | Parallelepipeds | Hulls
     radius: NDArray[np.float64]
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, core: Tetrahedra | Boxes | Parallelepipeds | Hulls, radius: ArrayLike
+        ) -> None:
+            """Take anything that NumPy reads as these arrays."""
+
     def __post_init__(self) -> None:
         if not isinstance(self.core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
             raise ValueError(f"core: {type(self.core).__name__}, expected convex bodies in space")
@@ -72,6 +80,11 @@ class Spheres(Rebuilt):
 
     center: NDArray[np.float64]
     radius: NDArray[np.float64]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: ArrayLike, radius: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_finite("center", self.center, (None, 3)))
@@ -102,6 +115,11 @@ class Capsules(Rebuilt):
     start: NDArray[np.float64]
     end: NDArray[np.float64]
     radius: NDArray[np.float64]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, start: ArrayLike, end: ArrayLike, radius: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", frozen_finite("start", self.start, (None, 3)))

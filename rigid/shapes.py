@@ -9,10 +9,10 @@ checked.
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import Rebuilt, frozen, frozen_finite, sealed
 from tauguard.rigid import _rigid
@@ -48,6 +48,11 @@ class Tetrahedra(_Batch):
 
     vertices: NDArray[np.float64]
 
+    if TYPE_CHECKING:
+
+        def __init__(self, vertices: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 4, 3)))
 
@@ -82,6 +87,11 @@ class Boxes(_Batch):
     rotation: NDArray[np.float64]
     #: The largest entry of ``|R^T R - I|`` over the batch, rounded up.
     skew: float = field(init=False, repr=False)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
 
     def __post_init__(self) -> None:
         center = frozen_finite("center", self.center, (None, 3))
@@ -140,6 +150,11 @@ class Parallelepipeds(_Batch):
     origin: NDArray[np.float64]
     edges: NDArray[np.float64]
 
+    if TYPE_CHECKING:
+
+        def __init__(self, origin: ArrayLike, edges: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", frozen_finite("origin", self.origin, (None, 3)))
         object.__setattr__(
@@ -164,6 +179,11 @@ class PointSets(_Batch):
     offsets: NDArray[np.int64]
 
     dimensions: ClassVar[int]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
+            """Take anything that NumPy reads as these arrays."""
 
     def __post_init__(self) -> None:
         vertices = frozen_finite("vertices", self.vertices, (None, self.dimensions))
