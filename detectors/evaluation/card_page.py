@@ -109,6 +109,12 @@ def _lines(card: ThresholdCard) -> list[str]:
         "motion, so a shorter impact has to be harder",
         _alarms(card),
     ]
+    if shown := [f"{speed:.2g}" for speed in card.fast if 0 < speed < CLOCK]:
+        lines.insert(
+            -1,
+            f"moving: up to {', '.join(shown)} rad/s, as the joints that move in the logs; a joint "
+            "that is faster, or accelerates harder, has to be pushed harder",
+        )
     if card.left_out:
         names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)
         lines.append(f"not learned from, since its alarms stand out: {names}")

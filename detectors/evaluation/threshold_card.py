@@ -64,6 +64,7 @@ class ThresholdCard:
     replay: tuple[int, int]
     """Contacts and collisions that ``moving`` and ``starting``, and :data:`UPPER` times these, as
     constant thresholds of the plain observer's residual would have raised in the logs."""
+    fast: Array  #: speeds up to which ``moving`` holds, those of the logs [rad/s], shape (n,)
 
     @property
     def franka(self) -> dict[str, list[float]]:
@@ -134,6 +135,7 @@ def threshold_card(
         sifted.left_out,
         dict(detector.unseen),
         replayed(detector, traces, usual, starting),
+        np.where(bound.shown, bound.fast, np.nan),
     )
 
 

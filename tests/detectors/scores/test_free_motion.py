@@ -9,6 +9,7 @@ from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
 from tauguard.detectors._observer import REGIME_SETTLES
 from tauguard.detectors.alarms.training import carrying
 from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.evaluation.card_page import text
 from tauguard.detectors.evaluation.cross_validation import CrossValidation, judge_logs
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
@@ -281,6 +282,9 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert card.tool["standing"][0] < card.tool["moving"][0]
     assert "standing for 2 s" in card.unseen
     assert set(card.unseen["moving alone"]) == {"a", "b", "c"}
+    fast = np.array([0.51, np.nan, 2.0])
+    assert (card.fast == fitted.bound.fast).all()
+    assert "moving: up to 0.51, 2 rad/s, as the joints" in text(replace(card, fast=fast))
     assert card.franka == {}  # libfranka speaks to arms of seven joints
     seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
