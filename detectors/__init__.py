@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.registry import DETECTORS, make_detector
     from tauguard.detectors.scores.detector import Detector, FittedDetector, ScoreStream
     from tauguard.detectors.scores.kernel import SrqRegressor, srq_kernel
-    from tauguard.detectors.scores.learned import PlainSrqSvr, SrqSvr
+    from tauguard.detectors.scores.windowed import PlainSrqSvr, SrqSvr
     from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
     from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation

@@ -23,12 +23,11 @@ def _score(module: str, maker: str) -> Any:
 
 #: Every method, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {
-    "srq-svr": partial(_score, "learned", "SrqSvr"),
-    "srq-svr-plain": partial(_score, "learned", "PlainSrqSvr"),
+    "srq-svr": partial(_score, "windowed", "SrqSvr"),
+    "srq-svr-plain": partial(_score, "windowed", "PlainSrqSvr"),
     "current-network": partial(_score, "currents", "CurrentNetwork"),
     "residual-thresholds": partial(_score, "baselines", "ResidualThresholds"),
     "moving-thresholds": partial(_score, "baselines", "MovingThresholds"),
-    "window-network": partial(_score, "learned", "WindowNetwork"),
     "free-motion": partial(_score, "free_motion", "FreeMotion"),
 }
 
@@ -52,7 +51,6 @@ FILE_TYPES: dict[str, str] = {
         "scores.currents": "FittedCurrentNetwork Inputs",
         "scores.free_motion": "FittedFreeMotion",
         "scores.kernel": "KernelMachine",
-        "scores.learned": "OneOutput",
         "scores.network": "Network",
         "scores.windowed": "FittedWindowed",
         "thresholds.speed_normalisation": "SpeedNormalisation",

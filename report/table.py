@@ -55,7 +55,10 @@ def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:
 
 
 def cell(value: object, brief: bool = False) -> str:
-    """A value with three digits; a rate or a time as ``value [low, high]``, unless ``brief``."""
+    """A value with three digits; a rate or a time as ``value [low, high]``, unless ``brief``.
+
+    Delays (:func:`~tauguard.detectors.evaluation.metrics.delay_metrics`) are ``median, p95``.
+    """
     if value is None:
         return "-"
     if isinstance(value, Mapping):
@@ -65,6 +68,8 @@ def cell(value: object, brief: bool = False) -> str:
         form = ".3g" if "median" in value else ".3f" if middle < 10 else ".0f"
         if brief:
             return f"{middle:.1e}" if 0 < middle < 5e-4 else f"{middle:{form}}"
+        if "p95" in value:
+            return f"{middle:{form}}, {value['p95']:{form}}"
         if "median" in value and value["low"] == value["high"]:
             return f"{middle:{form}}"  # of one repeat
         return f"{middle:{form}} [{value['low']:{form}}, {value['high']:{form}}]"

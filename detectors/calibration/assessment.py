@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.identification import RATE, filtered_logs, identify
+from tauguard.detectors.calibration.identification import RATE, Subsets, filtered_logs, identify
 from tauguard.detectors.calibration.recording import (
     Load,
     Recording,
@@ -272,13 +272,11 @@ def left_out(
         raise ValueError("one log alone cannot be held out: give two or more")
     if scale != "gains":
         arm = ArmModel(arm.robot, identify(arm, recordings, scale=scale).arm.drive_gain)
-    data = data or filtered_logs(arm, recordings)
-    found = []
+    calibrated, found = Subsets(replace(arm, friction=None), recordings, data), []
     turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
     for k, recording in enumerate(turns):
-        others = [*recordings[:k], *recordings[k + 1 :]]
-        own = [*data[:k], *data[k + 1 :]]
-        found.append(residual_rms(identify(arm, others, data=own).arm, recording.trace))
+        others = [i for i in range(len(recordings)) if i != k]
+        found.append(residual_rms(calibrated(others), recording.trace))
     return found
 
 

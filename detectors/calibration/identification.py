@@ -188,11 +188,19 @@ def filtered_logs(
 class Subsets:
     """Calibrations from some of the recordings, whose columns are filtered once; gains hold."""
 
-    def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
-        """Take the nominal arm, with its friction if it has any, and all recordings."""
+    def __init__(
+        self,
+        arm: ArmModel,
+        recordings: Sequence[Recording],
+        data: Sequence[Filtered] | None = None,
+    ) -> None:
+        """Take the nominal arm, with its friction if it has any, and all recordings.
+
+        ``data``: as in :func:`identify`.
+        """
         self._arm, self._recordings = arm, recordings
         self._friction = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-        self._data = filtered_logs(arm, recordings, self._friction)
+        self._data = data or filtered_logs(arm, recordings, self._friction)
 
     def __call__(self, use: Sequence[int]) -> ArmModel:
         """The arm that the recordings of these numbers show.

@@ -18,7 +18,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors import _kernel, _observer
 from tauguard.detectors.calibration.calibrate import calibrate
-from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimate, Estimator, Unknowns
+from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.estimation.noise_model import TERMS, NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
 from tauguard.detectors.estimation.velocity import SLOWEST
@@ -55,16 +55,15 @@ class Scaling(Frozen):
         joints = np.array(self.joints, dtype=np.int64)
         return _kernel.Scaling(joints, weights, self.units, self.factor, self.compress)
 
-    def rows(self, residual: Array, qd: Array, motion: Array, out: Array | None = None) -> Array:
+    def rows(self, residual: Array, qd: Array, motion: Array) -> Array:
         """The scaled residual, shape (T, len(joints)).
 
         Args:
             residual: [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
             motion: of the estimate, shape (T, 4, n).
-            out: where to write it (default: a new array).
         """
-        found = np.empty((len(residual), len(self.joints))) if out is None else out
+        found = np.empty((len(residual), len(self.joints)))
         self._native.rows(residual, qd, motion, found)
         return found
 
@@ -215,26 +214,6 @@ class FrontEnd(Frozen):
         """The scaled residual of a trace, shape (T, joints)."""
         estimate = self.estimate(trace)
         return scaling.rows(estimate.unexplained, trace.qd, estimate.motion)
-
-    def stream(self, scaling: Scaling) -> ResidualStream:
-        """The scaled residual sample by sample."""
-        return ResidualStream(self, scaling)
-
-
-class ResidualStream:
-    """Estimator and scaling, sample by sample."""
-
-    def __init__(self, front: FrontEnd, scaling: Scaling) -> None:
-        """Begin anew."""
-        self._estimator, self._scaling = front.estimator(), scaling
-        self._out = np.zeros((2 + MOTION, front.arm.robot.joints))
-        self._row = np.zeros((1, len(scaling.joints)))
-
-    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> Array:
-        """The scaled residual of this sample, shape (1, joints); valid until the next step."""
-        self._estimator.step(q, qd, current, self._out, dt)
-        out = self._out
-        return self._scaling.rows(out[1:2], qd[None], out[None, 2:], self._row)
 
 
 _FITTED: dict[FrontEndSettings, tuple[tuple[weakref.ref[object], ...], FrontEnd]] = {}

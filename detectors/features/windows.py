@@ -76,10 +76,6 @@ class WindowShape:
         _kernel.windows(signal, at, self.lag, self.count, out)
         return out
 
-    def stream(self, columns: int) -> _kernel.Window:
-        """The window that ends with the latest row of a signal of ``columns`` columns."""
-        return _kernel.Window(columns, self.lag, self.count)
-
 
 def median_distance(a: Array, b: Array, rng: np.random.Generator, pairs: int = 4000) -> float:
     """Median Euclidean distance between random rows of ``a`` and of ``b``."""

@@ -1,11 +1,10 @@
-"""What the learned rankings share: windows of the scaled residual, mined negatives, one output."""
+"""Support vector regression with the SRQ kernel on windows of the scaled residual."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,51 +27,53 @@ from tauguard.detectors.features.windows import (
     WindowShape,
     binary_target,
     draw_windows,
+    median_distance,
     peaks,
     severity,
     severity_targets,
 )
 from tauguard.detectors.scores.baselines import FittedThresholds, MovingThresholds
-from tauguard.detectors.scores.kernel import KernelMachine
+from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
 from tauguard.traces.trace import Trace
 
 #: Fraction of the collision-free samples that may exceed the unit.
 RARE = 1e-3
 
+#: Windows that the scale of the features is found with.
+SAMPLED = 1000
+
+#: Between two mined moments [s].
+MINING_GAP = 0.1
+
 #: Windows that are evaluated at once: memory stays small.
 CHUNK = 20_000
 
 
-class Regressor(Protocol):
-    """A fitted function of windows."""
-
-    def __call__(self, x: Array) -> Array:
-        """Values at the rows of x, shape (N, d) -> (N,); each depends on its row alone."""
-
-
 @dataclass(frozen=True)
-class Windowed(ABC):
-    """Settings of a regressor on windows of the residual in standard deviations of free motion,
+class SrqSvr:
+    """The dissertation's regressor on the residual in standard deviations of free motion,
     compressed by asinh.
 
     Training windows are drawn from collisions and from collision-free motion; then, twice, the
-    collision-free moments that score highest are added as negatives.
+    collision-free moments that score highest are added as negatives. One factor brings the median
+    distance between windows of collisions and of collision-free motion to ``distance``, a length
+    that the kernel resolves. Beneath the score lie the thresholds of ``moving-thresholds``: they
+    find what is far from anything that the regressor has seen.
     """
 
-    windows: int = 20_000  #: training windows, a fifth of them from collisions
-    mined: int = 2_000  #: collision-free moments added in each of two rounds
+    windows: int = 3000  #: training windows, a fifth of them from collisions
+    mined: int = 300  #: collision-free moments added in each of two rounds
     units: float = 5.0  #: standard deviations that make 1 before the asinh
     seed: int = 0
     graded: bool = True  #: targets grow with the torque, and scores are severities; else 0 and 1
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
-    name: ClassVar[str] = "windowed"
-    floored: ClassVar[bool] = False  #: whether plain thresholds lie beneath the score
-    mining_gap: ClassVar[float] = 0.05  #: between two mined moments [s]
-    stream_of_seeds: ClassVar[int] = 3  #: that the windows are drawn from
-
-    @abstractmethod
-    def learn(self, x: Array, y: Array) -> Regressor:
-        """Fit the regressor on windows (N, size) and targets (N,)."""
+    sigma: float = 3.0  #: of the SRQ kernel
+    C: float = 1.0
+    epsilon: float = 0.02
+    distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
+    vectors: int = 400  #: support vectors that are kept, at most; 0 keeps all
+    name: ClassVar[str] = "srq-svr"
+    floored: ClassVar[bool] = True  #: whether plain thresholds lie beneath the score
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedWindowed:
         """Calibrate, draw windows, learn, mine, learn.
@@ -85,15 +86,20 @@ class Windowed(ABC):
         targets = self.targets(traces, front)
         scaling = self.scaling(traces, targets, front, shape)
         prepared = self.prepared(traces, targets, front, scaling)
-        x, y = self.draw(np.random.default_rng([self.seed, self.stream_of_seeds]), prepared, shape)
-        regressor = self.learn(x, y)
+        x, y = draw_windows(np.random.default_rng([self.seed, 1]), prepared, shape, self.windows)
+        machine = self.learn(x, y)
         for _ in range(2 if self.mined else 0):
-            hardest = self._mine(prepared, shape, regressor, front.dt)
+            hardest = self._mine(prepared, shape, machine, front.dt)
             x, y = np.concatenate([x, hardest]), np.concatenate([y, np.zeros(len(hardest))])
-            regressor = self.learn(x, y)
-        finished = self.finished(regressor)
+            machine = self.learn(x, y)
+        if 0 < self.vectors < len(machine.vectors):
+            machine = machine.reduced(self.vectors)
         limits = MovingThresholds(self.front).fit(traces, arm).limits if self.floored else None
-        return FittedWindowed(self.name, front, scaling, shape, finished, self.graded, limits)
+        return FittedWindowed(self.name, front, scaling, shape, machine, self.graded, limits)
+
+    def learn(self, x: Array, y: Array) -> KernelMachine:
+        """Epsilon-SVR on windows (N, size) and targets (N,)."""
+        return SrqRegressor(self.sigma, self.C, self.epsilon).fit(x, y).machine_
 
     def targets(self, traces: Sequence[Trace], front: FrontEnd) -> list[Array]:
         """The regressor's targets for each trace, shape (T,)."""
@@ -108,8 +114,15 @@ class Windowed(ABC):
         front: FrontEnd,
         shape: WindowShape,
     ) -> Scaling:
-        """How the residual is scaled."""
-        return self.bare(traces, front)
+        """Bring the median distance of windows to ``distance``."""
+        bare = self.bare(traces, front)
+        if self.distance <= 0:
+            return bare
+        rng = np.random.default_rng(self.seed)
+        prepared = self.prepared(traces, targets, front, bare)
+        windows, target = draw_windows(rng, prepared, shape, SAMPLED)
+        spread = median_distance(windows[target > 0], windows[target == 0], rng)
+        return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
 
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The residual in ``units`` deviations, or more for a joint whose peaks are higher.
@@ -123,10 +136,6 @@ class Windowed(ABC):
         free = [np.abs(front.scaled(t, plain)[r]) for t, r in zip(traces, rows, strict=True)]
         most = np.quantile(np.concatenate(free), 1 - RARE, axis=0)
         return replace(plain, noise_model=_widened(plain, np.maximum(most, 1.0)), compress=True)
-
-    def finished(self, regressor: Regressor) -> Regressor:
-        """What is kept of the last regressor."""
-        return regressor
 
     @staticmethod
     def prepared(
@@ -143,24 +152,18 @@ class Windowed(ABC):
             for trace, target in zip(traces, targets, strict=True)
         ]
 
-    def draw(
-        self, rng: np.random.Generator, prepared: Sequence[Prepared], shape: WindowShape
-    ) -> tuple[Array, Array]:
-        """Training windows and their targets."""
-        return draw_windows(rng, prepared, shape, self.windows)
-
     def _mine(
-        self, prepared: Sequence[Prepared], shape: WindowShape, regressor: Regressor, dt: float
+        self, prepared: Sequence[Prepared], shape: WindowShape, machine: KernelMachine, dt: float
     ) -> Array:
         """The collision-free moments with the highest output, as many from every trace."""
         fraction = -(-self.mined // len(prepared))
         thin = max(1, shape.lag // 2)
-        gap = max(1, round(self.mining_gap / dt) // thin)
+        gap = max(1, round(MINING_GAP / dt) // thin)
         found = []
         for p in prepared:
             rows = np.flatnonzero(p.free)[::thin]
             if len(rows):
-                worst = peaks(evaluated(regressor, p.signal, shape, rows), fraction, gap)
+                worst = peaks(evaluated(machine, p.signal, shape, rows), fraction, gap)
                 found.append(shape.of(p.signal, rows[worst]))
         return np.concatenate(found)
 
@@ -174,13 +177,13 @@ def _widened(scaling: Scaling, factors: Array) -> NoiseModel:
 
 
 def evaluated(
-    regressor: Regressor, signal: Array, shape: WindowShape, rows: NDArray[np.intp]
+    machine: KernelMachine, signal: Array, shape: WindowShape, rows: NDArray[np.intp]
 ) -> Array:
-    """The regressor at the windows that end at ``rows``, shape (len(rows),)."""
+    """The kernel machine at the windows that end at ``rows``, shape (len(rows),)."""
     out = np.empty(len(rows))
     for begin in range(0, len(rows), CHUNK):
         part = rows[begin : begin + CHUNK]
-        out[begin : begin + CHUNK] = regressor(shape.of(signal, part))
+        out[begin : begin + CHUNK] = machine(shape.of(signal, part))
     return out
 
 
@@ -192,18 +195,15 @@ class FittedWindowed(OnFrontEnd):
     front: FrontEnd
     scaling: Scaling
     shape: WindowShape
-    regressor: Regressor
+    regressor: KernelMachine
     graded: bool  #: the regressor says x / (1 + x), and the score is x
     limits: Array | None = None
     """Of :attr:`floor`, shape (joints,); ``None``: there is none."""
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual: a residual above them is an alarm too.
-
-        A kernel machine has them: its native stream gives their score beside its own.
-        """
-        if self.limits is None or not isinstance(self.regressor, KernelMachine):
+        """Plain thresholds on the same residual: a residual above them is an alarm too."""
+        if self.limits is None:
             return None
         return FittedThresholds(
             self.front, self.front.scaling(), self.limits, MovingThresholds.name
@@ -215,11 +215,9 @@ class FittedWindowed(OnFrontEnd):
         output = evaluated(self.regressor, signal, self.shape, np.arange(len(signal)))
         return severity(output) if self.graded else output
 
-    def stream(self) -> NativeStream | WindowStream:
-        """The same, sample by sample; of a kernel machine all of it is native."""
+    def stream(self) -> NativeStream:
+        """The same, sample by sample."""
         machine, floor = self.regressor, self.floor
-        if not isinstance(machine, KernelMachine):
-            return WindowStream(self)
         vectors, weights = map(np.ascontiguousarray, (machine.vectors, machine.weights))
         scores = _observer.kernel_scores(
             self.front.estimator().native,
@@ -237,19 +235,24 @@ class FittedWindowed(OnFrontEnd):
         return NativeStream(scores, self.dt)
 
 
-class WindowStream:
-    """Residual, window and regressor, sample by sample."""
+@dataclass(frozen=True)
+class PlainSrqSvr(SrqSvr):
+    """The dissertation's form: residuals in N m times one factor, labels 0/1, no friction model.
 
-    def __init__(self, detector: FittedWindowed) -> None:
-        """Begin anew."""
-        joints, shape = len(detector.scaling.joints), detector.shape
-        self._residual = detector.front.stream(detector.scaling)
-        self._window, self._regressor = shape.stream(joints), detector.regressor
-        self._graded = detector.graded
-        self._x = np.zeros((1, joints * shape.count))
+    Residuals in N m lie some 100 apart, where a kernel of sigma = 3 is diagonal and nothing is
+    learnt; the factor brings the median distance to sigma. ``distance=0`` is the literal form.
+    """
 
-    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample."""
-        self._window.step(self._residual.step(q, qd, current, dt), self._x)
-        output = self._regressor(self._x)
-        return float((severity(output) if self._graded else output)[0])
+    mined: int = 0
+    distance: float = 3.0
+    vectors: int = 0
+    graded: bool = False
+    front: FrontEndSettings = field(
+        default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
+    )
+    name: ClassVar[str] = "srq-svr-plain"
+    floored: ClassVar[bool] = False
+
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+        """Residuals in N m."""
+        return Scaling(front.joints)

@@ -40,21 +40,6 @@ void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out)
   }
 }
 
-void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t count, Out1 out,
-            int threads) {
-  const std::size_t m = signal.shape(1);
-  require(m * count == kernel.dimension() && out.shape(0) == signal.shape(0) && lag > 0,
-          "series: arrays differ in shape");
-  nb::gil_scoped_release release;
-  ThreadPool::shared().parallel_for(signal.shape(0), threads, 256, [&](auto begin, auto end, auto) {
-    std::vector<double> x(m * count);
-    for (auto t = begin; t < end; ++t) {
-      window(signal.data(), m, t, lag, count, x.data());
-      out.data()[t] = kernel.at(x.data());
-    }
-  });
-}
-
 KernelSum* make_kernel(In2 vectors, In1 coef, double intercept, double sigma) {
   require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
   require(sigma > 0, "KernelSum: sigma must be above 0");
@@ -80,18 +65,6 @@ void scale(const Scaling& scaling, In2 left, In2 qd, In3 motion, Out2 out) {
   for (std::size_t t = 0; t < left.shape(0); ++t)
     scaling.row(left.data() + t * n, qd.data() + t * n, motion.data() + t * motion_rows * n, n,
                 out.data() + t * m);
-}
-
-Window* make_window(std::size_t columns, std::size_t lag, std::size_t count) {
-  require(columns > 0 && lag > 0 && count > 0, "Window: sizes must be above 0");
-  return new Window(columns, lag, count);
-}
-
-void step(Window& window, In2 row, Out2 out) {
-  require(row.shape(0) == 1 && row.shape(1) == window.columns() && out.shape(0) == 1 &&
-              out.shape(1) == window.size(),
-          "Window: arrays differ in shape");
-  window.step(row.data(), out.data());
 }
 
 // K_ij between the rows of a and b.
@@ -121,14 +94,10 @@ NB_MODULE(_kernel, m) {
   using namespace tauguard::detectors;
   nb::class_<KernelSum>(m, "KernelSum")
       .def(nb::new_(&make_kernel), "vectors"_a, "coef"_a, "intercept"_a, "sigma"_a)
-      .def("rows", &rows, "x"_a, "out"_a.noconvert(), "threads"_a)
-      .def("series", &series, "signal"_a, "lag"_a, "count"_a, "out"_a.noconvert(), "threads"_a);
+      .def("rows", &rows, "x"_a, "out"_a.noconvert(), "threads"_a);
   nb::class_<Scaling>(m, "Scaling")
       .def(nb::new_(&make_scaling), "joints"_a, "weights"_a, "units"_a, "factor"_a, "compress"_a)
       .def("rows", &scale, "left"_a, "qd"_a, "motion"_a, "out"_a.noconvert());
-  nb::class_<Window>(m, "Window")
-      .def(nb::new_(&make_window), "columns"_a, "lag"_a, "count"_a)
-      .def("step", &step, "row"_a, "out"_a.noconvert());
   m.def("gram", &gram, "a"_a, "b"_a, "sigma"_a, "out"_a.noconvert(), "threads"_a);
   m.def("windows", &windows, "signal"_a, "ends"_a, "lag"_a, "count"_a, "out"_a.noconvert());
 }

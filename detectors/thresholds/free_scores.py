@@ -86,10 +86,11 @@ class FreeScores:
         self, levels: SpeedNormalisation, floor: SpeedNormalisation | None = None
     ) -> FreeScores:
         """The larger of normalised score and floor; within a piece the speed hardly changes."""
-        peaks, plain = levels(self.peaks, self.speeds), self.floor
-        if floor is not None and plain is not None:
-            peaks = np.maximum(peaks, floor(plain.peaks, plain.speeds))
-        return replace(self, peaks=peaks, floor=None)
+        peaks, beneath = levels(self.peaks, self.speeds), None
+        if floor is not None and self.floor is not None:
+            beneath = self.floor.over(floor)
+            peaks = np.maximum(peaks, beneath.peaks)
+        return replace(self, peaks=peaks, floor=beneath)
 
     def alarms(self, threshold: float) -> int:
         """How many alarms a threshold gives, those less than the merge gap apart as one."""

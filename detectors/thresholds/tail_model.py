@@ -133,7 +133,7 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
 
     Args:
-        scores: an episode each.
+        scores: an episode each. Where plain thresholds lie beneath a score, they alone decide.
         per_hour: false alarms to accept.
 
     Raises:
@@ -141,7 +141,7 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     """
     if not (len(scores) and per_hour > 0):
         raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
-    peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
+    peaks = np.sort(np.concatenate([(one.floor or one).blocks()[0] for one in scores]))[::-1]
     hours = sum(one.seconds for one in scores) / 3600
     interval = max(one.interval for one in scores)
     usual = min(USUAL_SHAPE * max(interval / HEAVIER, 1.0), SHAPES[1])
@@ -149,8 +149,10 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     return tail_level(peaks, per_hour * hours, count, usual)
 
 
-#: Rate at which a learned score and the plain thresholds beneath it have equal levels [1/h].
-ALIKE = 1.0
+#: Where the plain thresholds beneath a learned score have the first rate, it has the second [1/h].
+#: Both together then have the first by the tail's law: most moments that either exceeds are those
+#: of the other. Chosen on three arms.
+PLAIN, LEARNED = 1.0, 0.3
 
 
 def normalisations(
@@ -158,8 +160,8 @@ def normalisations(
 ) -> tuple[SpeedNormalisation, SpeedNormalisation | None]:
     """The normalisation of a score, and that of the plain thresholds beneath it.
 
-    Both normalised scores exceed one level :data:`ALIKE` times an hour, so that one threshold on
-    the larger of them asks as much of either.
+    One threshold holds for the larger of both: the one that the plain thresholds alone would have.
+    So what they find is found, and no later. The learned score is scaled to add few alarms to it.
 
     Args:
         scores: not normalised, an episode each.
@@ -172,7 +174,7 @@ def normalisations(
     if not beneath:
         return levels, None
     floor = speed_normalisation(beneath)
-    reached = threshold_for_rate([one.over(levels) for one in scores], ALIKE)
-    plain = threshold_for_rate([one.over(floor) for one in beneath], ALIKE)
-    factor = plain / reached if min(plain, reached) > 0 else 1.0
-    return levels, replace(floor, unit=factor * floor.unit)
+    reached = threshold_for_rate([one.over(levels) for one in scores], LEARNED)
+    plain = threshold_for_rate([one.over(floor) for one in beneath], PLAIN)
+    factor = reached / plain if min(plain, reached) > 0 else 1.0
+    return replace(levels, unit=factor * levels.unit), floor

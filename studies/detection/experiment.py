@@ -89,7 +89,6 @@ class Size:
 ALL = (
     "srq-svr",
     "moving-thresholds",
-    "window-network",
     "srq-svr-plain",
     "residual-thresholds",
     "current-network",

@@ -140,6 +140,9 @@ def run_part(
             raise ValueError(f"{path}: no folder {path.parent}; make it first")
     module, before = part.load(), load()
     rows, broken = _measured(module, quick, seed, options)
+    if json_path is not None:  # first: a table that fails takes no hours of work along
+        incomplete = {"incomplete": str(broken)} if broken else {}
+        write_json(json_path, measured(name, rows, quick, seed) | incomplete)
     every, short = printed(module, rows), brief(module, rows)
     print(table(every if tables else short, notes=module.NOTES))
     if not tables and short != every:
@@ -149,8 +152,6 @@ def run_part(
         stream.write(chart(module, rows, figure_path.suffix[1:] or "png"))
     print(f"figure: {figure_path}")
     if json_path is not None:
-        incomplete = {"incomplete": str(broken)} if broken else {}
-        write_json(json_path, measured(name, rows, quick, seed) | incomplete)
         print(f"json: {json_path}")
     if broken is not None:
         raise broken

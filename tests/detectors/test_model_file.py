@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import skops.io
 
-from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
+from tauguard.detectors import ArmModel, CollisionAlarm, load_model, registry, save_model
 from tauguard.detectors import model_file as files
 from tauguard.detectors.registry import make_detector
 from tauguard.traces import Trace
@@ -52,7 +52,8 @@ def small(arm, unseen):
 
 @pytest.fixture
 def named(monkeypatch):
-    """This module under a name that a user could give."""
+    """This module under a name that a user could give and that no test has named before."""
+    monkeypatch.setattr(registry, "_NAMED", set())
     module = types.ModuleType("mypackage")
     for kind in (FittedCurrent, CurrentSize):
         monkeypatch.setattr(kind, "__module__", "mypackage")

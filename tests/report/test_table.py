@@ -78,3 +78,10 @@ def test_a_broken_heading_keeps_its_spaces():
     assert "another long_" in text
     assert "heldout" not in text
     assert "[N m]" in text
+
+
+def test_delays_are_their_median_and_95th_percentile():
+    some = {"median": 5.0, "p95": 14.8, "n": 3}
+    assert cell(some) == "5, 14.8"
+    assert cell(some, brief=True) == "5"
+    assert cell({"median": None, "p95": None, "n": 0}) == "-"

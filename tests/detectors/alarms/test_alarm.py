@@ -23,6 +23,7 @@ from tauguard.detectors.thresholds.speed_normalisation import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.models import Mismatch
+from tauguard.traces import resampled
 from tests.oracles.added_contact import Added, add_contact
 
 
@@ -71,6 +72,21 @@ def test_the_floor_is_that_of_moving_thresholds(alarm, training, unseen, arm):
     speed = recent_speed(unseen[0].qd, unseen[0].dt)
     beneath = alarm.floor(own.floor.scores(unseen[0]), speed)
     assert (alarm.scores(unseen[0]) >= beneath).all()
+
+
+@pytest.mark.parametrize("hz", [None, 25.0])
+def test_what_moving_thresholds_find_is_found_no_later(training, unseen, arm, hz):
+    """Trained alike for one rate: at each sample at which their alarm is up, this one is, too."""
+    own, fresh = (
+        [t if hz is None else resampled(t, hz) for t in traces] for traces in (training, unseen)
+    )
+    methods = SrqSvr(windows=300, mined=0), MovingThresholds()
+    ours, plain = (train(method, own, arm, 10.0, folds=1) for method in methods)
+    assert ours.threshold == plain.threshold
+    for trace in fresh:
+        theirs = plain.detect(trace).alarm
+        assert theirs.any()
+        assert ours.detect(trace).alarm[theirs].all()
 
 
 def test_the_plain_form_is_the_dissertations(training, arm):

@@ -6,7 +6,7 @@ import pytest
 from tauguard.detectors.calibration import nominal
 from tauguard.detectors.events import free_rows
 from tauguard.detectors.features.front_end import FrontEndSettings
-from tauguard.detectors.scores.learned import SrqSvr
+from tauguard.detectors.scores.windowed import SrqSvr
 from tauguard.envs import Episode, simulate
 from tests.models.arms import random_arm
 

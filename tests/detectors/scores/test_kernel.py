@@ -47,14 +47,14 @@ def test_same_bits_for_any_number_of_threads_and_row_by_row():
     model = SrqRegressor().fit(rng.normal(size=(300, 8)), rng.normal(size=300))
     signal = np.ascontiguousarray(rng.normal(size=(1500, 2)))
     kernel = model.machine_.native
+    windows = np.empty((1500, 8))
+    _kernel.windows(signal, np.arange(1500), 3, 4, windows)
     outs = []
     for threads in (1, 2, 5):
         out = np.empty(1500)
-        kernel.series(signal, 3, 4, out, threads)
+        kernel.rows(windows, out, threads)
         outs.append(out)
     assert outs[0].tobytes() == outs[1].tobytes() == outs[2].tobytes()
-    windows = np.empty((1500, 8))
-    _kernel.windows(signal, np.arange(1500), 3, 4, windows)
     one = np.array([model.predict(w[None])[0] for w in windows[:200]])
     assert one.tobytes() == outs[0][:200].tobytes()
 
