@@ -44,10 +44,11 @@ class Frame:
     Attributes:
         vf: Colliding vertices and faces, shape (M, 2), sorted.
         ee: Colliding edges (rows of ``MeshCCD.edges``), smaller first, shape (K, 2), sorted.
-        vf_impacts: Impacts of the rows of ``vf``; all are hits.
+        vf_impacts: Impacts of the rows of ``vf``; ``hit`` is true in every row.
         ee_impacts: Impacts of the rows of ``ee``.
         pe: Colliding isolated vertices and isolated edges (rows of ``MeshCCD.edges``), shape
-            (P, 2), sorted. Other vertices meet edges as ends of edges or corners of faces.
+            (P, 2), sorted. Contacts of all other vertices with edges are in ``ee`` or ``vf``:
+            such a vertex is an end of an edge or a corner of a face.
         pp: Colliding isolated vertices, smaller first, shape (Q, 2), sorted.
         pe_impacts: Impacts of ``pe``; weights are those of the point and the edge's ends, shape (P,
             3).

@@ -50,7 +50,7 @@ class Friction:
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         per_joint = tuple(f.name for f in fields(self) if f.type == "Array")
-        shaped(self, (len(self.coulomb),), "one a joint", *per_joint)
+        shaped(self, (len(self.coulomb),), "one per joint", *per_joint)
         if (self.slope is None) != (self.slope_velocity is None):
             raise ValueError("Friction.slope, slope_velocity: expected both or neither")
         if self.slope is not None and self.slope_velocity is not None:
@@ -120,7 +120,7 @@ class Sensors:
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
-        shaped(self, (len(self.current_noise),), "one a joint", "current_quantum")
+        shaped(self, (len(self.current_noise),), "one per joint", "current_quantum")
         not_negative(self, *(f.name for f in fields(self) if f.name != "left_over"))
         joints = 0 if self.left_over is None else self.left_over.qd.shape[1]
         if self.left_over is not None and joints != len(self.current_noise):
@@ -222,11 +222,11 @@ class Drive:
         if (self.rated_speed is None) != (self.no_load_speed is None):
             raise ValueError("Drive.rated_speed, no_load_speed: expected both or neither")
         if self.rated_speed is not None and self.no_load_speed is not None:
-            shaped(self, joints, "one a joint", "rated_speed", "no_load_speed")
+            shaped(self, joints, "one per joint", "rated_speed", "no_load_speed")
             above_zero(self, "rated_speed")
             if not (self.no_load_speed > self.rated_speed).all():
                 raise ValueError("Drive.no_load_speed: expected above rated_speed")
-        shaped(self, joints, "one a joint", "gear", "current_limit")
+        shaped(self, joints, "one per joint", "gear", "current_limit")
         if not (np.isfinite(self.gain).all() and (self.gain != 0).all()):
             raise ValueError(f"Drive.gain {self.gain}: expected N m/A other than 0")
         if not (self.current_limit > 0).all():

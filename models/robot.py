@@ -252,9 +252,9 @@ def _numbers(value: Any, name: str) -> float | Numbers:
     try:
         rows = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} {value!r}: expected a number or one a joint") from None
+        raise ValueError(f"{name} {value!r}: expected a number or one per joint") from None
     if rows.ndim > 1 or not np.isfinite(rows).all():
-        raise ValueError(f"{name} {value!r}: expected finite numbers, one or one a joint")
+        raise ValueError(f"{name} {value!r}: expected finite numbers, one or one per joint")
     return float(rows) if rows.ndim == 0 else tuple(rows.tolist())
 
 
@@ -266,5 +266,5 @@ def per_joint(value: float | Numbers, joints: int, name: str) -> Array:
     """
     rows = np.asarray(value, dtype=float)
     if rows.shape not in ((), (joints,)):
-        raise ValueError(f"{name}: {rows.size} numbers, expected one or {joints}, one a joint")
+        raise ValueError(f"{name}: {rows.size} numbers, expected one or {joints}, one per joint")
     return np.array(np.broadcast_to(rows, (joints,)))

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "tauguard/geometry/aabb.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
@@ -61,7 +62,7 @@ std::vector<Centroid> centroids(const Features& features, const Ends& x, const G
 void FeatureTree::build(const Features& features, const Ends& x, const Groups& groups,
                         int threads) {
   arity_ = features.arity;
-  const std::size_t fill = changed_ ? with_room : full;
+  const std::size_t fill = added_ ? with_room : full;
   const std::size_t n = std::max<std::size_t>(1, (features.size() + fill - 1) / fill);
   leaves_ = static_cast<std::int32_t>(n);
   ids_.assign(n * lanes, -1);
@@ -284,13 +285,14 @@ std::int32_t FeatureTree::free_leaf_near(std::int32_t leaf) const {
 
 bool FeatureTree::update(const Features& features, const std::vector<std::int32_t>& new_id,
                          const Groups& groups) {
-  changed_ = true;
   std::vector<std::int32_t> missing;
   std::vector<std::uint8_t> placed(features.size(), 0);
   for (const auto id : new_id)
     if (id >= 0) placed[id] = 1;
   for (std::size_t i = 0; i < placed.size(); ++i)
     if (!placed[i]) missing.push_back(static_cast<std::int32_t>(i));
+  // Full leaves have no room: the first new features rebuild the tree with some.
+  if (!missing.empty() && !std::exchange(added_, true)) return false;
 
   for (std::int32_t leaf = 0; leaf < leaves_; ++leaf)
     for (int lane = 0; lane < lanes; ++lane) {

@@ -85,7 +85,7 @@ class FeatureTree {
 
   int arity_ = 1, axes_ = 0, slots_ = 0, times_ = 0;
   std::int32_t leaves_ = 0;
-  bool changed_ = false;  // by update()
+  bool added_ = false;  // features, by update()
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;
   std::vector<std::int32_t> ids_, vertices_,

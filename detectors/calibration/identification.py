@@ -249,8 +249,7 @@ def _fit(
     level: Array = np.ones(robot.joints)
     known = [known_load(recording.load) for recording in recordings]
     loads = np.array(known)
-    # Friction that depends on the model's own load is independent of the gains, which scale the
-    # currents only.
+    # Gains scale the currents only: friction by the model's own load does not depend on them.
     rescaled = friction.modelled and not friction.saturation
     first: Sequence[Filtered] = ()
     for turn in range(rounds):

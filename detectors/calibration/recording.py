@@ -23,11 +23,11 @@ LEAST = 10.0
 
 @dataclass(frozen=True)
 class Load:
-    """The load that the arm carried; parts of it may be unknown."""
+    """Mass and centre of mass of the load that the arm carried; the centre may be unknown."""
 
     mass: float = 0.0  #: [kg]
     centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]; None: unknown, identified with the other numbers."""
+    """In the last link's frame [m]. None: unknown, and identified with the arm's numbers."""
 
     def __post_init__(self) -> None:
         """``ValueError`` for a mass below 0 or numbers that are not finite."""

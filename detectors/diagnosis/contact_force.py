@@ -93,7 +93,7 @@ def point_jacobians(
 
 @dataclass(frozen=True, eq=False)
 class ContactBelief:
-    """Probability and force of a contact at every sampled point of the surface; a row a point."""
+    """Probability and force of a contact at every sampled point of the surface; a row per point."""
 
     link: NDArray[np.int64]  #: 0-based, shape (K,)
     point: Array  #: world frame [m], shape (K, 3)

@@ -48,7 +48,7 @@ ScaledResidual residual_of(const Estimator& estimator, const std::vector<std::in
 Source limit_scores(const Estimator& estimator, const std::vector<std::int64_t>& joints,
                     const Numbers& weights, double units, double factor, bool compress,
                     const Numbers& limits) {
-  require(limits.size() == joints.size(), "limits: expected one a joint that is used");
+  require(limits.size() == joints.size(), "limits: expected one per joint that is used");
   return std::make_shared<LimitScores>(
       residual_of(estimator, joints, weights, units, factor, compress), limits);
 }

@@ -1,4 +1,4 @@
-"""Inject a planned collision: find a target, search the strength, simulate its window."""
+"""Inject a planned collision: choose a target, search for the strength, simulate around it."""
 
 from dataclasses import dataclass, replace
 

@@ -184,7 +184,7 @@ def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -
             raise ValueError(f"options: unknown {name!r}; {hint}")
         numbers = _numbers(value)
         if not len(numbers):
-            raise ValueError(f"options: {name} {value!r}; expected a number, or one a joint")
+            raise ValueError(f"options: {name} {value!r}; expected a number, or one per joint")
         _in_range(f"options: {name}", name, numbers)
 
 

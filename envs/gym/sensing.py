@@ -50,7 +50,7 @@ class Listener(Protocol):
 
     @property
     def fault(self) -> str:
-        """The fault of the samples of the last :meth:`steps`; "" if there is none."""
+        """The fault found in the samples of the last :meth:`steps`; "" if none was found."""
 
     @property
     def settle(self) -> float:
@@ -316,7 +316,7 @@ class Sensing:
 
     @property
     def fault(self) -> str:
-        """The fault of the samples of the last action; "" if there is none."""
+        """The fault that the detector found in the last action's samples; "" if it found none."""
         return self.detector.fault if self.detector else ""
 
     @property

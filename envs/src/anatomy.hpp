@@ -41,19 +41,21 @@ constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
 // After a touch the hand withdraws at this multiple of its speed and stays away for this long [s].
-// The person steps back within this time, and stays there for this long [s].
 constexpr double startle = 1.6, quiet = 1.0;
+// Duration of a person's step back, and of the stay there [s].
 constexpr double step_time = 0.6, step_lasts = 2.0;
 // A seated person leans back instead, by this angle per metre of a step [rad/m], at most at this
 // rate [rad/s].
 constexpr double lean_back = 1.2, lean_rate = 1.2;
 // Smallest force that a person feels [N]; turning rate [rad/s]. The body leans towards a goal
-// farther than the fraction `comfort` of the arm's length, which stretches up to `stretch`.
+// farther than `comfort` times the arm's length, by at most `most_lean` [rad]. The arm extends to
+// at most `stretch` times its length.
 constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
 
 // Palms, forearms and upper arms keep the distance `clearance` from barriers [m]. A hand that is
 // stopped climbs at the speed `climb` [m/s] by at most `highest_climb` [m], and comes down at
-// `descend` [m/s]. Before a walk the person takes both hands back, which may last `patience` [s].
+// `descend` [m/s]. Before a walk the person takes both hands back. If they are not back within
+// `patience` [s], the walk waits for as long again.
 constexpr double clearance = 0.005, climb = 0.6, highest_climb = 0.6, descend = 0.2, patience = 2.0;
 
 inline double minimum_jerk(double u) {

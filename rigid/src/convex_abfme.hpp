@@ -220,7 +220,7 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   for (const auto& r : row) certain = certain && any(r < wall - ea) && any(r > ea - wall);
   const Double4 side_x{1.0, 1.0, -1.0, -1.0}, side_y{1.0, -1.0, 1.0, -1.0};
   Double4 x[4], y[4];
-  for (int i = 0; i < 3; ++i) {  // the four edges of A along generator i + 2, one a lane
+  for (int i = 0; i < 3; ++i) {  // the four edges of A along generator i + 2, one per lane
     const int k = i == 2 ? 0 : i + 1;
     const auto open = [&](const Double4& shift) __attribute__((always_inline)) {
       for (int j = 0; j < 4; ++j) {

@@ -44,7 +44,7 @@ class MeshImpact {
     float enter;
   };
 
-  // Depth first, the pair that may touch first on top.
+  // Depth first: the pair with the earliest possible contact is on top of the stack.
   void traverse_piece() {
     stack_.clear();
     stack_.push_back({{{-1, 0}, {-1, 0}}, 0});

@@ -12,17 +12,18 @@
 namespace tauguard::rigid {
 namespace {
 
-// Largest error of a certified answer in double precision, as a fraction of the size. If the
-// distance is below the fraction `near`, exact arithmetic is used, so the sign is always certain.
-// The total error stays below 2^-45 of the size, which is 256 unit roundoffs: 128 between the lower
-// and the upper bound, 18 for the rounding of the corners and 21 for that of the upper bound; then
-// for the lower bound 18 if the bodies are apart, or 21 in FacetDepth and 48 for the facets that it
-// leaves out, or 39 in least_depth.
+// An answer in double precision is accepted if the gap between the upper and the lower bound of the
+// distance is at most the fraction `certain` of the size. If the distance is below the fraction
+// `near`, exact arithmetic is used, so the sign is always certain.
+// The total error is below 2^-45 of the size, or 256 unit roundoffs. Its parts in unit roundoffs
+// are: gap between the bounds 128, rounding of the corners 18, rounding of the upper bound 21, and
+// rounding of the lower bound. The last part is 18 if the bodies are apart, 39 in least_depth, and
+// 21 + 48 in FacetDepth (48 for the facets that it leaves out).
 constexpr double certain = 0x1p-46, near = 1e-10;
 // Beyond these sizes products of four lengths leave the range of a double.
 bool in_range(double size) { return size > 1e-40 && size < 1e40; }
 
-// Vertices relative to `origin`; a difference of two doubles is off by one rounding of itself.
+// Vertices relative to `origin`. Each difference is rounded once: its error is relative to itself.
 Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec3& origin) {
   const double* p = bodies.row(row);
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {

@@ -57,7 +57,7 @@ class Extent:
     slices: int  #: with collisions
     free: int  #: collision-free
     samples: int  #: timed
-    single: int  #: rows that scikit-learn predicts, one a call
+    single: int  #: rows that scikit-learn predicts, one per call
     seconds: float  #: of motion from scene to alarm
     repeats: int  #: of it
 

@@ -39,7 +39,7 @@ QUICK = Size(1, NAMES[:3], (ASKED,), LITTLE, 0.1, 0.1, 1)
 
 
 def measure(quick: bool, seed: int, robot: str | None = None, keep: str | None = None) -> list[Row]:
-    """Rows ``robot``: one a robot and detector (default: the package's arms; quick: one)."""
+    """Rows ``robot``: one per robot and detector (default: the package's arms; quick: one)."""
     own = NAMED[1:2] if quick else NAMED
     names = list(own) if robot is None else [name.strip() for name in robot.split(",")]
     stems = [Path(name).stem for name in names]

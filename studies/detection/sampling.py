@@ -37,7 +37,7 @@ QUICK = Size(1, NAMES, (ASKED,), LITTLE, 0.1, 0.1, 1)
 
 
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """Rows ``sample rate``: one a rate and detector."""
+    """Rows ``sample rate``: one per rate and detector."""
     size, rates = (QUICK, RATES[:1] + RATES[3:4]) if quick else (FULL, RATES)
     arms = [71_000 + 100 * seed + k for k in range(size.arms)]
     jobs = [(size, seed, arm, rates) for arm in arms]

@@ -67,6 +67,8 @@ def draw_found(found: Mapping[str, Mapping[str, Row]], figure: Any) -> None:
         axes.set_axis_off()
     for axes, (title, own) in zip(panels, found.items(), strict=False):
         for k, rate in enumerate(own.values()):
+            if not rate["n"]:
+                continue
             value, low, high = (rate[key] for key in ("value", "low", "high"))
             spread, colour = [[value - low], [high - value]], COLOURS[min(k, 1)]
             axes.errorbar(value, k, xerr=spread, fmt="o", color=colour)

@@ -57,7 +57,7 @@ class ArmData:
 
     @property
     def file(self) -> Path:
-        """Its robot file."""
+        """The robot file: ``robot`` of the package, else the URDF in the arm's data folder."""
         own = folder() / self.name / f"{self.name}.urdf"
         return PUBLISHED / self.robot if self.robot else own
 

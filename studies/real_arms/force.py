@@ -1,11 +1,11 @@
 """Forces of pushes by a detector and by a twin, compared with a force sensor.
 
 A UR5 stands and is pushed at the tool; a sensor there gives the force. Its logs without contact
-make the detector and the twin. A row an alarm: peak, impulse, contact time and loudest joint as
-``detect --at-tool`` gives them, beside the sensor's in the time that the diagnosis looks at: from
-the beginning of the contact, which may be before the alarm, until the alarm ends. And a row a push:
-the twin, standing as the arm stood and pushed with the sensor's force, beside the joint torques
-that the arm's currents changed by.
+make the detector and the twin. There is one row per alarm: peak, impulse, contact time and loudest
+joint as ``detect --at-tool`` gives them, and those of the sensor in the same time: from the
+beginning of the contact, which may be before the alarm, until the alarm ends. And there is one row
+per push: the twin stands as the arm stood and is pushed with the sensor's force; its joint torques
+stand beside those that the currents show.
 
 How the sensor was mounted is not documented. Its rotation against the flange is fitted, to the
 joint torques of every second push; the row says which ones. Its lever is not: all pushes are in one

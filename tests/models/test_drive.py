@@ -13,7 +13,7 @@ SIX = np.ones(6)
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"gear": np.ones(2)}, r"Drive.gear: shape \(2,\), expected \(6,\): one a joint"),
+        ({"gear": np.ones(2)}, r"Drive.gear: shape \(2,\), expected \(6,\): one per joint"),
         ({"gain": np.zeros(6)}, "expected N m/A other than 0"),
         ({"gain": np.full(6, np.nan)}, "expected N m/A other than 0"),
         ({"current_limit": -SIX}, "Drive.current_limit .*: expected above 0"),

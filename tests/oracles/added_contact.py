@@ -19,7 +19,7 @@ SHAPES = {
 class Added:
     start: float  #: [s]
     seconds: float
-    torque: tuple[float, ...]  #: at its peak, one a joint [N m]
+    torque: tuple[float, ...]  #: at its peak, one per joint [N m]
     shape: str = "impact"
 
 

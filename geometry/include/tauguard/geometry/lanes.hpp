@@ -13,8 +13,8 @@
 #define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 #endif
 
-// Compiles a function for the baseline and for AVX2; the loader chooses. Not under ThreadSanitizer,
-// because the loader chooses before that is initialised.
+// Compiles a function for the baseline and for AVX2; the loader chooses. It does nothing under
+// ThreadSanitizer: the loader would choose before ThreadSanitizer is initialised.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
     !defined(__SANITIZE_THREAD__)
 #define TAUGUARD_CLONES __attribute__((target_clones("avx2", "default")))
