@@ -145,8 +145,9 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     print(asked_and_found(summary))
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     recording = out / "demo.rrd"
-    print(f"to see it in a browser: .uv/bin/uv run --no-dev tauguard replay --web {recording}")
-    print(f"in rerun's own window:  .uv/bin/uv run --no-dev rerun {recording}")
+    run = ".uv/bin/uv run --no-dev " if Path(".uv/bin/uv").is_file() else ""  # of a checkout
+    print(f"to see it in a browser: {run}tauguard replay --web {recording}")
+    print(f"in rerun's own window:  {run}rerun {recording}")
 
 
 def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
