@@ -94,11 +94,13 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
             raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
         return replace(PRESETS[columns], **form)
     header, table = _beginning(path, **form)
+    preset = next((replace(PRESETS[name], **form) for name in presets_of(header)), None)
+    if preset is not None and columns is None:
+        return preset
     found = recognised(header, table)
     found = None if found is None else replace(found, **form)
-    for name in presets_of(header):
-        preset = replace(PRESETS[name], **form)
-        return preset if columns is None or found is None else in_units_of(preset, found)
+    if preset is not None:
+        return preset if found is None else in_units_of(preset, found)
     if found is not None and columns == "auto":
         return found
     known = f"give a column map, or a preset: {', '.join(PRESETS)}"

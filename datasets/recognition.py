@@ -2,13 +2,15 @@
 
 Names come in groups that differ by a joint's number, such as ``q0`` to ``q6``, ``actual_q_0`` or
 ``/joint_states/position[0]``. The last word of its name identifies a group. Commands are ignored.
-Values decide the units: angles beyond two turns, or named so, are degrees, and sample intervals of
-more than half a second are milliseconds or less.
+A unit in a name counts: "timestamp_us", "angle (deg)". Without one, values decide: angles beyond
+two turns are degrees, currents above 100 are mA, and sample intervals of more than half a second
+are milliseconds or less.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +51,19 @@ _UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
 _WRITTEN = re.compile(
     r"(?<=[a-z0-9])_(deg|degrees|rad|radians|deg_s|rad_s|deg_per_s|rad_per_s|ma|a|nm|n_m|ns|us|ms|s)$"
 )
+#: Units that names may have, as :func:`_unit` compares them: seconds, amperes, whether degrees.
+_SECONDS = {
+    **dict.fromkeys(("nanoseconds", "nsec", "ns"), 1e-9),
+    **dict.fromkeys(("microseconds", "usec", "us"), 1e-6),
+    **dict.fromkeys(("milliseconds", "msec", "ms"), 1e-3),
+    **dict.fromkeys(("seconds", "sec", "s"), 1.0),
+}
+_AMPERES = {"milliamperes": 1e-3, "ma": 1e-3, "amperes": 1.0, "amps": 1.0, "a": 1.0}
+_ANGLES = {
+    unit + per: unit.startswith("deg")
+    for unit in ("degrees", "deg", "radians", "rad")
+    for per in ("", "_s", "_per_s", "_sec")
+}
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -93,6 +108,9 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     Args:
         header: names of all columns.
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
+
+    Raises:
+        ValueError: names with units of which one map can hold only one.
     """
 
     def plain(name: str) -> str:
@@ -114,36 +132,89 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     def numbers(columns: Sequence[str]) -> Array:
         return table[:, [list(header).index(name) for name in columns]]
 
-    def largest(columns: Sequence[str]) -> float:
-        values = np.abs(numbers(columns))
-        return float(values[np.isfinite(values)].max(initial=0.0))
-
     repair = {"repeat", "tail", "state"}
+    used = {field: columns for field, columns in groups.items() if field in ("q", "qd", effort)}
+    degrees, amperes = _units(used, numbers)
     scale, clock = 1.0, 0.0
     if time is not None:
         t = numbers([time])[:, 0]
         steps = np.diff(t[np.isfinite(t)])
         repair |= {"order"} if (steps < 0).any() else set()
-        steps = np.diff(np.unique(t[np.isfinite(t)]))  # of rows in order
-        usual = float(np.median(steps)) if len(steps) else 0.0
-        scale = next(scale for least, scale in CLOCKS if usual >= least)
+        scale = _time_scale(time, t)
     elif "qd" not in groups or not (clock := rate_of(numbers(groups["q"]), numbers(groups["qd"]))):
         return None
-    milli = effort == "current" and largest(groups["current"]) > AMPERES
     return ColumnMap(
         t=time,
         q=groups["q"],
         qd=groups.get("qd", ()),
         current=groups["current"] if effort == "current" else (),
         torque=groups["torque"] if effort == "torque" else (),
-        degrees=largest(groups["q"]) > FURTHEST or "deg" in groups["q"][0].lower(),
+        degrees=degrees,
         time_scale=scale,
         clock=clock,
-        current_scale=1e-3 if milli else 1.0,
+        current_scale=amperes,
         torque_scale=-1.0 if effort == "torque" and _FRI in groups["torque"][0] else 1.0,
         joint_names=_joints(groups["q"]),
         repair=frozenset(repair),
     )
+
+
+def _time_scale(name: str, t: Array) -> float:
+    """Seconds in one unit of the time: as its name says, else as its usual step does."""
+    steps = np.diff(np.unique(t[np.isfinite(t)]))  # of rows in order
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return _unit(name, _SECONDS) or next(scale for least, scale in CLOCKS if usual >= least)
+
+
+def _units(
+    groups: Mapping[str, Sequence[str]], numbers: Callable[[Sequence[str]], Array]
+) -> tuple[bool, float]:
+    """Whether angles are degrees, and amperes in one unit of currents: as names say, else values.
+
+    Raises:
+        ValueError: columns in different units.
+    """
+    angles = [*groups["q"], *groups.get("qd", ())]
+    degrees = _one(
+        {name: _unit(name, _ANGLES) for name in angles},
+        "convert one of them in the file, or give a column map without qd if only the velocities "
+        "differ: positions are then differentiated",
+    )
+    amperes = _one(
+        {name: _unit(name, _AMPERES) for name in groups.get("current", ())},
+        "give a column map with a current_scale for each joint",
+    )
+
+    def beyond(field: str, limit: float) -> bool:
+        values = np.abs(numbers(groups.get(field, ())))
+        return bool((values[np.isfinite(values)] > limit).any())
+
+    if degrees is None:
+        degrees = beyond("q", FURTHEST) or "deg" in groups["q"][0].lower()
+    if amperes is None:
+        amperes = 1e-3 if beyond("current", AMPERES) else 1.0
+    return degrees, amperes
+
+
+def _one(said: Mapping[str, Any], remedy: str) -> Any:
+    """What all names with a unit say, None if there are none."""
+    named = {name: value for name, value in said.items() if value is not None}
+    first = next(iter(named), "")
+    for name, value in named.items():
+        if value != named[first]:
+            raise ValueError(
+                f"columns {first} and {name} are in different units, and auto takes one for both: "
+                f"{remedy}"
+            )
+    return named.get(first)
+
+
+def _unit(name: str, units: Mapping[str, Any]) -> Any:
+    """What the unit at the end of a column's name says, a joint's number apart; None: no unit."""
+    told = name.lower().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u")
+    words = re.sub(r"[^a-z0-9]+", "_", told).strip("_")
+    words = re.sub(r"_?\d+$", "", words)
+    return next((said for unit, said in units.items() if f"_{words}".endswith(f"_{unit}")), None)
 
 
 def in_units_of(preset: ColumnMap, found: ColumnMap) -> ColumnMap:

@@ -30,8 +30,10 @@ from tauguard.untrusted_input import check_no_device, reading
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
 #: of regressors are severities; 4: that filter learns less of a held contact; 5: the noise model
 #: knows inertia, payload and changes of friction; 6: also changes of
-#: torque in slow logs, and a change of friction counts once.
-FORMAT, VERSION = "tauguard model", 6
+#: torque in slow logs, and a change of friction counts once; 7: the bound in free motion grows
+#: beyond the speeds and accelerations of the logs, and srq-svr's thresholds are those of
+#: moving-thresholds beneath its learned score.
+FORMAT, VERSION = "tauguard model", 7
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.

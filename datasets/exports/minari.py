@@ -9,6 +9,9 @@ import numpy as np
 from tauguard.extras import extra
 from tauguard.traces import Trace
 
+#: Minari's warnings of an author, code and environments that are not given.
+NOT_GIVEN = r"`(code_permalink|author|author_email|eval_env)` is set to None|env_spec is None"
+
 
 def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
     """Write traces with truth as a Minari dataset into Minari's own folder of datasets.
@@ -43,8 +46,8 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
         buffer = _buffer(trace, count)
         if dataset is None:
             n = len(trace.joint_names)
-            with warnings.catch_warnings():  # of an author and environments that are not given
-                warnings.simplefilter("ignore", UserWarning)
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", NOT_GIVEN, UserWarning)
                 dataset = minari.create_dataset_from_buffers(
                     name,
                     [buffer],

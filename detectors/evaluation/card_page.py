@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tauguard.atomic_write import atomic_file
 from tauguard.detectors.evaluation.threshold_card import UPPER
+from tauguard.detectors.features.free_bound import ANYWHERE
 from tauguard.detectors.features.motion_regimes import unseen_text
 
 if TYPE_CHECKING:
@@ -109,11 +110,12 @@ def _lines(card: ThresholdCard) -> list[str]:
         "motion, so a shorter impact has to be harder",
         _alarms(card),
     ]
-    if shown := [f"{speed:.2g}" for speed in card.fast if 0 < speed < CLOCK]:
+    speeds = zip(card.joints, card.fast, strict=True)
+    if shown := [f"{joint} {speed:.2g}" for joint, speed in speeds if 0 < speed < ANYWHERE]:
         lines.insert(
             -1,
-            f"moving: up to {', '.join(shown)} rad/s, as the joints that move in the logs; a joint "
-            "that is faster, or accelerates harder, has to be pushed harder",
+            f"moving: up to the speeds of the logs ({', '.join(shown)} rad/s); a joint that is "
+            "faster, or accelerates harder, has to be pushed harder",
         )
     if card.left_out:
         names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)

@@ -109,6 +109,13 @@ class Bound:
     """Factors from held-out logs on the prior bounds: at rest, added by motion, and in motion,
     shape (3, n)."""
 
+    def __post_init__(self) -> None:
+        """Refuse speeds or accelerations of which no multiple is a number: no alarm would come."""
+        for name in ("fast", "hard"):
+            own = getattr(self, name)
+            if not (np.isfinite(own) & (own > 0)).all():
+                raise ValueError(f"{name} {own}: expected finite numbers above 0")
+
     @classmethod
     def prior(cls, friction: Array, static: Array, low: Array, high: Array) -> Bound:
         """The bound to start from, before it is fitted to recordings."""

@@ -282,8 +282,15 @@ def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
 
 def _shown(judged: Sequence[Judged], name: str) -> Array:
     """The size of qd or qdd that each joint exceeds for :data:`SHORTLY` in all, shape (n,)."""
-    ranked = np.sort(np.concatenate([np.abs(getattr(p, name))[:: _stride(p)] for p in judged]), 0)
-    shown: Array = np.maximum(ranked[-min(len(ranked), round(SHORTLY / EVERY))], LEAST_SHOWN)
+    rows = [np.abs(getattr(p, name))[:: _stride(p)] for p in judged]
+    each = [_stride(p) * float(np.median(np.diff(p.t))) for p in judged]
+    sizes, seconds = np.concatenate(rows), np.repeat(each, [len(r) for r in rows])
+    order = np.argsort(-sizes, axis=0, kind="stable")
+    passed = np.cumsum(seconds[order], axis=0)  # for so long a joint had this size or a larger one
+    count = (passed <= SHORTLY * (1 + 1e-6)).sum(axis=0)
+    ranked = np.take_along_axis(sizes, order, axis=0)
+    last = np.take_along_axis(ranked, np.maximum(count - 1, 0)[None], axis=0)[0]
+    shown: Array = np.maximum(last, LEAST_SHOWN)
     return shown
 
 

@@ -118,7 +118,6 @@ class Window {
   Window(std::size_t columns, std::size_t lag, std::size_t count)
       : columns_(columns), lag_(lag), count_(count), rows_((lag * (count - 1) + 1) * columns) {}
 
-  std::size_t columns() const { return columns_; }
   std::size_t size() const { return columns_ * count_; }
   void reset() { filled_ = false; }
 

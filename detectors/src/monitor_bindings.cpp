@@ -182,8 +182,8 @@ void bind_monitor(nb::module_& m) {
            "settle"_a, "span"_a, "window"_a, "bridged"_a)
       .def_prop_ro("settled", &Monitor::settled)
       .def("step", &step, "t"_a, "q"_a, "qd"_a, "current"_a)
-      .def("steps", &steps, "t"_a, "q"_a, "qd"_a, "current"_a, "estimator"_a, "dt"_a, "last"_a,
-           "residuals"_a, "alarms"_a);
+      .def("steps", &steps, "t"_a, "q"_a, "qd"_a, "current"_a, "estimator"_a, "dt"_a,
+           "last"_a.noconvert(), "residuals"_a.noconvert(), "alarms"_a.noconvert());
 }
 
 }  // namespace tauguard::detectors

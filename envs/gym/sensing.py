@@ -120,7 +120,7 @@ class ObserverListener:
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """An alarm is up where a residual exceeds its bound."""
-        residuals, alarms = np.empty_like(q), np.empty(len(q), dtype=np.bool_)
+        residuals, alarms = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
         direction = np.tanh(qd / STANDSTILL)
         signals, own = (q, qd, direction, current), self._observer
         own.native.alarms(
@@ -147,16 +147,16 @@ class AlarmListener:
         self.name, self.settle = alarm.detector.name, alarm.settle
         self.bounds: Array = SIGMAS * np.asarray(arm.noise)
         self._dt, self._count = alarm.detector.dt, 0
-        self._alarm = alarm.stream()
-        #: A model with checks of its input also names faults.
+        #: A model with checks of its input also names faults; the monitor has its own stream.
         self._monitor = Monitor(alarm, alarm.inputs) if alarm.inputs is not None else None
+        self._alarm = alarm.stream() if self._monitor is None else None
         self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
         self._last = np.zeros(arm.robot.joints)
         self.fault = ""
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """See :class:`Listener`; a residual stays where a sample is not finite."""
-        residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
+        residuals, alarms = np.empty(q.shape), np.zeros(len(q), dtype=np.bool_)
         if self._monitor is not None:
             t = self._dt * np.arange(self._count, self._count + len(q), dtype=np.float64)
             self._count += len(q)
@@ -166,6 +166,7 @@ class AlarmListener:
             )
             return residuals, alarms
         out = np.empty((2 + MOTION, q.shape[1]))
+        assert self._alarm is not None
         for row, sample in enumerate(zip(q, qd, current, strict=True)):
             alarms[row] = self._alarm.step(*sample)
             self._observer.step(*sample, out)

@@ -2,6 +2,8 @@
 
 import json
 import sys
+import types
+import warnings
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -62,6 +64,29 @@ def test_minari_reads_what_was_written(tiny, tmp_path, monkeypatch):
         np.testing.assert_allclose(episode.infos["tau_ext"], trace.truth.tau_ext, rtol=1e-6)
     with pytest.raises(ValueError, match="has a dataset of that name"):
         write_minari(traces, "tauguard/tiny-v0", 500)
+
+
+def test_of_minari_s_warnings_only_what_is_not_given_is_hidden(tiny, monkeypatch):
+    def create(*_, **__):
+        for text in (
+            "`author_email` is set to None. For longevity",
+            "`eval_env` is set to None. If another",
+            "env_spec is None, no environment",
+            "the disk is nearly full",
+        ):
+            warnings.warn(text, UserWarning, stacklevel=2)
+        return types.SimpleNamespace(update_dataset_from_buffer=lambda _: None)
+
+    fake = types.ModuleType("minari")
+    fake.list_local_datasets, fake.create_dataset_from_buffers = dict, create
+    collector = types.ModuleType("minari.data_collector")
+    collector.EpisodeBuffer = types.SimpleNamespace
+    monkeypatch.setitem(sys.modules, "minari", fake)
+    monkeypatch.setitem(sys.modules, "minari.data_collector", collector)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert write_minari(read(tiny, ["test"]), "tauguard/tiny-v0", 500) == 2
+    assert [str(one.message) for one in told] == ["the disk is nearly full"]
 
 
 def test_an_export_without_its_extra_says_which(tiny, monkeypatch):

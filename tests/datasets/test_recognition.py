@@ -79,6 +79,54 @@ def test_units_may_be_the_last_words_of_names():
     assert found.qd == ("axis1_vel_deg_s", "axis2_vel_deg_s", "axis3_vel_deg_s")
 
 
+@pytest.mark.parametrize(
+    ("names", "values", "units"),
+    [
+        (
+            ("timestamp_ms", "axis#_pos_rad", "axis#_vel_rad_s", "axis#_current_mA"),
+            (0.25, 20, 30),
+            (1e-3, False, 1e-3),
+        ),
+        (
+            ("time [us]", "J# angle (rad)", "J# speed (rad/s)", "J# current [A]"),
+            (40, 20, 300),
+            (1e-6, False, 1.0),
+        ),
+        (
+            ("time (\u00b5s)", "q#_pos [\u00b0]", "q#_vel [\u00b0/s]", "q#_current [mA]"),
+            (40, 1, 3),
+            (1e-6, True, 1e-3),
+        ),
+        (("t_s", "pos_#", "vel_deg_s_#", "current_#"), (0.6, 1, 3), (1.0, True, 1.0)),
+        (("timestamp_ns", "q_#", "qd_#", "current_A_#"), (1000, 20, 300), (1e-9, True, 1.0)),
+        (("seconds", "q[#]", "qd[#]", "current[#]"), (0.6, 1, 300), (1.0, False, 1e-3)),
+    ],
+)
+def test_a_named_unit_beats_what_values_suggest(names, values, units):
+    header = [names[0], *(name.replace("#", str(k)) for name in names[1:] for k in (1, 2))]
+    table = np.ones((50, 7)) * [0, *(values[k] for k in (1, 1)), 1, 1, values[2], values[2]]
+    table[:, 0] = values[0] * np.arange(50)
+    found = recognised(header, table)
+    assert found.qd == (header[3], header[4])
+    assert (found.time_scale, found.degrees, found.current_scale) == units
+
+
+def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):
+    t, q, qd, i = motion()
+    names = ["t", *(f"axis{k}_{kind}" for kind in ("pos_rad", "vel_deg_s", "amps") for k in (1, 2))]
+    path = written(tmp_path / "log.csv", names, t, q, np.rad2deg(qd), i)
+    said = "axis1_pos_rad and axis1_vel_deg_s are in different units.*a column map without qd"
+    for columns in (None, "auto"):
+        with pytest.raises(ValueError, match=said):
+            read_log(path, columns)
+    columns = ColumnMap("t", tuple(names[1:3]), current=tuple(names[5:]))
+    np.testing.assert_allclose(read_log(path, columns).trace.qd[5:], qd[5:], atol=0.05)
+    names = ["t", "q1", "q2", "current 1 [A]", "current 2 [mA]"]
+    path = written(tmp_path / "mixed.csv", names, t, q, i)
+    with pytest.raises(ValueError, match=r"current 2 .* a current_scale for each joint"):
+        read_log(path, "auto")
+
+
 def test_nothing_is_proposed_where_something_lacks():
     table = np.zeros((5, 4))
     assert recognised(["t", "q1", "q2", "x"], table) is None

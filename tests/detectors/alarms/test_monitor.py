@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.detectors import Estimator, Unknowns
+from tauguard.detectors import CollisionAlarm, Estimator, Unknowns
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Monitor
 from tauguard.detectors.estimation.estimator import MOTION
 from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.envs.gym.sensing import AlarmListener
 from tauguard.live.packets import Fault, Packets
 
 #: Faults that the samples show by themselves. Others look like a contact.
@@ -80,6 +81,32 @@ def test_a_block_of_samples_says_what_single_samples_say(alarm, struck, quiet, n
         assert alarms.tolist() == [said[k].alarm for k in block]
         assert residuals.tobytes() == np.array([single[k] for k in block]).tobytes()
     assert any(a.reason for a in said)
+
+
+def test_outputs_of_another_layout_are_not_written_into_a_copy(alarm, struck):
+    signals = [x[:300] for x in (struck.q, struck.qd, struck.current)]
+    turned = [np.asfortranarray(x) for x in signals]
+    for some in (alarm, replace(alarm, inputs=None)):
+        (rows, up), (same, again) = (AlarmListener(some).steps(*x) for x in (signals, turned))
+        assert rows.tobytes() == same.tobytes()
+        assert np.abs(rows).max() > 0
+        assert up.tolist() == again.tolist()
+    estimator = Estimator(alarm.detector.arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
+    right = np.zeros(6), np.empty((300, 6)), np.empty(300, dtype=bool)
+    wrong = np.zeros(12)[::2], np.empty((300, 6), order="F"), np.empty(600, dtype=bool)[::2]
+    for k in range(3):
+        out = [*right[:k], wrong[k], *right[k + 1 :]]
+        with pytest.raises(TypeError):
+            Monitor(alarm, alarm.inputs).steps(struck.t[:300], tuple(signals), estimator, *out)
+
+
+def test_a_listener_makes_one_stream(alarm, monkeypatch):
+    made, stream = [], CollisionAlarm.stream
+    monkeypatch.setattr(CollisionAlarm, "stream", lambda own: made.append(own) or stream(own))
+    for some in (alarm, replace(alarm, inputs=None)):
+        AlarmListener(some)
+        assert made == [some]
+        made.clear()
 
 
 @pytest.mark.parametrize("name", SEEN)

@@ -1,11 +1,13 @@
 """Quantile regression with a prior."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.features.free_bound import upper_quantile
+from tauguard.detectors.features.free_bound import Bound, upper_quantile
 
 
 @settings(max_examples=8, deadline=None)
@@ -47,3 +49,12 @@ def test_thinned_rows_count_as_all():
     prior, weight = np.array([0.3, 0.0]), np.array([600.0, 1.0])
     for rows in (900, 90):
         assert upper_quantile(x, y, 0.99, prior, weight, rows)[0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("field", ["fast", "hard"])
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.inf, np.nan])
+def test_a_bound_that_never_alarms_is_refused(field, bad):
+    """At 0 the bound of a joint that stands is 0/0, which no residual exceeds."""
+    bound = Bound.prior(*np.ones((4, 2)))
+    with pytest.raises(ValueError, match=f"{field} .*expected finite numbers above 0"):
+        replace(bound, **{field: np.array([1.0, bad])})

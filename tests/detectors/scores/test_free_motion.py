@@ -14,7 +14,7 @@ from tauguard.detectors.evaluation.cross_validation import CrossValidation, judg
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
-from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion, Judged, _shown
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 from tests.oracles.added_contact import Added, add_contact
 
@@ -49,6 +49,23 @@ def test_speeds_that_training_exceeds_for_half_a_second_count_as_shown(fitted):
     assert (seconds < 0.7).all()
     assert (fitted.bound.hard > 0.3).all()
     assert (fitted.bound.hard < 10).all()
+
+
+def ramp(dt, seconds=10.0):
+    """Speeds that rise by 1 rad/s a second."""
+    t = dt * np.arange(round(seconds / dt))
+    same = np.column_stack([t, t])
+    return Judged(t, same, 2 * same, same, same, same, same > 0)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2e-3, 8e-3, 0.01, 0.02, 0.03, 0.05, 0.1])
+def test_half_a_second_is_meant_at_every_rate(dt):
+    assert _shown([ramp(dt)], "qd") == pytest.approx(9.5, abs=0.06)
+    assert _shown([ramp(dt)], "qdd") == pytest.approx(19, abs=0.12)
+    assert _shown([ramp(dt), ramp(0.01)], "qd") == pytest.approx(9.75, abs=0.08)
+    if dt in (1e-3, 8e-3, 0.01):  # twelve rows of 40 ms
+        rows = ramp(dt).qd[:: round(0.04 / dt)]
+        assert (_shown([ramp(dt)], "qd") == rows[-12]).all()
 
 
 @pytest.mark.parametrize(("field", "part"), [("fast", 1.0), ("hard", 0.5)])
@@ -284,7 +301,8 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert set(card.unseen["moving alone"]) == {"a", "b", "c"}
     fast = np.array([0.51, np.nan, 2.0])
     assert (card.fast == fitted.bound.fast).all()
-    assert "moving: up to 0.51, 2 rad/s, as the joints" in text(replace(card, fast=fast))
+    said = " ".join(text(replace(card, fast=fast)).split())
+    assert "the speeds of the logs (a 0.51, c 2 rad/s); a joint" in said
     assert card.franka == {}  # libfranka speaks to arms of seven joints
     seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
