@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from tqdm import tqdm
 
 from tauguard.arrays import Array, Bools
@@ -120,11 +119,12 @@ def _unexplained(arm: ArmModel, recording: Recording) -> Unexplained:
 
 def _swing(arm: ArmModel, trace: Trace) -> Array:
     """The largest torque of accelerations within :data:`SWINGS` [N m], shape (T, n)."""
+    from scipy.ndimage import maximum_filter1d
+
     p = momentum_terms(arm.robot, trace.q, trace.qd)[0]
     rates, rows = np.full(arm.robot.joints, RATE), round(SWINGS / trace.dt)
     change = np.abs(low_pass(rates, intervals(trace.t, len(p)), p, np.zeros_like(p)))
-    padded = np.pad(change, ((rows, rows), (0, 0)))
-    largest: Array = sliding_window_view(padded, 2 * rows + 1, axis=0).max(axis=2)
+    largest: Array = maximum_filter1d(change, 2 * rows + 1, axis=0, mode="constant")
     return largest
 
 
@@ -149,7 +149,8 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
     for name, log in logs.items():
         t, left, rows = log.trace.t, log.beside_swings(), log.moves
         whole = _size(log.torque, rows)
-        fraction = _size(left, rows) / np.maximum(whole, FAINT * whole.max() + 1e-12)
+        whole = np.maximum(whole, FAINT * whole.max() + 1e-12)
+        fraction = _size(left, rows) / whole
         judged = rows.sum(axis=0) * log.trace.dt > ENOUGH
         burst, level = np.zeros(len(joints)), np.full(len(joints), np.inf)
         for j in np.flatnonzero(judged):
@@ -161,7 +162,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
             starts = [f"{alarm.start - t[0]:.1f}" for alarm in find_alarms(t, peaks)]
             said = ", ".join(starts[:SAID]) + (", ..." if len(starts) > SAID else "")
             found.append(
-                f"{name}: {100 * fraction[worst]:.0f} % of the torque of "
+                f"{name}: {100 * (_size(log.left, rows) / whole)[worst]:.0f} % of the torque of "
                 f"{joints[worst]} in motion is not explained, and it comes in bursts, as contacts "
                 f"do, at {said} s after the beginning"
             )

@@ -43,7 +43,7 @@ class Diagnosis:
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: the measures that decided the kind
     severity: Severity  #: impulse and peak force, each with an interval
-    since: float  #: when the contact began, or shortly before [s]
+    since: float  #: start of the observed window [s]; with ``at_tool`` shortly before the contact
     until: float  #: end of the observed window [s]
     joints: tuple[str, ...]  #: their names
 
@@ -114,7 +114,7 @@ class Diagnoser:
     surface: LinkSurface
     noise_model: NoiseModel | None = None  #: of free motion; None: the arm's noise at every speed
     trust: Trust = field(default_factory=Trust)
-    at_tool: bool = False  #: all contacts are at the origin of the last link
+    at_tool: bool = False  #: all contacts are at the tool, see :func:`tool_severity`
     load_known: bool = False  #: what the arm carries is known and does not change
 
     @classmethod

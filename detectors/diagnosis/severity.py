@@ -110,7 +110,8 @@ COVERAGE = 0.9
 #: The torque is averaged over this number of lags to both sides before its peak is taken.
 SMOOTHED = 0.3
 
-#: Of a long contact, the average is over this fraction of its time: joints that slip give peaks.
+#: Of a long contact at the tool, the average is over this fraction of its time: joints that slip
+#: give peaks.
 LONG = 0.1
 
 #: The contact lasts while the torque is above this fraction of its peak.
@@ -157,7 +158,7 @@ class ContactTorque:
     """Torques of a contact at the joints, from its beginning to the end of the window."""
 
     row: int  #: row of the peak among the window's samples
-    seconds: float  #: duration of the contact within the window of about 0.4 s [s]
+    seconds: float  #: duration of the contact within the window [s]
     impulse: Array  #: integral of tau_ext [N m s], shape (n,)
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
@@ -178,12 +179,18 @@ class ContactTorque:
         return f"{two_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
 
     @classmethod
-    def of(cls, after: PostAlarmWindow) -> ContactTorque:
-        """The torques from the residual around an alarm."""
+    def of(cls, after: PostAlarmWindow, smooth: float = 0.0) -> ContactTorque:
+        """The torques from the residual around an alarm.
+
+        Args:
+            after: the residual.
+            smooth: fraction of the contact's time that is averaged over, if this is more than twice
+                the time that the lag asks for.
+        """
         width, torque, top, along, first, last = _followed(after, 0.0)
-        wider = LONG * float(after.t[last] - after.t[first])
+        wider = smooth * float(after.t[last] - after.t[first])
         if wider > 2 * width:
-            width, torque, top, along, first, last = _followed(after, wider)
+            _, torque, top, along, first, last = _followed(after, wider)
         part = slice(first, last + 1)
         seconds = float(after.t[last] - after.t[first])
         step = after.residual[last] - after.residual[first]

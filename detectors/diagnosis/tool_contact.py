@@ -16,7 +16,9 @@ from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 from tauguard.detectors.diagnosis.severity import (
+    CONTACT_FRACTION,
     DRAWS,
+    LONG,
     SEED,
     ContactTorque,
     Interval90,
@@ -53,7 +55,7 @@ def tool_severity(
     Returns:
         The severity, and the force on the arm at its peak, world frame [N], shape (3,).
     """
-    torque = ContactTorque.of(after)
+    torque = ContactTorque.of(after, LONG)
     q, row, n = after.q[torque.row], torque.row, arm.robot.joints
     poses = link_poses(arm.robot, q)
     heights = np.zeros(1) if surface is None else surface.point @ arm.robot.axis[-1]
@@ -69,11 +71,12 @@ def tool_severity(
     mean = torque.mean + turned[torque.first : torque.last + 1].mean(axis=0)
     deviation = np.sqrt(LEAST**2 + (OWN * np.abs(torque.peak)) ** 2 + (HIDDEN * friction) ** 2)
     along = peak / deviation**2
-    shape = max(float(peak @ along) / max(float(mean @ along), 1e-12), 1.0)
+    # The first value and turned friction were taken off: the mean may be small or negative.
+    level = float(np.clip(mean @ along / max(float(peak @ along), 1e-12), CONTACT_FRACTION, 1.0))
     force = _draws(jacobians, peak, deviation)
     rng = np.random.default_rng((SEED, 2))
     size = np.linalg.norm(force, axis=1) * np.exp(SCALE * rng.standard_normal(len(force)))
-    impulse = size / shape * torque.seconds
+    impulse = size * level * torque.seconds
     return Severity(Interval90.of(impulse), Interval90.of(size), torque), force.mean(axis=0)
 
 

@@ -8,6 +8,7 @@ import pytest
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
 from tauguard.detectors.calibration.arm_file import load_arm, save_arm
 from tauguard.detectors.calibration.assessment import (
+    SWINGS,
     check_bursts,
     explained,
     left_out,
@@ -15,10 +16,11 @@ from tauguard.detectors.calibration.assessment import (
     start_gains,
     unexplained,
 )
-from tauguard.detectors.calibration.identification import identify
+from tauguard.detectors.calibration.identification import RATE, identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
 from tauguard.detectors.dynamics.physical_consistency import is_physically_consistent
-from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
+from tauguard.detectors.estimation.observer import intervals, low_pass
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,
@@ -136,6 +138,29 @@ def test_bursts_while_the_arm_itself_jerks_are_no_contacts(found, jerks):
         return
     with pytest.raises(ValueError, match="bursts, as contacts do, at"):
         check_bursts(*given)
+
+
+def test_the_part_that_bursts_leave_unexplained_is_all_of_it(found):
+    given = unexplained(found.arm, {"log": Recording(pushed(record(7), 3.0, 15.0))})
+    log = given["log"]
+    given["log"] = log = dataclasses.replace(log, swing=log.swing + 0.5 * np.abs(log.left))
+    with pytest.raises(ValueError, match="bursts") as caught:
+        check_bursts(found.arm.robot.joint_names, given)
+    rows = log.moves[:, 2]
+    left, torque = (np.linalg.norm(x[rows, 2]) for x in (log.left, log.torque))
+    assert f"log: {100 * left / torque:.0f} % of the torque of" in str(caught.value)
+    assert np.linalg.norm(log.beside_swings()[rows, 2]) < 0.9 * left
+
+
+def test_the_swing_is_the_largest_torque_of_accelerations_nearby(found):
+    log = record(7)
+    p = momentum_terms(found.arm.robot, log.q, log.qd)[0]
+    change = np.abs(low_pass(np.full(3, RATE), intervals(log.t, len(p)), p, np.zeros_like(p)))
+    rows = round(SWINGS / log.dt)
+    swing = unexplained(found.arm, {"log": Recording(log)})["log"].swing
+    for k in (0, 1, rows, len(p) // 2, len(p) - rows, len(p) - 1):
+        near = change[max(k - rows, 0) : k + rows + 1]
+        np.testing.assert_array_equal(swing[k], near.max(axis=0))
 
 
 def test_each_log_left_out_once(logs, found):

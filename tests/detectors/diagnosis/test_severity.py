@@ -7,6 +7,7 @@ from tauguard.detectors.diagnosis.isolation import Trust
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 from tauguard.detectors.diagnosis.severity import (
     COVERAGE,
+    LONG,
     ContactTorque,
     Interval90,
     force_draws,
@@ -91,6 +92,19 @@ def test_most_intervals_hold_what_happened():
     assert np.mean([f.impulse.low <= impulse <= f.impulse.high for f in found]) >= COVERAGE - 0.1
     for name in ("peak", "impulse"):  # from 0 to infinity would hold it, too
         assert np.median([getattr(f, name).high / getattr(f, name).low for f in found]) < 4.5
+
+
+def test_only_a_contact_at_the_tool_is_averaged_over_a_part_of_its_time():
+    found = said(5, 40, 80.0, 0.2)
+    assert found.torque.hidden == pytest.approx(0.003 / 0.182)
+    ends = [(one.low, one.value, one.high) for one in (found.impulse, found.peak)]
+    np.testing.assert_allclose(ends[0], (7.003, 9.869, 14.443), rtol=1e-3)
+    np.testing.assert_allclose(ends[1], (56.21, 79.29, 116.11), rtol=1e-3)
+    after = seen(TORQUE, 0.2, 0.005)
+    np.testing.assert_allclose(ContactTorque.of(after).peak, 0.99992 * TORQUE, rtol=1e-5)
+    longer = ContactTorque.of(after, LONG)
+    assert longer.hidden == pytest.approx(0.003 / 0.182)
+    np.testing.assert_allclose(longer.peak, 0.9963 * TORQUE, rtol=1e-4)
 
 
 def test_a_force_that_no_joint_feels_is_not_identifiable():

@@ -8,6 +8,7 @@ import pytest
 from tauguard.detectors import ArmModel, FrictionModel
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.diagnosis.diagnosis import SURE, Diagnoser
+from tauguard.detectors.diagnosis.severity import CONTACT_FRACTION
 from tauguard.detectors.diagnosis.tool_contact import tool_severity
 from tests.detectors.diagnosis.test_severity import HOME, ROBOT, SURFACE, seen
 
@@ -77,6 +78,18 @@ def test_friction_of_a_joint_that_the_servo_drives_back_is_no_force():
     size = np.linalg.norm(force)
     assert abs(back.value / size - 1) < 0.6 * abs(found.value / size - 1)
     assert back.low < size < back.high
+
+
+def test_a_residual_below_its_first_value_leaves_an_impulse_within_what_the_peak_allows():
+    window = seen(np.zeros(6), 0.2, 0.005)
+    t = window.t
+    bump = np.sin(np.pi * np.clip((t - 0.15) / 0.02, 0, 1))
+    size = np.where(t < 0, 20.0, 10.0) + 35 * bump
+    torque = np.outer(size, pushed(np.array([1.0, 0.0, 0.0])))
+    found = tool_severity(DIRECT, replace(window, residual=torque))[0]
+    whole = found.peak.value * found.torque.seconds
+    assert CONTACT_FRACTION * whole <= 1.001 * found.impulse.value <= whole
+    assert 0.1 < found.impulse.value < 5.0  # that of the force is 3.9 N s
 
 
 def test_a_diagnoser_that_is_told_the_tool_names_the_last_link():
