@@ -49,7 +49,7 @@ RUNS = (
     "time. load: programs that wanted to run when a part ended; above the number of cores its "
     "times are too long."
 )
-UNRECORDED = "<p>A quick run records none: <code>tauguard report --mistakes</code> does.</p>"
+UNRECORDED = "<p>A quick run records none: <code>tauguard report --bound</code> does.</p>"
 CASES = (
     "<p>Named cases with exact answers, put to every library that is installed; "
     "<code>tauguard hard-cases</code> runs them, on other libraries too. "
@@ -65,13 +65,13 @@ def command(
     seed: int = 0,
     study: tuple[str, ...] = (),
     bound: bool = False,
-    mistakes: bool | None = None,
+    mistakes: bool = True,
 ) -> None:
     """Run the studies that the folder does not hold yet, and write `index.html` of all of them.
 
-    A stopped run continues where it stopped. The page opens offline. A full run also records the
-    mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If something
-    cannot be shown, the page and a message name it, and the exit code is 1.
+    A stopped run continues where it stopped. The page opens offline. A run that is not quick also
+    records the mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If
+    something cannot be shown, the page and a message name it, and the exit code is 1.
 
     Args:
         out: the folder of the page and of each part's rows (JSON) and figure.
@@ -81,7 +81,7 @@ def command(
         study: these studies or parts only (default: all that `tauguard bench list` names).
         bound: write the page from what the folder holds; run no study and no hard case.
         mistakes: train the detector of `tauguard demo` and record its mistakes, unless the
-            folder holds those of this build (default: where the run is not --quick).
+            folder holds those of this build; a quick run records none.
     """
     from studies.framework import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run
@@ -101,10 +101,10 @@ def command(
         found = {"name": kept.stem, "versions": versions(), "rows": rows}
         write_json(kept, found)
     cases, links = found["rows"], ""
-    if mistakes or (mistakes is None and not quick):
-        links = missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "")
-    elif mistakes is None:
+    if quick:
         links = UNRECORDED
+    elif mistakes:
+        links = missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "")
     print(f"report: {Report(out, failed, missing).write(cases, links)}")
     for line in missing.lines:
         print(f"not shown, or not whole: {line}", file=sys.stderr)
