@@ -16,8 +16,8 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Most features that a leaf gets at a build: all slots of a mesh whose topology never changed. In
-// one that has changed, slots are left for features that come later.
+// Most features that a leaf gets at a build: as many as it has slots, until update() adds features.
+// From then on a build leaves slots for features that come later.
 constexpr std::size_t full = lanes, with_room = 13;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
