@@ -16,8 +16,9 @@ def table(terms):
     text = PAGE.read_text().partition("## Read `info`")[2]
     lines = next(part for part in text.split("\n\n") if part.startswith("| key")).splitlines()[2:]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    assert all(len(row) == 4 and row[3] for row in cells)
-    shapes = {key.strip("`"): tuple(re.findall(r"\w+", shape)) for key, shape, _, _ in cells}
+    assert all(len(row) == 3 and row[2] for row in cells)
+    names = [re.fullmatch(r"`(\w+)`(?: \((.+)\))?", row[0]).groups("") for row in cells]
+    shapes = {key: tuple(re.findall(r"\w+", shape)) for key, shape in names}
     del shapes["reward_NAME"]
     return shapes | {f"reward_{term}": () for term in terms}
 
