@@ -1,4 +1,4 @@
-"""Costs as libraries of constrained reinforcement learning expect them."""
+"""Costs in the form that libraries of constrained reinforcement learning expect."""
 
 from typing import Any
 
@@ -11,10 +11,9 @@ from tauguard.envs.gym.settings import positive
 
 
 class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """Ends an episode once its costs exceed a budget.
+    """Ends an episode once the sum of its costs exceeds a budget.
 
-    ``info["cost_left"]`` is the rest of the budget, below 0 at the end. ``info["cost_sum"]`` and
-    ``info["cost"]`` are those of the environment.
+    ``info["cost_left"]`` is the rest of the budget; it is below 0 once the budget is exceeded.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], limit: float) -> None:
@@ -25,7 +24,7 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             limit: largest sum of ``info["cost"]`` in an episode [N s]; 0 allows no cost.
 
         Raises:
-            ValueError: below 0 or not finite.
+            ValueError: the limit is below 0 or not finite.
         """
         RecordConstructorArgs.__init__(self, limit=limit)
         gymnasium.Wrapper.__init__(self, env)
@@ -49,18 +48,17 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
 
 
 class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """``step`` returns six values with the cost third, as Safety-Gymnasium's do.
+    """``step`` returns observation, reward, cost, terminated, truncated and info.
 
-    observation, reward, cost, terminated, truncated, info: what OmniSafe, SafePO and others read.
-    ``scale`` turns newton seconds into the unit of their budgets.
+    This is the interface of Safety-Gymnasium, which OmniSafe, SafePO and others use.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], scale: float = 1.0) -> None:
-        """Choose the unit.
+        """Choose the unit of the cost.
 
         Args:
             env: an environment whose ``info`` has a cost.
-            scale: factor on the cost [1/(N s)].
+            scale: factor on the cost, for libraries whose budgets have another unit [1/(N s)].
 
         Raises:
             ValueError: a scale that is not above 0.

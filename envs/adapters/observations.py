@@ -30,8 +30,8 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
     | rgb | (height, width, 3) | uint8 | |
     | depth | (height, width, 1) | float32 | m along the optical axis, at most 10 |
 
-    Needs an OpenGL (without a display the library libegl1 or libosmesa6). The pixels depend on the
-    renderer: they are the same bits on one machine only.
+    It needs OpenGL; without a display this is the library libegl1 or libosmesa6. The pixels depend
+    on the renderer, so they can differ between machines.
     """
 
     def __init__(
@@ -50,8 +50,8 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
             width: width of the pictures [px].
 
         Raises:
-            ValueError: an unknown mode or no pixels.
-            RuntimeError: there is nothing to draw with; the message says what would help.
+            ValueError: an unknown mode, or a height or width below 1.
+            RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         RecordConstructorArgs.__init__(self, mode=mode, height=height, width=width)
         gymnasium.Wrapper.__init__(self, env)
@@ -100,7 +100,7 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
 class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
     """Appends the detector's residual [N m], shape (n,), and its alarm (0 or 1).
 
-    ``info["residual"]`` and ``info["alarm"]`` are the detector's, too.
+    ``info["residual"]`` and ``info["alarm"]`` come from the same detector.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], detector: Any = None) -> None:
@@ -108,11 +108,10 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
 
         Args:
             env: an environment of tauguard.
-            detector: a name, a model file or an object as of the keyword ``detector``; ``None``
-                takes the environment's own.
+            detector: a value of the keyword ``detector``; ``None``: the environment's own detector.
 
         Raises:
-            ValueError: no detector, or one that does not fit.
+            ValueError: there is no detector, or it was trained on another arm or sample rate.
         """
         RecordConstructorArgs.__init__(self, detector=detector)
         gymnasium.Wrapper.__init__(self, env)

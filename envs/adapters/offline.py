@@ -1,4 +1,4 @@
-"""Episodes of a policy as a Minari dataset for offline learning (extra ``export``)."""
+"""Write episodes of a policy as a Minari dataset for offline learning (extra ``export``)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +10,7 @@ import tauguard  # noqa: F401  (registers the environments)
 from tauguard.arrays import Array
 from tauguard.extras import extra
 
-#: Keys of ``info`` that are stored at every step, as ``infos``.
+#: Keys of ``info`` that are stored at every step.
 KEYS = ("cost", "success", "force", "limit_ratio", "tau_ext_peak")
 
 
@@ -26,17 +26,18 @@ def record_policy(
 
     Args:
         name: name of the environment, such as "tauguard/Reach-v0".
-        policy: from an observation to an action.
+        policy: maps an observation to an action.
         dataset: Minari's id, ``namespace/name-v0``.
         episodes: number of episodes; episode i has the seed ``seed + i``.
         seed: seed of the first episode.
         **keywords: keywords of the environment, and ``max_episode_steps``.
 
     Returns:
-        How many episodes there were.
+        The number of episodes.
 
     Raises:
-        ValueError: Minari is not installed or has a dataset of that name, or ``episodes`` is 0.
+        ValueError: Minari is not installed or has a dataset of that name, or ``episodes`` is
+            below 1.
     """
     try:
         import minari
@@ -60,7 +61,7 @@ def record_policy(
 def _episode(
     env: gymnasium.Env[Array, Array], policy: Callable[[Array], Any], number: int, seed: int
 ) -> Any:
-    """One episode; Minari wants one observation, and one row of infos, more than actions."""
+    """Run one episode; it has one observation and one row of infos more than actions."""
     from minari.data_collector import EpisodeBuffer
 
     observation, info = env.reset(seed=seed)

@@ -1,1 +1,1 @@
-"""The Gymnasium core: compiled scenes, batches of simulation states, tasks, single and vector."""
+"""The Gymnasium core: compiled scenes, batches of simulation states, tasks, environments."""

@@ -9,13 +9,13 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.compiled import CompiledScene
 
-#: Largest Cartesian speed [m/s] and angular speed [rad/s]; they limit the increment of an action.
+#: Speed [m/s] and angular speed [rad/s] of the tool at an action of 1 in Cartesian mode.
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5
-#: Range of an action in position mode to both sides of home [rad], within the joint's range.
+#: An action of 1 in position mode is this far from home [rad], or at the end of the joint's range.
 POSITION_REACH = 2.0
-#: For a joint without torque limit an action of 1 is the torque of this servo error [rad].
+#: At a joint without torque limit, an action of 1 is the servo's torque at this error [rad].
 SOFT_LIMIT = 0.1
-#: Bounds of the observation: speed [rad/s], torque where none is known [N m], distance [m].
+#: Bounds of the observation: speed [rad/s, m/s], torque without a known limit [N m], distance [m].
 SPEED_BOUND, TORQUE_BOUND, DISTANCE_BOUND = 100.0, 1e4, 100.0
 
 
@@ -30,7 +30,7 @@ class Entry:
 
 
 def action_table(compiled: CompiledScene) -> list[Entry]:
-    """The values that -1 and 1 mean, entry by entry."""
+    """Name, unit, and meaning of -1 and 1 (``low`` and ``high``) of each entry of an action."""
     centre, scale = action_scale(compiled)
     unit = {
         "current": "A",

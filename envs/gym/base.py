@@ -18,9 +18,9 @@ from tauguard.envs.gym.settings import one_of
 from tauguard.envs.gym.task import Task, build
 from tauguard.models import Scene
 
-#: Why a diverged episode ended.
 DIVERGED_REASON = (
-    "diverged: a position is not finite or a speed beyond 1000; a smaller timestep would hold"
+    "diverged: a position is not finite, or a speed is beyond 1000 rad/s or m/s; use a smaller "
+    "timestep"
 )
 RENDER_MODES = ("rgb_array", "human")
 #: Value of :attr:`StepMetrics.diverged` for an impossible force.
@@ -28,7 +28,7 @@ IMPOSSIBLE = 2
 
 
 class ArmEnv(gymnasium.Env[Array, Array]):
-    """One arm scene as a Gymnasium environment; subclasses name their task.
+    """One arm scene as a Gymnasium environment; each subclass sets ``task_type``.
 
     The keywords are those of :class:`tauguard.envs.gym.settings.Settings` and of the task.
     Every ``info`` has the same keys and shapes. A peak is the largest value over the physics steps
@@ -52,13 +52,13 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     | region_point, region_direction | where [m], and the force's direction, shape (k, 3) |
     | contacts | with checkers: number of pairs that each reported |
 
-    The limit is the transient one; it is the quasi-static one after 0.5 s of contact, or if the
-    region cannot move. In the cost a force counts at most as much as the arm would exert on a
-    person who stands still. Without ``contact_area`` the regions' pressures are estimates, see
-    :attr:`tauguard.envs.gym.regions.RegionInfo.least_pressure`.
+    The limit of a region's force is the transient limit. After 0.5 s of contact, or if the region
+    cannot move, it is the quasi-static limit. In the cost, a force counts at most as much as the
+    arm would exert on a person who stands still. Without ``contact_area`` the regions' pressures
+    are estimates, see :attr:`tauguard.envs.gym.regions.RegionInfo.least_pressure`.
 
-    The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
-    ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
+    The limits follow ISO 10218-2:2025. Some values could not be confirmed from an open source;
+    ``unwrapped.regions`` marks them. A simulated force does not replace a measurement.
     """
 
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
@@ -171,7 +171,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         return self._seen.copy(), reward, over and not diverged, diverged, info
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that the next steps depend on, for :meth:`set_state`; plain arrays."""
+        """Everything that the next steps depend on, as plain arrays, for :meth:`set_state`."""
         return self.batch.get_state(0) | {
             "memory": np.array(self.task.memory),
             "task": self.task.get_state(),
@@ -180,10 +180,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to what :meth:`get_state` gave: the same actions give the same bits again.
+        """Restore a state of :meth:`get_state`; the same actions then give the same bits again.
 
         Raises:
-            ValueError: a state of another environment, or none that :meth:`get_state` gave.
+            ValueError: the state is of another environment, or not from :meth:`get_state`.
         """
         if not isinstance(state, dict) or not {"memory", "task", "rng", "begun"} <= state.keys():
             raise ValueError("state: expected what get_state() gave")
@@ -194,7 +194,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = state["begun"]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Its keywords and state; the window is not copied."""
+        """The keywords and the state of the environment; the window is not copied."""
         return {
             "made": (self.render_mode, self._keywords),
             "spec": self.spec,
@@ -202,7 +202,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        """Make it again and restore the state."""
+        """Make the environment again and restore its state."""
         mode, keywords = saved["made"]
         type(self).__init__(self, mode, **keywords)
         self.spec = saved["spec"]
@@ -268,7 +268,7 @@ def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
 
 
 def divergence(compiled: CompiledScene, kind: float) -> str:
-    """Why the results of a simulation are not valid, by :attr:`StepMetrics.diverged`."""
+    """Why a simulation is not valid; ``kind`` is the value of :attr:`StepMetrics.diverged`."""
     if kind != IMPOSSIBLE:
         return DIVERGED_REASON
     return (

@@ -27,30 +27,30 @@ from tauguard.models import Person
 
 
 class StepMetrics(NamedTuple):
-    """The result of one action: numbers of one copy, or arrays with a number for each copy.
+    """The result of one action: a number per field for one copy, an array per field for several.
 
-    Native code writes the fields, so all are numbers: flags are 0 or 1.
+    Native code writes the fields as numbers; flags are 0 or 1.
     """
 
     time: Any  #: since the episode began [s]
-    distance: Any  #: of the tool from its target, of two tools the larger one [m]
+    distance: Any  #: of the tool from its target [m]; with two tools the larger distance
     force: Any  #: largest force on a link [N]
     cost: Any  #: impulse of the arm beyond the limits of the body regions [N s]
     limit_ratio: Any  #: largest force on a body region divided by its limit
     region_force: Any  #: largest force on a body region [N]
-    onset: Any  #: a collision began
-    onset_time: Any  #: of the latest collision [s]; -1: none yet
+    onset: Any  #: 1: a collision began
+    onset_time: Any  #: time at which the latest collision began [s]; -1: none yet
     link: Any  #: link with the largest force, 1-based; 0: none
     region: Any  #: region with the largest ratio, 1-based; 0: none
     diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
-    speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
-    cost_sum: Any  #: of the costs of the episode's actions so far [N s]
+    speed_ratio: Any  #: largest ratio of a joint's speed to its largest speed, after the action
+    cost_sum: Any  #: sum of ``cost`` over the episode's actions so far [N s]
 
 
-#: The same fields as columns of :attr:`Batch.metrics`.
+#: Fields of :class:`StepMetrics` as columns of :attr:`Batch.metrics`.
 METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
-#: At a physics step: net force on the arm [N]; link (1-based, 0: none), point [m] and force [N] of
-#: the largest force on a link.
+#: Contact of the arm at a physics step: net force on the arm [N]; and of the largest force on one
+#: link, that link (1-based, 0: none), the point [m] and the force [N].
 CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
 #: Position of a body [m], and its orientation as w, x, y, z.
 POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
@@ -59,18 +59,18 @@ assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
 
 
 class Override(IntEnum):
-    """Replacements of an action, by their native codes."""
+    """What the motors do in place of an action; the numbers are the native code's."""
 
-    FREE = 0  #: nothing: the action counts
-    VELOCITY = 1  #: joint velocities
+    FREE = 0  #: the action is not replaced
+    VELOCITY = 1  #: the servo follows joint velocities
     LIMP = 2  #: no power
     BRAKE = 3  #: no power, and brakes
 
 
 #: Arrays of the peak contact on each body region; names in :class:`Batch` and in ``info``.
 TOUCHES = ("region_force", "region_pressure", "region_point", "region_direction")
-#: A snapshot holds MuJoCo's integration state, derived fields that are read before the next physics
-#: step, and the rows of one copy.
+#: A snapshot consists of MuJoCo's integration state, the derived fields that are read before the
+#: next physics step, and the rows of one copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 KEYS = {"scene", "physics", "derived", "plant", "rows", "detector", "drawn"}
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
@@ -79,12 +79,12 @@ ROWS = (
     "q", "qd", "current", "tau", "contact", "region", "tau_peak", *TOUCHES, "alarm_delay",
     "alarm_last", "reaches", "walks",
 )  # fmt: skip
-#: An alarm later than this after the onset does not detect it [s].
+#: A collision counts as detected only by an alarm within this time after its onset [s].
 LATEST = 0.5
 
 
 def _identity(model: mujoco.MjModel) -> str:
-    """SHA-256 of the numbers that tell scenes of equal sizes apart."""
+    """SHA-256 of numbers that differ between scenes, even if their arrays have equal sizes."""
     numbers = (model.body_pos, model.body_mass, model.geom_size, model.geom_pos, model.dof_armature)
     return hashlib.sha256(b"".join(values.tobytes() for values in numbers)).hexdigest()
 
@@ -95,7 +95,7 @@ class Batch:
     Attributes:
         observation: shape (rows, size).
         numbers: results of the last action, one column per field of :class:`StepMetrics`.
-        metrics: the same by name, shape (rows,).
+        metrics: ``numbers`` by field name, shape (rows,).
         tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
         tau_peak: largest external torque of each joint in the last action [N m], (rows, n).
         target: positions of the tools' targets [m], shape (rows, arms, 3).
@@ -223,13 +223,12 @@ class Batch:
             self.sensing[i].reset()
 
     def get_state(self, i: int) -> dict[str, Any]:
-        """Everything that copy ``i`` depends on: physics, drives, rows, detector, checkers."""
+        """The state of copy ``i``: physics, drives, rows, detector and drawn values."""
         data, model = self.datas[i], self.model(i)
         physics = np.empty(mujoco.mj_stateSize(model, STATE))
         mujoco.mj_getState(model, data, physics, STATE)
         listener = self.sensing[i].detector if self.sensing else None
-        # Derived fields must be restored, too: labels and kinematics are read before the next
-        # forward.
+        # Labels and kinematics are read before the next mj_forward, which computes these fields.
         derived = {name: getattr(data, name).copy() for name in DERIVED}
         return {
             "scene": self._scene,
@@ -245,8 +244,8 @@ class Batch:
         """Restore what :meth:`get_state` returned.
 
         Raises:
-            ValueError: a state of another scene, or not one of :meth:`get_state`. Nothing is
-                changed then, unless its arrays are damaged.
+            ValueError: the state is of another scene, or not from :meth:`get_state`. The copy is
+                then unchanged, unless the state's arrays are damaged.
         """
         if not isinstance(state, dict) or not state.keys() >= KEYS:
             raise ValueError("state: expected what get_state() gave")
@@ -315,7 +314,10 @@ class Batch:
         return [one.fault for one in self.sensing] if self.sensing else [""] * self.rows
 
     def _time_alarm(self, i: int, before: bool) -> None:
-        """The delay of the alarm after the onset; an alarm that was up before detects nothing."""
+        """Set the delay of the alarm after the onset.
+
+        Only a rise of the alarm after the onset detects the collision.
+        """
         alarms = self.sensing[i].alarms if self.sensing else np.zeros(0)
         dt, now = self.compiled.settings.timestep, self.metrics["time"][i]
         rises = alarms & ~np.append(before, alarms[:-1])
@@ -325,7 +327,7 @@ class Batch:
             self.alarm_delay[i] = max(0.0, float(delays[found[0]]))
 
     def _checked_step(self, i: int, action: Array) -> None:
-        """A step with contact checkers: each sees every physics step."""
+        """Apply an action and give every physics step to the contact checkers."""
         plant, data, checks = self.plants[i], self.datas[i], self.checks[i]
         plant.begin(action)
         checks.begin(data)
@@ -365,5 +367,5 @@ class Batch:
 
 
 def _numbers(table: NDArray[np.void], i: int) -> Array:
-    """Row ``i`` of a table with named columns, as its plain numbers."""
+    """Row ``i`` of a table with named columns, as plain numbers."""
     return table[i : i + 1].view(np.float64)

@@ -1,4 +1,4 @@
-"""ClothReach-v1: work round a hanging cloth."""
+"""ClothReach-v1: reach targets on both sides of a hanging cloth."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ ASIDE = 0.12
 
 
 class ClothReach(CarefulReach):
-    """Targets on both sides of the sheet in turn, whose straight path goes through it."""
+    """Targets alternate between the two sides of the sheet.
+
+    The straight path from the tool to each target goes through the sheet.
+    """
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
-        """Whether the place is beyond the sheet as seen from the tool, within its width."""
+        """Whether the place is beyond the sheet as seen from the tool, and within its width."""
         compiled = self.batch.compiled
         sheet = compiled.scene.spec.cloth
         if sheet is None:
@@ -43,11 +46,13 @@ class ClothReachEnv(ArmEnv):
     """Go round a hanging cloth to targets on its other side.
 
     Each target lies beyond the sheet as seen from the tool, so that the straight path to it goes
-    through the cloth. Actions are those of Reach-v0; there is no person unless ``obstacles`` says
-    so. The cloth is MuJoCo's; ``cloth=`` takes another :class:`tauguard.models.Cloth` and
-    ``checkers=("rigid",)`` and others from :func:`tauguard.contacts.registered` watch every physics
-    step: ``info["contacts"]`` counts the pairs that each reported. A fast tool can pass through the
-    sheet (contacts of thin things are soft): compare a checker's count with ``info["force"]``.
+    through the cloth. Actions are the same as in Reach-v0. There is no person unless ``obstacles``
+    adds one. MuJoCo simulates the cloth; ``cloth=`` replaces it by another
+    :class:`tauguard.models.Cloth`. ``checkers=("rigid",)``, or other names of
+    :func:`tauguard.contacts.registered`, checks every physics step for contacts:
+    ``info["contacts"]`` is the number of pairs that each checker reported. A fast tool can pass
+    through the sheet, because contacts of thin bodies are soft. To find out, compare a checker's
+    count with ``info["force"]``.
 
     ## Observations (n joints; 3 n + 6 numbers, then the body regions as in Reach-v0)
 
@@ -64,14 +69,14 @@ class ClothReachEnv(ArmEnv):
     | term | value |
     |---|---|
     | progress | how much nearer the tool came [m] |
-    | target | 1 within 3 cm of the target; then comes the next |
-    | contact | -1 for each second at 100 N or more on a link, less force less |
+    | target | 1 within 3 cm of the target, which is then replaced by the next |
+    | contact | -1 per second at 100 N or more on a link; proportional below 100 N |
     """
 
     task_type = ClothReach
 
 
 class ClothReachVectorEnv(VectorArmEnv):
-    """Many ClothReach-v1 at once; see :class:`ClothReachEnv`."""
+    """Several copies of ClothReach-v1; see :class:`ClothReachEnv`."""
 
     task_type = ClothReach

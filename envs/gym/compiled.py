@@ -32,9 +32,10 @@ from tauguard.models import (
     without_losses,
 )
 
-#: Least height of a target and least distance from the base's axis [m]; for a short arm both as
-#: fractions of the reach.
-LOWEST, NEAREST, SHORT = 0.12, 0.2, (0.25, 0.4)
+#: Least height of a target and its least distance from the base's axis [m].
+LOWEST, NEAREST = 0.12, 0.2
+#: Least height and least distance as fractions of the reach; for a short arm these are smaller.
+SHORT = (0.25, 0.4)
 #: Least reach of an arm [m].
 LEAST_REACH = 0.02
 #: Tolerance of the conjugate gradients for a cloth's edges; it changes forces by 1e-4.
@@ -43,10 +44,11 @@ CLOTH_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class ForceBound:
-    """Largest force [N] of an arm against a contact of stiffness k, from the energy E in it.
+    """Largest force F [N] of an arm on a contact of stiffness k: F^2 / (2 k) = E.
 
-    F^2 / (2 k) = E. ``moving`` comes from the arm's kinetic energy at its largest speeds; a faster
-    arm has more. ``driven`` comes from its drives, its load, and the body that runs into it. See
+    E is the energy that can go into the contact. ``moving`` follows from the arm's kinetic energy
+    at its largest speeds, with its load. ``driven`` follows from the work of its drives and the
+    kinetic energy of a body region that runs into it. See
     :func:`tauguard.models.derive.largest_energy`.
     """
 
@@ -61,7 +63,7 @@ class ForceBound:
 
 @dataclass(frozen=True)
 class CompiledScene:
-    """A scene, and what the controller and the observation need to know about it."""
+    """A scene, and the data about it that the controller and the observation use."""
 
     __repr__ = in_a_line
 
@@ -77,7 +79,7 @@ class CompiledScene:
     tools: tuple[tuple[int, int, int], ...]  #: for each arm: site or -1, body, first joint
     regions: tuple[RegionInfo, ...]
     people: tuple[Person, ...]
-    blocked: Array  #: what they walk round, see :func:`tauguard.envs.gym.placing.blocked_ground`
+    blocked: Array  #: areas that people avoid: :func:`tauguard.envs.gym.placing.blocked_ground`
     force_bound: ForceBound
     layout: Layout  #: the arm's reach, and how things were placed
 
@@ -107,17 +109,18 @@ def compile_scene(
     moved: Mapping[str, float] = MappingProxyType({}),
     default: frozenset[str] = frozenset(),
 ) -> CompiledScene:
-    """Compile what ``settings`` ask for, and nothing else.
+    """Compile the scene that ``settings`` describe.
 
     Args:
         settings: the keywords of the environment.
-        places: places of things that are given by name.
+        places: places of body regions and people that are given by name.
         arms: number of arms, 1 or 2.
         moved: see :attr:`tauguard.envs.gym.placing.Layout.moved`.
-        default: those of "table" and "cloth" that are defaults, which are fitted to the arm.
+        default: "table", "cloth" or both, if they are the task's defaults: those are fitted to the
+            arm.
 
     Raises:
-        ValueError, FileNotFoundError: a robot that cannot be used.
+        ValueError, FileNotFoundError: the robot cannot be used.
     """
     plain = SceneSpec(
         timestep=settings.timestep,
@@ -153,7 +156,8 @@ def compile_scene(
         data = mujoco.MjData(scene.model)
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
     if settings.cloth is not None and settings.cloth.young is None:
-        # Newton's method factors a matrix of all edges at each step, which is slower by a third.
+        # Newton's method, MuJoCo's default, factors a matrix of all edges at each step. With it a
+        # step takes a third longer.
         scene.model.opt.solver = mujoco.mjtSolver.mjSOL_CG
         scene.model.opt.tolerance = CLOTH_TOLERANCE
     # A diverged state must stay visible; MuJoCo would restart it at the origin.
@@ -262,9 +266,9 @@ def tool_position(compiled: CompiledScene, data: mujoco.MjData, arm: int = 0) ->
 
 
 def arm_reach(scene: Scene) -> float:
-    """Largest distance from the first joint to the last link over 200 fixed random poses [m].
+    """Largest distance [m] from the first joint to the last link over 200 fixed random poses.
 
-    If that link only turns in place, the reach is the size of its shapes.
+    If the last link only turns in place, the reach is the size of its shapes.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     rng = np.random.default_rng(0)
@@ -284,7 +288,7 @@ def arm_reach(scene: Scene) -> float:
 
 
 def pose_box(scene: Scene) -> tuple[Array, Array]:
-    """Poses to draw from: around home, within the joints' ranges [rad], shapes (n,)."""
+    """Lower and upper end of the random poses: around home, within range [rad], shapes (n,)."""
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
     spread = np.resize(scene.facts.spread, len(joints))

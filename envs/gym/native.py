@@ -1,4 +1,4 @@
-"""A compiled scene as the native plant takes it."""
+"""Conversion of a compiled scene into the arguments of the native plant."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tauguard.models.scene import people_parts
 
 
 def controls(compiled: CompiledScene) -> _plant.Controls:
-    """What an action means."""
+    """The control mode, and the scale and limits of actions."""
     settings = compiled.settings
     centre, scale = action_scale(compiled)
     return _plant.Controls(
@@ -74,7 +74,7 @@ def surroundings(
 
 
 def _boxes(model: mujoco.MjModel, geoms: list[int]) -> Array:
-    """Centre and half extents of geoms in their own frames [m], (k, 6); a plane has no end."""
+    """Centre and half extents of geoms in their own frames [m], (k, 6); a plane is infinite."""
     boxes: Array = model.geom_aabb[geoms].reshape(-1, 6)
     boxes[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_PLANE, 3:] = np.inf
     return boxes

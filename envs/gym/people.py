@@ -1,4 +1,4 @@
-"""The motions of a person in an episode; native code plays them."""
+"""Draw the motions of a person in an episode; native code carries them out."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ from tauguard.models import Person
 from tauguard.models.person import SEGMENTS
 
 assert len(SEGMENTS) == _plant.PERSON_SEGMENTS
-#: Number of reaches of each hand and of places to walk to in a script, which then repeats.
+#: Number of reaches per hand, and of walks, in a script; at its end the script repeats.
 REACHES, WALKS = 24, 8
-#: Time between two reaches, and at the goal [s].
+#: Range of the time between two reaches, and of the hand's time at its goal [s].
 PAUSE, HOLD = (0.2, 1.5), (0.2, 1.0)
-#: Time at work and away [s]; distance of the other place, to the side and behind [m].
+#: Range of the time at the work place, and away from it [s].
 STAY, AWAY = (3.0, 8.0), (1.0, 3.0)
+#: Range of the distance of the place away: to the side of the work place, and behind it [m].
 ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
-#: Least distance of a walk from tables and objects (or that of the work place, if smaller) [m];
-#: number of draws after which a walk is left out; longest step back [m].
-CLEAR, DRAWN, STEP_BACK = 0.3, 20, 0.3
+#: Least distance of a walk from tables and objects [m]; smaller if the work place is closer.
+CLEAR = 0.3
+DRAWN = 20  #: number of draws for one walk, after which it is left out
+STEP_BACK = 0.3  #: longest step back [m]
 #: No obstacles to walk around.
 NOWHERE: Array = np.zeros((0, 4))
-#: Range of a reach ahead and to the side, in units of the arm's length, and above the hips [m].
+#: Range of a reach: ahead and to the side [arm's length], and above the hips [m].
 AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
 
 
@@ -68,7 +70,8 @@ def draw_script(
 ) -> tuple[Array, Array]:
     """Draw the motions of one episode: reaches (2, rows, 5) and walks (rows, 3).
 
-    A reach: wait [s], place [m], hold [s]. A walk: stay there [s], place [m].
+    The columns of a reach are wait [s], place (3) [m] and hold [s]. The columns of a walk are the
+    time at its place [s] and the place (2) [m].
 
     Args:
         person: the person.
@@ -91,7 +94,7 @@ def draw_script(
     away = np.arange(WALKS) % 2 == 1
 
     def spots(count: int) -> Array:
-        """Away and at work, shape (count, 2, 2)."""
+        """Places at work (row 0) and away from it (row 1) [m], shape (count, 2, 2)."""
         aside = rng.uniform(*ASIDE, count) * rng.choice([-1.0, 1.0], count)
         shift = np.outer(aside, left) - np.outer(rng.uniform(*BEHIND, count), forward)
         near = rng.normal(0.0, 0.03, (count, 2))
@@ -101,7 +104,7 @@ def draw_script(
     drawn[0] = person.position
     for k in range(1, WALKS if len(blocked) else 0):
         last = drawn[k - 1]
-        # From every place there is a path to the first one, where the script repeats.
+        # The last candidate is the work place, with which the script begins again.
         tries = [drawn[k], *spots(DRAWN)[:, int(away[k])], drawn[0]]
         free = (p for p in tries if _clear(person, blocked, p) and _clear(person, blocked, p, last))
         drawn[k] = next(free, last)

@@ -15,27 +15,29 @@ from tauguard.models.scene import people_parts
 
 Vector = tuple[float, float, float]
 
-#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
+#: Line on which each body region crosses the workspace: position [reach] and direction.
 LINES = {
     "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
     "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
     "upper_arm": ((0.75, -0.10, 0.45), (1.0, 0.3, 0.0)),
     "chest": ((0.95, 0.0, 0.45), (0.2, 1.0, 0.0)),
 }
-#: Any other region's.
+#: The line of any other region.
 OTHER_LINE = ((0.85, 0.0, 0.50), (0.0, 1.0, 0.0))
 #: Distance of a person's hips from the arm [reach], and the least distance [m].
 OPPOSITE, NEAREST_PERSON = 0.9, 0.6
-#: Reach of the arm for which tables, cloths and second arms are placed in metres [m].
+#: Reach of the package's arm [m]; the places of tables, cloths and second arms are stated for it.
 USUAL_REACH = 1.146
 #: Names of a second arm's parts begin with this.
 SECOND = "arm2_"
-#: Step by which an overlapping thing is moved [m], more for a long arm; largest number of steps.
-STEP, MOVES = 0.05, 16
-#: An arm whose first joint is higher above its floor than this [reach] stands on a pedestal; one
-#: that works below that joint hangs from this height [reach].
-SHOULDER, HANGING = 0.5, 1.1
-#: People may stand this far within a table or an object [m].
+#: Step by which an overlapping table, person or object is moved [m]; longer for a long arm.
+STEP = 0.05
+MOVES = 16  #: largest number of such steps
+#: If the first joint is higher above the floor than this [reach], the arm stands on a pedestal.
+SHOULDER = 0.5
+#: Height of the first joint above the floor, if the arm works below that joint [reach].
+HANGING = 1.1
+#: People may overlap a table or an object by this depth [m].
 LEANING = 0.01
 #: Spacing of checked places along an object's path, and clearance for people's sway [m].
 ALONG, ROOM = 0.05, 0.1
@@ -44,7 +46,7 @@ CENTRED = 0.1
 
 
 class StartsInContact(ValueError):
-    """An episode cannot begin because the arm overlaps something; ``kind`` is what it overlaps."""
+    """An episode cannot begin because two bodies overlap; ``kind`` says what must be moved."""
 
     def __init__(self, kind: str, link: str, other: str, depth: float) -> None:
         """Name the pair."""
@@ -57,19 +59,19 @@ class StartsInContact(ValueError):
 
 @dataclass(frozen=True)
 class Layout:
-    """Places of the things that were asked for by name."""
+    """Places of body regions, people, tables, cloths and second arms around an arm."""
 
     reach: float  #: of the arm [m]
-    own: bool = True  #: the arm of the package, for which places are stated in metres
+    own: bool = True  #: it is the package's arm, for which places are stated in metres
     moved: Mapping[str, float] = field(default_factory=dict)
-    """How far each kind of thing moves to be clear of the arm [m]: "person", "cloth" and body
-    regions away from the base, "table" down, "second arm" away."""
-    base: Vector = (0.0, 0.0, 0.0)  #: of the arm, on the floor that it works above [m]
-    quarter: int = 0  #: the arm works along x, y, -x or -y
+    """How far each kind is moved to be clear of the arm [m]: "table" down, "person", "cloth",
+    "second arm" and body regions away from the base."""
+    base: Vector = (0.0, 0.0, 0.0)  #: place of the arm's base on its floor [m]
+    quarter: int = 0  #: direction in which the arm works: 0: x, 1: y, 2: -x, 3: -y
 
     @classmethod
     def of(cls, bare: Scene, reach: float, moved: Mapping[str, float]) -> Layout:
-        """The layout of an arm: where it stands, and which way it faces at home."""
+        """The layout of an arm from its place and from the direction that it faces at home."""
         if bare.facts.name in cura6.NAMES:
             return cls(reach, True, moved)
         model, data = bare.model, mujoco.MjData(bare.model)
@@ -90,22 +92,22 @@ class Layout:
 
     @property
     def yaw(self) -> float:
-        """Which way the arm faces, about z [rad]."""
+        """Angle about z of the direction that the arm faces [rad]."""
         return self.quarter * np.pi / 2
 
     def turn(self, direction: Vector) -> Vector:
-        """A direction in the arm's frame, in the world."""
+        """Transform a direction from the arm's frame to the world."""
         x, y, z = direction
         x, y = ((x, y), (-y, x), (-x, -y), (y, -x))[self.quarter]
         return x, y, z
 
     def at(self, place: Vector) -> Vector:
-        """A place in the arm's frame, in the world [m]."""
+        """Transform a place from the arm's frame to the world [m]."""
         x, y, z = self.turn(place)
         return x + self.base[0], y + self.base[1], z + self.base[2]
 
     def ahead(self, place: Array) -> tuple[float, float]:
-        """A place in the world, ahead of the arm and to its left [m]."""
+        """How far a place in the world is ahead of the arm's base, and to its left [m]."""
         x, y = float(place[0]) - self.base[0], float(place[1]) - self.base[1]
         return ((x, y), (y, -x), (-x, -y), (-y, x))[self.quarter]
 
@@ -169,17 +171,17 @@ class Layout:
         return self.scale * distance + self.moved.get("second arm", 0.0)
 
     def second_arm(self, distance: float) -> Vector:
-        """Where the frame of a second arm is that faces the first: the world turned by pi [m]."""
+        """Place of a second arm that faces the first [m]; its frame is turned by pi about z."""
         x, y, _ = self.at((self.apart(distance), 0.0, 0.0))
         return x + self.base[0], y + self.base[1], 0.0
 
 
 class Usual:
-    """The places of things that were asked for by name, unless a task defines others."""
+    """The places of body regions and people given by name; a task can define others."""
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, layout: Layout) -> BodyProxy:
-        """A body region that was asked for by name."""
+        """The body region of this name."""
         return layout.crossing(region)
 
     @classmethod
@@ -191,7 +193,7 @@ class Usual:
 def check_clear(
     scene: Scene, model: mujoco.MjModel, scratch: mujoco.MjData, data: mujoco.MjData
 ) -> None:
-    """Check that the arm overlaps nothing.
+    """Check that the arm overlaps nothing, and that people overlap no table or object.
 
     Args:
         scene: the simulated scene.
@@ -200,7 +202,7 @@ def check_clear(
         data: the state.
 
     Raises:
-        StartsInContact: it overlaps something; the message has the deepest overlap.
+        StartsInContact: two bodies overlap; the message names them and the depth.
     """
     for name in ("qpos", "mocap_pos", "mocap_quat"):
         getattr(scratch, name)[:] = getattr(data, name)
@@ -233,7 +235,7 @@ def check_clear(
 
 
 def things_around(scene: Scene, model: mujoco.MjModel) -> list[int]:
-    """The geoms of the table and of objects, which people do not touch in the simulation."""
+    """The geoms of the table and of objects. People do not collide with them in the simulation."""
     spec = scene.spec
     around = [model.geom("table").id] if spec.table is not None else []
     bodies = {model.body(obj.name).id for obj in spec.objects if obj.touchable}
@@ -243,7 +245,7 @@ def things_around(scene: Scene, model: mujoco.MjModel) -> list[int]:
 
 
 def blocked_ground(scene: Scene) -> Array:
-    """Areas that people avoid: least x and y, largest x and y of each geom [m], (k, 4)."""
+    """Areas that people avoid: smallest x and y, largest x and y of each geom [m], (k, 4)."""
     model, data = scene.model, mujoco.MjData(scene.model)
     mujoco.mj_forward(model, data)
     paths = {model.body(o.name).id: np.array(o.path)[:, 1:3] for o in scene.spec.objects if o.path}
@@ -264,7 +266,7 @@ def blocked_ground(scene: Scene) -> Array:
 def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
     """Check that people overlap no table or object, and stand in no object's path.
 
-    Arms yield to what moves, so they may be in a path.
+    The arms of people give way to moving objects, so they may be in a path.
     """
     spec, around = scene.spec, things_around(scene, model)
     paths = {model.body(o.name).id: o.places(ALONG) for o in spec.objects if o.path}

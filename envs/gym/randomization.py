@@ -1,4 +1,4 @@
-"""Quantities that differ between episodes: distributions, and their effect on one copy."""
+"""Quantities that are drawn for each episode: distributions, and their effect on one copy."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class Uniform:
-    """Uniform between ``low`` and ``high``; a pair of numbers is short for it."""
+    """Uniform between ``low`` and ``high``; a pair of numbers means the same."""
 
     low: float
     high: float
@@ -73,7 +73,7 @@ Distribution = Normal | Uniform | Choice
 
 @dataclass(frozen=True)
 class Parameter:
-    """A quantity that can be drawn: its meaning and its range."""
+    """A quantity that ``randomize`` can draw: its meaning and its range."""
 
     meaning: str
     low: float
@@ -100,7 +100,7 @@ def distributions(given: Mapping[str, Any]) -> dict[str, Distribution]:
     """The keyword ``randomize``, checked.
 
     Raises:
-        ValueError: an unknown name, or values that cannot be; the message says what would work.
+        ValueError: an unknown name or a value out of range; the message says what would work.
     """
     if not isinstance(given, Mapping):
         raise ValueError(
@@ -139,7 +139,7 @@ def _distribution(name: str, value: Any) -> Distribution:
 
 
 def _numbers(value: Any) -> Array:
-    """One or several numbers; none for anything else."""
+    """The number or numbers in ``value``, shape (k,); shape (0,) if it is anything else."""
     try:
         row = np.atleast_1d(np.asarray(value, dtype=np.float64))
     except (TypeError, ValueError):
@@ -156,25 +156,25 @@ def _in_range(where: str, name: str, values: Array) -> None:
 def check_names(
     names: Iterable[str], people: tuple[Person, ...], checkers: tuple[str, ...]
 ) -> None:
-    """Whether the scene has what is drawn.
+    """Check that the scene has what ``randomize`` draws.
 
     Raises:
-        ValueError: it has not; the message names the first.
+        ValueError: a quantity of people without a person, or stature with checkers.
     """
     for name in names:
         if name in _OF_PERSON and not people:
             raise ValueError(f"randomize: {name!r} without a person; add obstacles=('person',)")
         if name == "stature" and checkers:
             raise ValueError(
-                "randomize: 'stature' with checkers, which know one size of the person only"
+                "randomize: 'stature' with checkers: they support only one size of the person"
             )
 
 
 def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -> None:
-    """Whether ``reset(options=...)`` can be: names of ``randomize``, values in their range.
+    """Check the names and values of ``reset(options=...)``.
 
     Raises:
-        ValueError: an unknown name or a value that cannot be.
+        ValueError: a name that ``randomize`` lacks, or a value out of range.
     """
     for name, value in given.items():
         if name not in known:
@@ -194,7 +194,10 @@ def draw(
     rng: np.random.Generator,
     stated: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """The values of one episode; stated values replace drawn ones, which are drawn all the same."""
+    """The values of one episode; ``stated`` values replace drawn ones.
+
+    All values are drawn, so that ``stated`` does not change later draws.
+    """
     n, found = len(compiled.scene.joint_names), {}
     for name, spread in known.items():
         size = n if PARAMETERS[name].each else 1
@@ -210,7 +213,7 @@ def draw(
 
 @dataclass
 class Variant:
-    """Model, drive and people of one copy, in place of the compiled scene's."""
+    """Model, drive and people of one copy; they replace those of the compiled scene."""
 
     model: mujoco.MjModel
     drive: Drive
@@ -218,7 +221,7 @@ class Variant:
 
 
 def vary(compiled: CompiledScene, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Variant:
-    """Put drawn values into ``model``, the model of one copy."""
+    """Write the drawn values into ``model``, the model of one copy."""
     base = compiled.scene.model
     _weigh(compiled.scene, base, model, drawn)
     own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}

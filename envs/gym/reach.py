@@ -15,21 +15,23 @@ from tauguard.envs.gym.compiled import LOWEST, NEAREST, SHORT, pose_box, tool_po
 from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 
-#: Distance at which a target counts as reached [m], and its reward.
-TOLERANCE, BONUS = 0.03, 1.0
-#: A contact at this force [N] or above costs as much in a second as a target earns.
+TOLERANCE = 0.03  #: distance at which a target counts as reached [m]
+BONUS = 1.0  #: reward for a reached target
+#: One second of contact at this force or more costs as much reward as a target gives [N].
 CONTACT_FORCE = 100.0
 #: Largest distance of the initial pose from home, by joint [rad].
 START_SPREAD = 0.1
+CANDIDATES = 6  #: number of candidates for the next target
 #: Probability that the next target is the candidate whose straight path passes closest to the
-#: person, and number of candidates. With the same probability their hand moves onto the path.
-NEAR_PERSON, CANDIDATES = 0.5, 6
-#: The hand moves to a place between these fractions of the path, with this standard deviation [m],
-#: and stays there for this time [s].
-HAND_FRACTION, HAND_DEVIATION, HAND_STAYS = (0.4, 1.0), 0.03, 0.6
+#: person. With the same probability the person's hand moves onto the path.
+NEAR_PERSON = 0.5
+#: The hand moves to a place between these fractions of the path.
+HAND_FRACTION = (0.4, 1.0)
+HAND_DEVIATION = 0.03  #: standard deviation of that place [m]
+HAND_STAYS = 0.6  #: time for which the hand stays there [s]
 #: Least distance of a target from the tool [m].
 APART = 0.1
-#: Tolerance and least distance for a short arm, as fractions of its reach.
+#: Tolerance, and least distance of a target from the tool, for a short arm [reach].
 SHORT_TOLERANCE, SHORT_APART = 0.1, 0.33
 
 
@@ -83,7 +85,7 @@ class Reach(Task):
         self.memory[i] = batch.metrics["distance"][i]
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
-        """Start each region in the outer part of its line, moving to the middle at its speed."""
+        """Start each region in the outer half of its line; it moves to the middle at its speed."""
         data = self.batch.datas[i]
         qpos, qvel = data.qpos, data.qvel
         for crossing in self._crossings:
@@ -93,7 +95,7 @@ class Reach(Task):
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, i: int, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
-        """Draw a place [m] that the tool can reach, at least 0.1 m from ``apart``."""
+        """Draw a place [m] that the tool can reach, with the least distance from ``apart``."""
         compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
@@ -128,7 +130,7 @@ class Reach(Task):
             batch.plants[i].aim(place, HAND_STAYS)
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Progress and bonus, without an end. The memory is the last distance [m]."""
+        """Progress and bonus; the task never ends. The memory is the last distance [m]."""
         reached = step.distance < self.tolerance
         rewards = {"progress": memory - step.distance, "target": BONUS * reached}
         return Outcome(rewards, reached, step.distance)
@@ -145,12 +147,12 @@ class Reach(Task):
 
 
 class CarefulReach(Reach):
-    """Reach in which contacts cost: the peak force of each action times its duration."""
+    """Reach with a cost of contacts: the peak force of each action times its duration."""
 
     terms: ClassVar[tuple[str, ...]] = ("progress", "target", "contact")
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """As :class:`Reach`, minus force over :data:`CONTACT_FORCE` (at most 1) per second."""
+        """As :class:`Reach`, minus force / :data:`CONTACT_FORCE` (at most 1) per second."""
         outcome = super().score(step, memory)
         period = 1 / self.batch.compiled.settings.control_rate
         hard = step.force / CONTACT_FORCE
@@ -168,9 +170,9 @@ def _clearance(begin: Array, end: Array, points: Array) -> float:
 class ReachEnv(ArmEnv):
     """Bring the tool to places beside a person who works, reaches into the path and walks.
 
-    The straight path to half of the targets passes close to the person, and half of the times the
-    person's hand moves onto the path: a policy that ignores people hits them. A single body region
-    that crosses the workspace is ``obstacles=("hand",)``.
+    For half of the targets the straight path passes close to the person. For half of the targets
+    the person's hand moves onto the path. A policy that ignores people therefore hits them. With
+    ``obstacles=("hand",)`` only a hand crosses the workspace, and there is no person.
 
     ## Actions (joint velocity, the default; n joints)
 
@@ -184,9 +186,9 @@ class ReachEnv(ArmEnv):
     | "torque" | n | largest torque [N m] on top of gravity compensation |
     | "joint_velocity" | n | largest speed [rad/s], servo-controlled |
     | "joint_position" | n | 2 rad from home or the end of its range, at largest speed |
-    | "cartesian" | 6 | tool: 0.5 m/s along and 1.5 rad/s about x, y, z, a step's worth |
+    | "cartesian" | 6 | motion of the tool in one step: 0.5 m/s along, 1.5 rad/s about x, y, z |
 
-    ``unwrapped.batch.actions`` and ``unwrapped.batch.observations`` are these tables with numbers.
+    ``unwrapped.batch.actions`` and ``unwrapped.batch.observations`` list the entries with numbers.
 
     ## Observations (n joints, k body regions; 3 n + 6 + 6 k numbers)
 
@@ -202,14 +204,15 @@ class ReachEnv(ArmEnv):
 
     ## Reward, end and cost
 
-    The reward is how much nearer the tool came [m], and 1 within 3 cm of the target; then the next
-    target appears. An episode has 1000 steps. ``info["cost"]`` is the price of hitting somebody.
+    The reward is how much nearer the tool came [m], plus 1 when it is within 3 cm of the target.
+    Then the next target appears. An episode has 1000 steps. ``info["cost"]`` is the impulse on
+    people beyond the limits [N s].
     """
 
     task_type = Reach
 
 
 class ReachVectorEnv(VectorArmEnv):
-    """Many Reach-v0 at once; see :class:`ReachEnv`."""
+    """Several copies of Reach-v0; see :class:`ReachEnv`."""
 
     task_type = Reach

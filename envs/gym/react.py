@@ -1,4 +1,4 @@
-"""React-v1: work goes on where somebody stands on the path."""
+"""React-v1: move along a path on which a person stands."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import BodyProxy, Person, Scene
 
-#: The path goes along y through the tool's place at home; its lengths before and behind it [m].
+#: Lengths of the path before and behind the tool's place at home [m].
 RUN_UP, BEYOND = 0.25, 0.25
-#: The upward direction.
-UP = np.array([0.0, 0.0, 1.0])
-#: Approximate radii of the ball that is hit, and of the last link around its tool [m].
-BALL, LINK = 0.07, 0.05
-#: The path varies by this much across its direction [m].
+UP = np.array([0.0, 0.0, 1.0])  #: upward direction
+BALL = 0.07  #: radius of the ball that stands for a body region [m]
+LINK = 0.05  #: approximate radius of the last link around the tool [m]
+#: Largest random shift of the path across its direction, in each of two directions [m].
 ASIDE = 0.02
-#: Distance from the end at which the path is done [m]; weights of the terms of the reward.
-DONE, DONE_PRIZE, LIMIT_PRICE, IMPULSE_PRICE, TIME_PRICE = 0.03, 1.0, 1.0, 1.0, 0.1
-#: The region stands within this fraction of the run-up around the tool's place at home.
+DONE = 0.03  #: distance from the end at which the path is done [m]
+#: Weights of the terms of the reward.
+DONE_PRIZE, LIMIT_PRICE, IMPULSE_PRICE, TIME_PRICE = 1.0, 1.0, 1.0, 0.1
+#: Largest random shift of a body region along the path, as a fraction of ``RUN_UP``.
 WHERE = 0.5
 #: Number of steps of the inverse kinematics from home to the start of the path.
 ROUNDS = 30
@@ -59,7 +59,7 @@ class React(Task):
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, layout: Layout) -> BodyProxy:
-        """On the path, free to move along it."""
+        """A body region on the path that is free to move along it."""
         tool, along = home_swing(bare, layout.own)
         away = max(1.0, layout.scale) * LINK + BALL + layout.moved.get(region, 0.0)
         x, y, z = (tool + away * along).tolist()
@@ -67,7 +67,7 @@ class React(Task):
 
     @classmethod
     def person(cls, bare: Scene, layout: Layout) -> Person:
-        """Stands with hanging arms, the chest on the path."""
+        """A person who stands with hanging arms and the chest on the path."""
         tool, along = home_swing(bare, layout.own)
         facing = -np.pi / 2 if layout.own else float(np.arctan2(-along[1], -along[0]))
         someone = Person(motion="still", facing=facing)
@@ -76,7 +76,7 @@ class React(Task):
         return replace(someone, position=(x, y), floor=z - someone.chest_height())
 
     def start(self, i: int, rng: np.random.Generator) -> None:
-        """At the beginning of the path; the region stands somewhere along it."""
+        """Place the tool at the beginning of the path, and the region somewhere along it."""
         batch, region = self.batch, self.batch.compiled.regions[0]
         begin = self._meeting + rng.uniform(-ASIDE, ASIDE, 2) @ self._across
         begin -= self._run_up * self.along
@@ -123,8 +123,8 @@ class React(Task):
 def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:
     """Position of the tool at home [m], and direction of its swing, shapes (3,).
 
-    The package's arm swings along y; any other horizontally, across the line from its first joint
-    to its tool, so that no other link is on the path.
+    The package's arm swings along y. Any other arm swings horizontally, at a right angle to the
+    line from its first joint to its tool, so that no other link is on the path.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[scene.qpos_adr] = scene.home
@@ -140,12 +140,12 @@ def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:
 
 
 class ReactEnv(ArmEnv):
-    """Bring the tool along a path on which somebody stands, without hurting them.
+    """Bring the tool along a path on which a person stands, without exceeding a force limit.
 
-    The tool begins at one end of a straight path of 0.5 m; a body region, the chest unless
-    ``obstacles`` says otherwise, stands on it and slides away when it is pushed. Standing still
-    reaches nothing, going fast exceeds the region's limit: the arm has to arrive gently, yield, and
-    go on.
+    The tool begins at one end of a straight path of 0.5 m. A body region stands on the path and
+    slides away when it is pushed; it is the chest unless ``obstacles`` names another. An arm that
+    stands still does not reach the end, and a fast arm exceeds the region's limit. The arm has to
+    touch the region slowly, give way, and go on.
 
     ## Actions (joint velocity, the default; n joints)
 
@@ -153,7 +153,7 @@ class ReactEnv(ArmEnv):
     |---|---|---|---|
     | 0 .. n-1 | velocity of joint i | -1 to 1 | the joint's largest speed [rad/s] |
 
-    The other control modes are those of Reach-v0.
+    The other control modes are the same as in Reach-v0.
 
     ## Observations (n joints, one body region; 3 n + 12 numbers)
 
@@ -172,16 +172,16 @@ class ReactEnv(ArmEnv):
     | term | value |
     |---|---|
     | progress | how much nearer the tool came to the path's end [m] |
-    | done | 1 within 3 cm of it; this ends the episode as a success |
+    | done | 1 within 3 cm of the path's end; this ends the episode as a success |
     | limit | -1 for a force above the region's limit; this ends the episode |
-    | impulse | -1 for each second at the limit, less force less |
-    | time | -0.1 a second |
+    | impulse | -1 per second at the limit; proportional to the force |
+    | time | -0.1 per second |
     """
 
     task_type = React
 
 
 class ReactVectorEnv(VectorArmEnv):
-    """Many React-v1 at once; see :class:`ReactEnv`."""
+    """Several copies of React-v1; see :class:`ReactEnv`."""
 
     task_type = React

@@ -11,11 +11,12 @@ from tauguard.models import BodyProxy, Person, Scene, SceneObject
 from tauguard.models.person import PersonPart
 from tauguard.models.scene import people_parts
 
-#: Distance from the middle of its line at which a region turns back, in units of the reach.
+#: Distance from the middle of its line at which a region turns back [reach].
 SPAN = 0.6
-#: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
-#: a torso at less.
-HAND_SPEED, BODY_SPEED = 0.8, 0.3
+#: Speed at which a hand, an arm or another light region crosses [m/s]. A person's hand at work
+#: moves at up to 1.6 m/s (ISO 13855).
+HAND_SPEED = 0.8
+BODY_SPEED = 0.3  #: speed at which a region of more than 5 kg crosses [m/s]
 #: Speed of a free object after a fall of one metre [m/s].
 FALL_SPEED = 4.5
 
@@ -29,26 +30,26 @@ class RegionInfo:
     joint: int  #: -1: held in place
     quasi_static: float  #: limit [N]
     transient: float  #: limit [N]; 0: no impact is allowed
-    mocap: int  #: of the frame that a person moves; -1: not of a person
-    held: bool  #: cannot move away: its limit is the quasi-static one
+    mocap: int  #: mocap index of the frame that moves a person's region; -1: not of a person
+    held: bool  #: the region cannot move away, so its limit is the quasi-static one
     stiffness: float  #: of its contact [N/m]
     radius: float  #: [m]
-    span: float  #: [m]
-    speed: float  #: [m/s]
+    span: float  #: distance from the middle of its line at which it turns back [m]
+    speed: float  #: along its line or path [m/s]
     unconfirmed: tuple[str, ...]  #: values that no open source confirmed
 
     @property
     def least_pressure(self) -> float:
-        """Mean pressure of a flat surface on a round region [N/cm^2], where no area is known.
+        """Mean pressure of a flat surface on the round region [N/cm^2], for an unknown area.
 
-        The surface touches it in a circle, at the depth that its stiffness allows: pi radius F / k
-        (Hertz' geometry). The estimate is low, since a robot's edge presses harder.
+        At depth d = F / k a plane touches a sphere in a circle of area pi radius d (Hertz'
+        geometry), so F / area = k / (pi radius). The edge of a robot presses harder.
         """
         return self.stiffness / (np.pi * self.radius) / 1e4
 
 
 def fastest(region: RegionInfo, people: tuple[Person, ...]) -> float:
-    """Largest speed at which a region may meet the arm [m/s]."""
+    """Largest speed of a region when it meets the arm [m/s]."""
     if region.mocap < 0:
         return region.speed
     limb = region.name.endswith(("hand", "arm"))
@@ -113,7 +114,7 @@ def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
         mocap=-1,
         held=obj.motion == "fixed",
         stiffness=obj.stiffness,
-        radius=math.inf,  # a pressure is estimated on people only
+        radius=math.inf,  # pressure is estimated only on people
         span=0.0,
         speed=_path_speed(obj),
         unconfirmed=(),
@@ -121,7 +122,7 @@ def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
 
 
 def _path_speed(obj: SceneObject) -> float:
-    """Largest speed along a path [m/s]; for a free object its speed after a fall."""
+    """Largest speed of an object along its path, or after a fall if it is free [m/s]."""
     if not obj.path:
         return FALL_SPEED if obj.motion == "free" else 0.0
     rows = np.array(obj.path)

@@ -16,14 +16,15 @@ from tauguard.models.picture import FLOOR_HEIGHT, mark, opengl, staged
 
 #: Size of a picture [px].
 HEIGHT, WIDTH = 480, 640
-#: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
+#: Geom groups that are shown: bodies, obstacles, and the arm's visual shapes. The arm's collision
+#: shapes are not shown.
 SHOWN = (0, 1, 2)
 #: Shadows fall this far from the middle of the scene [m].
 SHADOW_REACH = 3.0
 
 
 def _need_display() -> None:
-    """Refuse a window on Linux without a display, which would end the process."""
+    """Raise an error on Linux without a display, where opening a window would end the process."""
     if sys.platform == "linux" and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -34,7 +35,7 @@ def _need_display() -> None:
 
 
 def _staged(compiled: CompiledScene) -> mujoco.MjModel:
-    """The scene with floor, sky and lamp, which are drawn and not simulated."""
+    """The scene with a floor, a sky and a lamp, which are only drawn."""
     spec = mujoco.MjSpec.from_string(compiled.scene.xml)
     person = compiled.person
     floor = FLOOR_HEIGHT if person is None else person.floor
@@ -42,13 +43,13 @@ def _staged(compiled: CompiledScene) -> mujoco.MjModel:
 
 
 def _bases(compiled: CompiledScene) -> list[NDArray[np.float64]]:
-    """Where the arms stand [m]."""
+    """Positions of the arms' bases [m]."""
     model = compiled.scene.model
     return [model.body_pos[model.body_rootid[body]] for _, body, _ in compiled.tools]
 
 
 class Stage:
-    """The shown scene with a state of its own, which follows the simulated state."""
+    """The scene that is drawn. It has its own state, which follows the simulated state."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
         """Set the lights and place the camera."""
@@ -58,7 +59,7 @@ class Stage:
         self.model.vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
 
     def look(self, camera: Any) -> None:
-        """Place the camera beside a single arm's front, or at the side of two arms or people."""
+        """Place the camera: in front of a single arm, or at the side of two arms or of people."""
         compiled, layout = self._world, self._world.layout
         reach = layout.reach
         if compiled.person is not None:
@@ -90,7 +91,7 @@ class Camera(Stage):
     def __init__(
         self, compiled: CompiledScene, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
     ) -> None:
-        """Open it.
+        """Open the camera.
 
         Raises:
             RuntimeError: OpenGL cannot start; the message suggests what to change.
@@ -138,10 +139,10 @@ class Window(Stage):
     """A window that shows one copy of a compiled scene."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
-        """Open it.
+        """Open the window.
 
         Raises:
-            RuntimeError: OpenGL cannot start; the message suggests what to change.
+            RuntimeError: there is no display, or OpenGL cannot start.
         """
         super().__init__(compiled, data)
         _need_display()
@@ -171,10 +172,10 @@ class Picture:
     """The view behind ``render``: an image for each call, or a window that is updated."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData, mode: str) -> None:
-        """Open it.
+        """Open the camera, or the window if ``mode`` is "human".
 
         Raises:
-            RuntimeError: OpenGL cannot start; the message suggests what to change.
+            RuntimeError: there is no display, or OpenGL cannot start.
         """
         self._view = Window(compiled, data) if mode == "human" else Camera(compiled, data)
 

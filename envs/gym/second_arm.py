@@ -16,15 +16,14 @@ from tauguard.models.scene import _add_label, label_region, lean_model, people_p
 
 #: Distance of the second arm ahead of the first, which it faces [m].
 APART = 1.1
-#: Sensor of the force between the arms.
+#: Name of the sensor of the force between the arms.
 ARMS = "contact_arms"
 
 
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
     """The scene with a second, nominal arm of the same kind; its joints and links come last.
 
-    The two arms can touch each other and everything around them. The model has no visual shapes;
-    ``xml`` has them.
+    The two arms can touch each other and all things around them. Only ``xml`` has visual shapes.
     """
     whole = mujoco.MjSpec.from_string(scene.xml)
     other = mujoco.MjSpec.from_string(scene.arm_xml)
@@ -43,7 +42,7 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0
     for i, geom in enumerate(shapes):
         geom.name = geom.name or f"{SECOND}collision{i}"
     if scene.spec.labels:
-        # The links' sensors must follow one another: those of the regions come after them all.
+        # The sensors of all links must be in sequence, so those of other bodies are added again.
         for sensor in [s for s in whole.sensors if s.name.startswith("contact_")]:
             if sensor.objname not in first:
                 whole.delete(sensor)
@@ -68,10 +67,10 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0
 
 
 def _set_bits(whole: mujoco.MjSpec, other: mujoco.MjSpec) -> None:
-    """Set the contact bits: the second arm and its base touch the first, other things both.
+    """Set the contact bits: the arms touch each other, and other things touch both arms.
 
-    The base is part of the world. With the first arm's bits it would touch its own first link,
-    which cannot move away, and MuJoCo would hold it with 1e13 N.
+    The second arm's base is part of the world. With the first arm's bits it would touch its own
+    first link. That link cannot move away, and the contact force would reach 1e13 N.
     """
     for geom in whole.geoms:
         if geom.contype == OBSTACLE_BITS:
@@ -104,7 +103,7 @@ def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
 
 
 def both_drives(drive: Drive) -> Drive:
-    """The drives of both arms: the numbers of every joint, twice."""
+    """The drives of two equal arms, one after the other."""
     parts: dict[str, object] = {}
     for field in fields(drive):
         value = getattr(drive, field.name)
@@ -116,7 +115,7 @@ def both_drives(drive: Drive) -> Drive:
 
 
 def _doubled(part: object) -> object:
-    """Friction, ripple or sensors of both arms; ``cycles`` is common to all joints."""
+    """Friction, ripple or sensors of both arms; all joints share the array ``cycles``."""
     rows = {
         field.name: np.concatenate([value, value])
         for field in fields(part)  # type: ignore[arg-type]

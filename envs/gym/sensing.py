@@ -27,22 +27,23 @@ from tauguard.envs.gym.settings import DETECTORS
 from tauguard.models import Drive, pin_model
 from tauguard.models.left_over import Player
 
-#: The plain detector's thresholds: multiples of the breakaway friction and of the torque limit.
+#: The threshold of the detector "observer" is the sum of these multiples of the static friction and
+#: of the torque limit.
 FRICTION_FACTOR, TORQUE_FACTOR = 1.5, 0.03
-#: An arm without torque limits gets this threshold [N m].
+#: Threshold at a joint without a torque limit [N m].
 PLAIN_THRESHOLD = 5.0
-#: Largest residual of a trained detector without contact, in standard deviations.
+#: Largest residual without contact for a trained detector [standard deviations].
 SIGMAS = 3.0
-#: Slope of the nominal friction around standstill [rad/s].
+#: Speed scale of the change of sign of the nominal friction around standstill [rad/s].
 STANDSTILL = 0.05
-#: Distance from an end of its range within which a joint may touch its stop [rad].
+#: Within this distance of an end of its range a joint is treated as touching its stop [rad].
 MARGIN = 0.005
-#: Time until a stop no longer shows in the residual, in time constants of the observer.
+#: Time after which a stop no longer affects the residual [time constants of the observer].
 FORGOTTEN = 15.0
 
 
 class Listener(Protocol):
-    """A detector in one copy of an environment, made anew for each episode."""
+    """A detector in one copy of an environment; each episode has a new one."""
 
     @property
     def name(self) -> str:
@@ -61,11 +62,11 @@ class Listener(Protocol):
         """Largest residual without contact [N m], shape (n,)."""
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
-        """Samples of shape (T, n) in turn: residuals (T, n) [N m] and alarms (T,)."""
+        """Process samples of shape (T, n); returns residuals (T, n) [N m] and alarms (T,)."""
         ...
 
     def get_state(self) -> Any:
-        """Its state, for :meth:`set_state`."""
+        """The detector's state, for :meth:`set_state`."""
         ...
 
     def set_state(self, state: Any) -> None:
@@ -75,12 +76,12 @@ class Listener(Protocol):
 class ObserverListener:
     """The momentum observer with fixed thresholds. It needs no training, so it fits any arm.
 
-    The nominal Coulomb and viscous friction is compensated; the static friction decides the
-    threshold. A trained detector is several times as sensitive.
+    The nominal Coulomb and viscous friction is compensated. The threshold follows from the static
+    friction and the torque limit. A trained detector is several times as sensitive.
 
-    The stop of a joint acts on it alone. While a joint is near an end of its range, and until the
-    observer has forgotten it, its residual counts as zero. A collision that only this joint would
-    show is not detected meanwhile.
+    The stop of a joint exerts a torque on this joint alone. The joint's residual therefore counts
+    as zero while the joint is near an end of its range, and until the observer has forgotten the
+    stop. In that time a collision is detected only if another joint's residual shows it.
     """
 
     name, settle, fault = "observer", 0.0, ""
@@ -100,7 +101,7 @@ class ObserverListener:
             drive: nominal drive.
             dt: sample interval of the samples [s].
             gain: gain of the observer [1/s].
-            ranges: joint ranges [rad], (n, 2); a joint at an end of its range touches its stop.
+            ranges: joint ranges [rad], (n, 2); default: no joint has a stop.
         """
         self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
@@ -119,7 +120,7 @@ class ObserverListener:
         self._left = np.zeros(robot.joints, dtype=np.int64)
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
-        """An alarm is up where a residual exceeds its bound."""
+        """See :class:`Listener`; the alarm is true where a residual exceeds its bound."""
         residuals, alarms = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
         direction = np.tanh(qd / STANDSTILL)
         signals, own = (q, qd, direction, current), self._observer
@@ -139,15 +140,15 @@ class ObserverListener:
 
 
 class AlarmListener:
-    """A trained detector with its threshold; the residual is the plain observer's."""
+    """A trained detector with its threshold; the residual is the momentum observer's."""
 
     def __init__(self, alarm: CollisionAlarm) -> None:
-        """Begin anew."""
+        """Start before the first sample."""
         arm = alarm.detector.arm
         self.name, self.settle = alarm.detector.name, alarm.settle
         self.bounds: Array = SIGMAS * np.asarray(arm.noise)
         self._dt, self._count = alarm.detector.dt, 0
-        #: A model with checks of its input also names faults; the monitor has its own stream.
+        #: For a model that checks its input: finds faults, and runs the detector itself.
         self._monitor = Monitor(alarm, alarm.inputs) if alarm.inputs is not None else None
         self._alarm = alarm.stream() if self._monitor is None else None
         self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
@@ -155,7 +156,7 @@ class AlarmListener:
         self.fault = ""
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
-        """See :class:`Listener`; a residual stays where a sample is not finite."""
+        """See :class:`Listener`; if a sample is not finite, the residual keeps its last value."""
         residuals, alarms = np.empty(q.shape), np.zeros(len(q), dtype=np.bool_)
         if self._monitor is not None:
             t = self._dt * np.arange(self._count, self._count + len(q), dtype=np.float64)
@@ -190,7 +191,7 @@ class AlarmListener:
 
 
 class PerArm:
-    """One listener for each arm of a scene with two arms, whose joints are in sequence."""
+    """One listener per arm; the joints of the arms follow one another."""
 
     def __init__(self, parts: Sequence[Listener]) -> None:
         """Take the listeners of the arms, in order."""
@@ -221,10 +222,14 @@ class PerArm:
 
 
 def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
-    """A function that makes the detector of a copy, from a name, a model file or an alarm.
+    """A function that makes the detector of a copy; None without a detector.
+
+    Args:
+        compiled: the scene.
+        wanted: a name, the path of a model file, a ``CollisionAlarm``, or None.
 
     Raises:
-        ValueError: ``wanted`` is no detector, or a model file of another arm.
+        ValueError: ``wanted`` is no detector, or was trained on another arm or sample rate.
     """
     if wanted is None:
         return None
@@ -240,7 +245,7 @@ def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener]
 
         return observers
     if isinstance(wanted, str):
-        from tauguard.detectors import load_model  # with scikit-learn, which takes long to import
+        from tauguard.detectors import load_model  # imports scikit-learn, which takes long
 
         try:
             wanted = load_model(wanted)
@@ -255,7 +260,7 @@ def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener]
 
 
 def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
-    """The alarm, if it is of an arm and a sample rate like the scene's."""
+    """Check that the alarm has the scene's number of joints and sample rate; returns it."""
     joints, own = alarm.detector.arm.robot.joints, len(compiled.scene.joint_names)
     if joints != own:
         raise ValueError(
@@ -270,7 +275,7 @@ def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
 
 
 def _arms(compiled: CompiledScene) -> list[tuple[RobotNumbers, Drive]]:
-    """Nominal numbers of each arm; the second is only turned about the vertical."""
+    """Nominal numbers of each arm; equal, because a turn about the vertical changes none."""
     robot = RobotNumbers.from_pin(pin_model(compiled.scene.arm_model))
     drive = compiled.scene.facts.nominal
     if compiled.settings.ideal_drive:
@@ -283,13 +288,13 @@ class Sensing:
 
     Attributes:
         measured: q, qd and current at every physics step of the last action, (substeps, n) each.
-        residuals: of the detector [N m], shape (substeps, n).
-        alarms: shape (substeps,).
-        sensors: model of the sensors; None: without errors.
+        residuals: the detector's residual in the last action [N m], shape (substeps, n).
+        alarms: the detector's alarm in the last action, shape (substeps,).
+        sensors: model of the sensors' errors; None: no errors.
     """
 
     def __init__(self, compiled: CompiledScene, make: Callable[[], Listener] | None) -> None:
-        """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
+        """Set up the sensors; ``make`` makes the detector of an episode, None: no detector."""
         self.sensors = compiled.scene.drive.sensors
         self._gain = compiled.nominal.gain
         self._dt = float(compiled.scene.model.opt.timestep)
@@ -306,7 +311,7 @@ class Sensing:
         self.measured = (self.residuals, self.residuals, self.residuals)
 
     def reset(self) -> None:
-        """A new episode."""
+        """Begin a new episode."""
         self._player = None
         self.detector = self._make() if self._make else None
 
@@ -336,14 +341,14 @@ class Sensing:
         return self.measured
 
     def detect(self, q: Array, qd: Array, current: Array) -> tuple[Array, bool]:
-        """Residual at the last sample [N m], and whether the alarm was up at any."""
+        """Residual at the last sample [N m], and whether any sample raised the alarm."""
         if self.detector is None:
             return self._none, False
         self.residuals[:], self.alarms[:] = self.detector.steps(q, qd, current)
         return self.residuals[-1], bool(self.alarms.any())
 
     def show(self, observation: Array, q: Array, qd: Array, current: Array) -> None:
-        """Put the last measured sample into an observation."""
+        """Write the last measured sample into an observation."""
         n = q.shape[1]
         observation[:n], observation[n : 2 * n] = q[-1], qd[-1]
         observation[2 * n : 3 * n] = self._gain * current[-1]

@@ -47,22 +47,22 @@ PERSON = "person"
 
 @dataclass(frozen=True)
 class Settings:
-    """The keywords of every environment; a scene compiles only what they ask for.
+    """The keywords of every environment.
 
     Attributes:
         control: one of :data:`CONTROLS`.
-        control_rate: actions a second [Hz].
+        control_rate: actions per second [Hz].
         timestep: time step of the physics [s].
         integrator: integrator of the physics.
-        robot: a name, a file or a robot, see ``tauguard robot``.
-        payload_g: load at the flange, unknown to controller and observer [g].
-        mismatch: difference between the simulated and the nominal arm; a number is its seed.
-        obstacles: "person", names of body regions, or objects of :class:`BodyProxy`, `Person`.
+        robot: a name, a robot file or a ``Robot``, see ``tauguard robot``.
+        payload_g: load at the flange, which controller and observer do not assume [g].
+        mismatch: difference between the simulated and the nominal arm, or the seed to draw it.
+        obstacles: "person", names of body regions, or :class:`BodyProxy` and :class:`Person`.
         table: a board that the arm can touch.
         cloth: a hanging cloth.
-        objects: objects of your own, or the TOML file that lists them.
+        objects: your own objects, or the TOML file that lists them.
         detector: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``.
-        checkers: names of contact checkers that watch every physics step.
+        checkers: names of contact checkers that check every physics step.
         labels: contact sensors; without them force, cost and tau_ext stay 0.
         noise: observe measured instead of true positions, velocities and currents.
         ideal_drive: no friction, ripple, lag or sensor errors.
@@ -92,7 +92,7 @@ class Settings:
     contact_area: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is wrong and what would work."""
+        """Check the values; a ``ValueError`` names the wrong one and what would work."""
         for name, (kind, words) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} {getattr(self, name)!r}: expected {words}")
@@ -140,7 +140,7 @@ class Settings:
         """The settings of an environment: its defaults, replaced by the user's keywords.
 
         Raises:
-            ValueError: a keyword that does not exist; the message lists those that do.
+            ValueError: an unknown keyword; the message lists the known ones.
         """
         known = [field.name for field in fields(cls)]
         for name in given:
@@ -157,7 +157,7 @@ def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
         if not isinstance(item, BodyProxy | Person) and item not in known:
             raise ValueError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
     if obstacles.count(PERSON) > 1:
-        raise ValueError("obstacles: 'person' twice; place others by Person(position=...)")
+        raise ValueError("obstacles: 'person' twice; add further people as Person(position=...)")
 
 
 def _objects(value: Any) -> tuple[SceneObject, ...]:

@@ -1,4 +1,4 @@
-"""Contact checkers in the loop of an environment: each sees every physics step."""
+"""Contact checkers in the loop of an environment; each one checks every physics step."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ class StepChecks:
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """See the class."""
+        """Number of pairs per checker; see the class."""
         return np.array([len(found) for found in self._pairs], dtype=np.int64)
 
     def begin(self, data: mujoco.MjData) -> None:
-        """A new action, from the state in ``data``."""
+        """Begin an action at the state in ``data``."""
         for found in self._pairs:
             found.clear()
         self._before = State.of(self._model, data, self._scratch)
 
     def see(self, data: mujoco.MjData) -> None:
-        """One physics step has been made."""
+        """Check the physics step that led to the state in ``data``."""
         assert self._before is not None
         after = State.of(self._model, data, self._scratch)
         for one, found in zip(self._checkers, self._pairs, strict=True):

@@ -13,13 +13,15 @@ from tauguard.envs.gym.settings import Settings
 
 #: Largest number of initial states that are drawn to find one without contact.
 BEGINNINGS = 100
-#: Number of seeds with which the places of things are tested. With an arm that is not part of the
-#: package, at most ``DRAWN_AGAIN`` of the initial states may overlap a thing that can be moved.
-ARRANGED, DRAWN_AGAIN = 12, 1
+#: Number of seeds with which the places of tables, people and other things are tested.
+ARRANGED = 12
+#: For an arm that is not part of the package: how many of the tested initial states may overlap
+#: something that can be moved.
+DRAWN_AGAIN = 1
 
 
 class Outcome(NamedTuple):
-    """A task's result of one step: numbers of one copy, or arrays of all."""
+    """A task's result of one step: numbers for one copy, or arrays with one entry per copy."""
 
     rewards: dict[str, Any]  #: named terms, the task's :attr:`Task.terms`; the reward is their sum
     success: Any
@@ -38,14 +40,15 @@ class Task(Usual):
     options: ClassVar[dict[str, Any]] = {}
     #: Names of the terms of the reward; ``info`` has each as ``reward_NAME``.
     terms: ClassVar[tuple[str, ...]] = ()
-    #: ``info["reason"]`` of an episode that the task terminates, after a success and without one.
+    #: ``info["reason"]`` of an episode that the task terminates after a success.
     ended: ClassVar[str] = ""
+    #: ``info["reason"]`` of an episode that the task terminates without a success.
     failed: ClassVar[str] = ""
 
     def __init__(self, batch: Batch, **options: Any) -> None:
         """Keep the batch."""
         self.batch = batch
-        #: The memory of :meth:`score` from one step to the next, a number for each copy.
+        #: The number that :meth:`score` keeps from one step to the next, one per copy.
         self.memory = np.zeros(batch.rows)
 
     def __repr__(self) -> str:
@@ -53,11 +56,11 @@ class Task(Usual):
         return f"{type(self).__name__}({self.batch!r})"
 
     def start(self, i: int, rng: np.random.Generator) -> None:
-        """Begin an episode of copy ``i``; end with :meth:`Batch.start`."""
+        """Begin an episode of copy ``i``; an implementation calls :meth:`Batch.start`."""
         raise NotImplementedError
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Compute rewards and success of a step, for one copy or for arrays of all.
+        """Compute rewards and success of a step, for one copy or for arrays of all copies.
 
         Args:
             step: the result of the action.
@@ -79,7 +82,7 @@ class Task(Usual):
         raise refused
 
     def after(self, i: int, rng: np.random.Generator) -> None:
-        """Prepare what follows a success of copy ``i``; its next observation shows it."""
+        """Prepare the next goal after a success of copy ``i``; the next observation has it."""
 
     def get_state(self) -> Any:
         """The state of the task besides :attr:`memory`."""
@@ -92,7 +95,10 @@ class Task(Usual):
 def build(
     task_type: type[Task], keywords: dict[str, Any], rows: int
 ) -> tuple[CompiledScene, Batch, Task]:
-    """Scene, batch and task of an environment with these keywords."""
+    """Scene, batch and task of an environment with these keywords.
+
+    Things whose place the environment chooses are moved until initial states are free of contact.
+    """
     own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
     try:
         settings = Settings.from_keywords(task_type.defaults, keywords)
@@ -119,7 +125,7 @@ def build(
 def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
     """The first overlap that occurs too often in initial states, or None.
 
-    A kind in ``strict`` may be overlapped :data:`DRAWN_AGAIN` times, another until no draw is left.
+    The limit is :data:`DRAWN_AGAIN` for kinds in ``strict`` and :data:`BEGINNINGS` for others.
     """
     missed = 0
     for seed in range(ARRANGED):
@@ -136,7 +142,7 @@ def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
 
 
 def _movable(settings: Settings, default: frozenset[str], task_type: type[Task]) -> set[str]:
-    """Kinds of things whose place the environment chooses."""
+    """Kinds of things whose place the environment chooses; see ``StartsInContact.kind``."""
     kinds = set(default & {"table", "cloth"})
     kinds |= {item for item in settings.obstacles if isinstance(item, str)}
     return kinds | ({"second arm"} if task_type.arms == 2 else set())

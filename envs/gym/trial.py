@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.models import Robot
 
-#: Actions of an episode, the first half zero, the rest random.
+#: Number of actions in an episode; the first half are zero, the others random.
 ACTIONS = 60
 
 
@@ -25,9 +25,9 @@ class ArmTrial:
     environment: str
     episodes: int
     overlaps: int  #: episodes that began in contact
-    force: float  #: largest on a link [N]
-    bound: float  #: largest that the arm can exert [N]
-    diverged: int  #: episodes
+    force: float  #: largest force on a link [N]
+    bound: float  #: largest force that the arm can exert [N]
+    diverged: int  #: episodes that diverged
     still: int  #: episodes in which an arm that stands still succeeds
     moved: dict[str, float]  #: things placed farther from the arm, and how far [m]
     refused: str = ""  #: why there is no such environment
@@ -47,7 +47,7 @@ def try_arm(robot: str | Robot, episodes: int = 10, seed: int = 0) -> list[ArmTr
         seed: seed of the first episode.
 
     Raises:
-        ValueError, FileNotFoundError: no arm at all.
+        ValueError, FileNotFoundError: ``robot`` is not an arm.
     """
     names = [name for name in gymnasium.registry if name.startswith("tauguard/")]
     return [_tried(name, robot, episodes, seed) for name in names]
@@ -82,7 +82,7 @@ def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
 
 
 def _inside(env: Any) -> bool:
-    """Whether a link of an arm is inside anything, by MuJoCo's contacts of the state."""
+    """Whether a link of an arm overlaps anything, by MuJoCo's contacts."""
     model, data = env.model, copy.copy(env.data)
     mujoco.mj_fwdPosition(model, data)
     links = np.flatnonzero(np.isin(model.geom_bodyid, env.scene.link_bodies))
@@ -94,8 +94,8 @@ def picture(name: str, robot: str | Robot, seed: int = 0) -> NDArray[np.uint8]:
     """The beginning of an episode, shape (480, 640, 3).
 
     Raises:
-        ValueError: no such environment with this arm.
-        RuntimeError: there is nothing to draw with.
+        ValueError: the environment cannot be made with this arm.
+        RuntimeError: OpenGL cannot start.
     """
     env = _made(name, robot, render_mode="rgb_array")
     env.reset(seed=seed)

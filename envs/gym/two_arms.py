@@ -14,17 +14,18 @@ from tauguard.envs.gym.second_arm import APART
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Person, Scene, Table
 
-#: A person's distance from the line between the arms, in units of the reach.
+#: Distance of a person from the line between the arms [reach].
 BESIDE = 0.75
-#: Largest distance of the first target from the middle between the arms, and distances between
-#: which the second one lies from it [m].
-MIDDLE, GAP = 0.15, (0.15, 0.35)
+#: Largest distance of the first target from the middle between the arms [m].
+MIDDLE = 0.15
+#: Range of the distance between the two targets [m].
+GAP = (0.15, 0.35)
 #: The table between the arms, below their workspace.
 BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
 
 
 class TwoArms(CarefulReach):
-    """Both targets are close to each other, where both arms can reach."""
+    """Both targets are close to each other in the middle between the arms."""
 
     arms: ClassVar[int] = 2
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
@@ -48,11 +49,12 @@ class TwoArms(CarefulReach):
 class TwoArmsEnv(ArmEnv):
     """Bring two tools to two places 15 to 35 cm apart, without the arms touching.
 
-    Arms that go straight to their targets meet.
+    Arms that go straight to their targets collide.
 
-    The second, nominal arm of the same kind stands opposite, 1.1 m away. Joints and actions of the
-    first arm come first. ``info["force"]`` and ``tau_ext`` are those of contacts with the other
-    arm, the table and whatever ``obstacles`` adds; links count on through the second arm.
+    A second, nominal arm of the same kind stands opposite, 1.1 m away. Joints and actions of the
+    first arm come first. ``info["force"]`` and ``tau_ext`` include contacts with the other arm, the
+    table and everything that ``obstacles`` adds. The numbers of the second arm's links follow
+    those of the first.
 
     ## Actions (joint velocity, the default; 2 n joints)
 
@@ -61,7 +63,8 @@ class TwoArmsEnv(ArmEnv):
     | 0 .. n-1 | velocity of joint i of the first arm | -1 to 1 | its largest speed [rad/s] |
     | n .. 2n-1 | velocity of joint i of the second arm | -1 to 1 | its largest speed [rad/s] |
 
-    Other control modes as in Reach-v0, for one arm after the other ("cartesian": 6 numbers each).
+    The other control modes are the same as in Reach-v0, first for one arm, then for the other
+    ("cartesian": 6 numbers per arm).
 
     ## Observations (6 n + 12 numbers)
 
@@ -78,14 +81,14 @@ class TwoArmsEnv(ArmEnv):
     | term | value |
     |---|---|
     | progress | decrease of the larger of both distances [m] |
-    | target | 1 when both are within 3 cm; then come the next targets |
-    | contact | -1 for each second at 100 N or more on a link, less force less |
+    | target | 1 when both tools are within 3 cm; then the next targets appear |
+    | contact | -1 per second at 100 N or more on a link; proportional below 100 N |
     """
 
     task_type = TwoArms
 
 
 class TwoArmsVectorEnv(VectorArmEnv):
-    """Many TwoArms-v1 at once; see :class:`TwoArmsEnv`."""
+    """Several copies of TwoArms-v1; see :class:`TwoArmsEnv`."""
 
     task_type = TwoArms

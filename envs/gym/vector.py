@@ -1,4 +1,4 @@
-"""Many copies of an environment, stepped on threads, with the bits of single ones."""
+"""Several copies of an environment, stepped on threads; bit-equal to single environments."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     """``num_envs`` copies of an :class:`tauguard.envs.gym.base.ArmEnv`, stepped on a thread pool.
 
     Results equal those of single environments bit for bit, for any number of threads. The scene is
-    compiled once and shared. Finished copies begin a new episode at the next step
-    (``AutoresetMode.NEXT_STEP``) or in the same one (``SAME_STEP``), as ``autoreset_mode`` says.
+    compiled once and shared. By ``autoreset_mode``, a finished copy begins a new episode at the
+    next step (``NEXT_STEP``), in the same step (``SAME_STEP``), or when ``reset`` is called.
     """
 
     task_type: ClassVar[type[Task]] = Task
@@ -52,8 +52,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
 
         Args:
             num_envs: how many copies.
-            max_episode_steps: an episode is truncated after so many actions.
-            threads: number of threads; 0 means all processors. The result does not depend on it.
+            max_episode_steps: number of actions after which an episode is truncated.
+            threads: number of threads; 0 means all processors.
             autoreset_mode: "NextStep", "SameStep" or "Disabled".
             render_mode: as for the single environment; the first copy is shown.
             **keywords: as for the single environment.
@@ -81,7 +81,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all episodes, or those that ``options["reset_mask"]`` chooses.
+        """Begin an episode of every copy, or of those that ``options["reset_mask"]`` chooses.
 
         Args:
             seed: copy i gets ``seed + i``, or entry i of a list.
@@ -172,7 +172,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return batch.observation.copy(), rewards, terminated, truncated, infos
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """Restart finished copies (SAME_STEP); their last values go into ``final_`` keys."""
+        """Restart finished copies (SAME_STEP); the ``final_`` keys get their last values."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
@@ -230,7 +230,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return infos | {f"_{key}": shown for key in infos}
 
     def render(self) -> Any:
-        """A picture of the first copy, as a tuple."""
+        """A tuple with a picture of the first copy; None in "human" mode."""
         if self.render_mode is None:
             return None
         if self._picture is None:

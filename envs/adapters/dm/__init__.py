@@ -1,6 +1,6 @@
-"""For users of dm_control: the arm as a composer entity, environments as ``dm_env`` ones.
+"""For users of dm_control: the arm as a composer entity, and environments for ``dm_env``.
 
-dm_control has no wheels for Python 3.13 and later; there this package raises ``ImportError``.
+dm_control has no wheels for Python 3.13 and later; there, this package raises ``ImportError``.
 """
 
 from tauguard.envs.adapters.dm.compatibility import repair

@@ -12,15 +12,15 @@ from tauguard.arrays import Array
 from tauguard.models import load_arm
 from tauguard.models.mjcf import xml_text
 
-#: Elements of a frame that have a pose of their own.
+#: Elements that can have their own pose inside a frame.
 _PLACED = ("body", "geom", "site", "camera", "light", "inertial", "joint")
 
 
 class ArmEntity(composer.Entity):  # type: ignore[misc]
-    """A serial arm with one torque motor a joint.
+    """A serial arm with one torque motor per joint.
 
-    Its observables are ``joint_positions`` [rad], ``joint_velocities`` [rad/s] and
-    ``joint_torques`` (what the motors apply, N m), each of shape (n,).
+    The observables are ``joint_positions`` [rad], ``joint_velocities`` [rad/s] and
+    ``joint_torques`` (of the motors, N m), each of shape (n,).
     """
 
     def _build(self, arm: str = "cura6", name: str | None = None) -> None:
@@ -57,17 +57,17 @@ class ArmEntity(composer.Entity):  # type: ignore[misc]
 
     @property
     def joints(self) -> list[mjcf.Element]:
-        """Base to tip."""
+        """The joints from base to tip."""
         return self._joints
 
     @property
     def actuators(self) -> list[mjcf.Element]:
-        """The motors, in the order of :attr:`joints`; their control is a torque [N m]."""
+        """The motors in the order of :attr:`joints`; the control of a motor is a torque [N m]."""
         return list(self._root.find_all("actuator"))
 
     @property
     def flange(self) -> mjcf.Element | None:
-        """The tool flange's site; ``None`` where the file names none."""
+        """The site of the tool flange; ``None`` if the file has none."""
         return self._flange
 
 
@@ -91,13 +91,13 @@ class ArmObservables(composer.Observables):  # type: ignore[misc]
 
 
 def without_frames(xml: str) -> str:
-    """The same MJCF without frames: each element of a frame gets the frame's pose.
+    """The same MJCF without frames: each frame's pose is applied to its elements.
 
     Args:
-        xml: text that MuJoCo has written: orientations are quaternions.
+        xml: text written by MuJoCo, with orientations as quaternions.
 
     Raises:
-        ValueError: something in a frame has an orientation that is no quaternion.
+        ValueError: an orientation in a frame is not a quaternion.
     """
     root = ElementTree.fromstring(xml)
     world = root.find("worldbody")
@@ -129,7 +129,7 @@ def _pose(element: ElementTree.Element) -> tuple[Array, Array]:
 
 
 def _place(part: ElementTree.Element, pos: Array, quat: Array) -> None:
-    """Give ``part`` the frame's pose on top of its own."""
+    """Apply the frame's pose to the pose of ``part``."""
     if part.tag not in _PLACED:
         return
     if part.get("fromto") is not None:

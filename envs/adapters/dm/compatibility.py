@@ -1,14 +1,13 @@
-"""Repairs dm_control for a MuJoCo that is newer than it."""
+"""Make dm_control work with a newer MuJoCo."""
 
 
 def repair() -> list[str]:
-    """Drop the array names that MuJoCo's structures lack from dm_control's tables.
+    """Remove array names from dm_control's tables if MuJoCo's structures lack them.
 
-    dm_control 1.0.50 lists arrays that MuJoCo 4 no longer has, and reads all of them. If the two
-    agree, this does nothing.
+    dm_control 1.0.50 lists arrays that MuJoCo 4 no longer has, and reads all of them.
 
     Returns:
-        The names dropped, as ``structure.name``; empty once it is no longer needed.
+        The removed names, as ``structure.name``; empty if nothing had to be removed.
 
     Raises:
         ImportError: dm_control is not installed (it has no wheels for Python 3.13 and later).

@@ -1,4 +1,4 @@
-"""A Gymnasium environment as a ``dm_env`` one."""
+"""A Gymnasium environment with the interface of ``dm_env``."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 
 class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
-    """Any of the environments with the interface of ``dm_env``.
+    """A Gymnasium environment with the interface of ``dm_env``.
 
     A truncated episode ends with discount 1, a terminated one with discount 0, as ``dm_env``
     defines it. :attr:`info` holds Gymnasium's ``info``.
@@ -24,7 +24,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
             seed: seed of the first episode.
 
         Raises:
-            ValueError: a space of another kind.
+            ValueError: ``env`` has a space of another kind.
         """
         self._env, self._seed, self._over = env, seed, True
         self._observation_spec = _spec(env.observation_space, "observation")
@@ -38,7 +38,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
         return dm_env.restart(observation)
 
     def step(self, action: Any) -> dm_env.TimeStep:
-        """Act; the first step after an episode's end begins the next one, whatever the action."""
+        """Act; the first step after the end of an episode ignores the action and resets."""
         if self._over:
             return self.reset()
         observation, reward, terminated, truncated, self.info = self._env.step(action)
@@ -50,7 +50,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
         return dm_env.transition(float(reward), observation)
 
     def observation_spec(self) -> Any:
-        """Spec of the observation: an array, or a dictionary of them."""
+        """Spec of the observation: an array spec, or a dictionary of array specs."""
         return self._observation_spec
 
     def action_spec(self) -> Any:
