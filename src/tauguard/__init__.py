@@ -1,12 +1,11 @@
-"""tauguard: a cobot-safety simulation environment on MuJoCo.
+"""tauguard: simulation and detection of collisions of robot arms, with MuJoCo.
 
-Import the sub-package that you need (``tauguard.cloth`` pulls in
-neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
-``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``,
-``report``, ``hard_cases``, ``twin``.
+Import the sub-package that you need: ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
+``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``, ``report``,
+``hard_cases``, ``twin``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
 
-``gymnasium.make("tauguard/Reach-v0")`` makes an environment once tauguard is imported; so do
-``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
+After ``import tauguard``, ``gymnasium.make("tauguard/Reach-v0")`` makes an environment. The others
+are ``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
 environment.
 
 ``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` help to inspect a recording by hand.
@@ -39,7 +38,7 @@ _FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.ca
 
 
 def __getattr__(name: str) -> Any:
-    """Load a package, or one of the functions of the front module."""
+    """Load a package, or a public function of this module."""
     if name in _PACKAGES:
         return importlib.import_module(f"tauguard.{name}")
     if name in _FUNCTIONS:

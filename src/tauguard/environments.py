@@ -1,4 +1,4 @@
-"""Register the environments with Gymnasium; each is imported when it is made."""
+"""Register the environments with Gymnasium; `gymnasium.make` imports their modules."""
 
 #: Name -> module and class prefix, and largest number of actions of an episode.
 ENVIRONMENTS = {

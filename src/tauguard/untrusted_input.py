@@ -14,14 +14,12 @@ MOST_TEXT = 1 << 26
 def reading(path: str | Path, expected: str = "") -> Iterator[None]:
     """Turn every error that the content of ``path`` causes in this block into a ``ValueError``.
 
-    A reader cannot foresee every kind of error in a file: nesting too deep, numbers too
-    large, missing names, wrong types. The message is one line and begins with the path;
-    ``expected`` describes a valid file.
+    The message is one line and begins with the path; ``expected`` describes a valid file.
 
     Raises:
-        ValueError: the content cannot be read; the cause is chained. Also a device such as
-            ``/dev/zero``, which may have no end.
-        OSError: as raised inside.
+        ValueError: the content cannot be read (the cause is chained), or ``path`` is a device such
+            as ``/dev/zero``, which may be endless.
+        OSError: as raised in the block.
     """
     check_no_device(path)
     try:
@@ -42,7 +40,7 @@ def reading(path: str | Path, expected: str = "") -> Iterator[None]:
 
 
 def check_no_device(path: str | Path) -> None:
-    """Refuse a device such as ``/dev/zero``, which may have no end: ``ValueError``."""
+    """Raise ``ValueError`` for a device such as ``/dev/zero``, which may be endless."""
     if Path(path).is_char_device():
         raise ValueError(f"{path}: a device; expected a file")
 
@@ -55,7 +53,7 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
     """A text file of at most ``most`` bytes, UTF-8.
 
     Raises:
-        ValueError: longer, or not text.
+        ValueError: the file is longer, or not text.
         OSError: missing or unreadable.
     """
     with open(path, "rb") as stream:
@@ -74,8 +72,8 @@ def read_json(path: str | Path) -> Any:
     """The content of a JSON file; depth and length are bounded.
 
     Raises:
-        ValueError: not JSON, or nested too deep; one line.
-        OSError: missing or unreadable.
+        ValueError: the file is not JSON, or nested too deep.
+        OSError: the file is missing or unreadable.
     """
     with reading(path, "expected JSON"):
         return json.loads(read_text(path))

@@ -15,32 +15,32 @@ from collections.abc import Sequence
 from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
 
 COMMANDS = {
-    "demo": "simulate, strike, train, detect, and leave a recording to look at",
-    "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
-    "twin": "a simulated arm that is like a real one, from collision-free logs",
-    "detect": "look for collisions in the log of a real arm",
-    "generate": "a labelled dataset from its description, on all cores or a Ray cluster",
-    "inspect": "the content of a generated dataset, and whether it is intact",
-    "export": "a generated dataset in the format of another library",
-    "robot": "what is known and assumed about an arm, number by number",
-    "simulate": "labelled episodes of the arm at work, as many as asked",
-    "train": "a detector from labelled recordings",
-    "evaluate": "a detector's metrics on labelled recordings",
-    "watch": "an environment live in the rerun viewer",
-    "listen": "a detector beside a running robot, read-only: free, collision or fault",
-    "play-ur": "play a log as a UR controller would send it, to test against",
-    "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
-    "video": "a recording of the simulation as a moving picture, GIF or MP4",
-    "report": "the studies and the hard cases in one HTML file",
-    "hard-cases": "named cases with exact answers, for our kernels and anybody's",
-    "bench": "run one study of speed against error: a table, a figure, --json",
+    "demo": "simulate an arm, train a detector, detect collisions, write a recording",
+    "calibrate": "identify friction, inertia and drive gains of a real arm from free logs",
+    "twin": "identify a simulated arm that behaves like a real one from free logs",
+    "detect": "find collisions in the log of a real arm",
+    "generate": "make a labelled dataset from its description, on all cores or a Ray cluster",
+    "inspect": "show the content of a generated dataset and check its files",
+    "export": "write a generated dataset in the format of another library",
+    "robot": "print every parameter of an arm with its source",
+    "simulate": "simulate labelled episodes of an arm and record them",
+    "train": "train a detector on labelled recordings or on free logs of a real arm",
+    "evaluate": "evaluate a detector on labelled recordings",
+    "watch": "show a running environment in the rerun viewer",
+    "listen": "run a detector on a running robot, read-only: free, collision or fault",
+    "play-ur": "send a log as a UR controller would, to test `listen`",
+    "replay": "convert an MCAP recording into an .rrd file for the rerun viewer",
+    "video": "render a recording of the simulation to GIF or MP4",
+    "report": "write the results of all studies and hard cases to one HTML page",
+    "hard-cases": "test collision libraries on named cases with exact answers",
+    "bench": "run a study of speed and error",
 }
 
 #: A user's ``module:Class``; the module may be in the working folder.
 OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 EPILOG = """\
-`tauguard COMMAND --help` explains a command.
+`tauguard COMMAND --help` explains a command. A free log is one in which nothing touched the arm.
 Exit codes: 0 done, 1 a defect of tauguard, 2 bad input; --debug shows the traceback of an error.
 tauguard is a research tool, not a certified safety function."""
 
@@ -111,11 +111,11 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
                 f"{name}: MUJOCO_GL={wanted}: MuJoCo finds no such OpenGL; install libegl1 for egl "
                 "or libosmesa6 for osmesa, or unset it"
             )
-        fail(f"{name}: a defect of tauguard, --debug shows where: {kind}: {error}", 1)
+        fail(f"{name}: a defect of tauguard (--debug shows where): {kind}: {error}", 1)
 
 
 def said(error: Exception) -> str:
-    """The message of an error; for a system error file and cause, without the error number."""
+    """The message of an error; for an error of the operating system, file and cause."""
     if isinstance(error, FileExistsError) and error.filename is not None:
         return f"{error.filename}: there is a file of that name; expected a folder, or a new name"
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
@@ -124,7 +124,7 @@ def said(error: Exception) -> str:
 
 
 def expect(flag: str, value: float, least: float, most: float = float("inf")) -> None:
-    """Refuse a flag's number outside ``least`` to ``most``, and NaN: ``ValueError``."""
+    """Raise ``ValueError`` if a flag's number is NaN or outside ``least`` to ``most``."""
     if not least <= value <= most:
         wanted = f"{least:g} or more" if most == float("inf") else f"{least:g} to {most:g}"
         raise ValueError(f"{flag} {value:g}: expected {wanted}")

@@ -12,7 +12,7 @@ from tauguard.datasets.columns import AS_IS, Reading
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
-#: Geared joints give more torque per ampere over all [N m/A]; torques given as currents about 1.
+#: A lower torque per current unit [N m/A] suggests that the columns hold torques (about 1 then).
 SMALL_GAIN = 2.0
 SOURCES = {
     "torques": "the logs' torques",
@@ -39,9 +39,9 @@ def command(
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
 
-    Currents determine torques only up to one factor for each joint. The factors come from --gains
-    or a preset if given, else from a log with a known --payload, else from the robot file's masses;
-    the output says which. Each log is also predicted by a calibration from the other logs.
+    Logs with currents do not determine the drive gains. These come from --gains or a preset if
+    given, else from a log with a known --payload, else from the robot file's masses; the output
+    states which. In cross-validation, a calibration from the other logs predicts each log.
 
     Args:
         logs: CSV or MCAP files, or a folder of them; at least 10 s of motion, better two minutes.
@@ -53,12 +53,12 @@ def command(
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
             m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are assumed to
             have no load.
-        scale: source of the scale of the torques.
-        torque: the logs hold joint torques in N m instead of currents, as ROS 2 efforts may; a
-            column map states this by its field "torque".
-        accept: write the file although a check fails. alarms: a log has bursts of torque, as
-            contacts cause them. error: the error of a joint's prediction exceeds its friction.
-            gravity: gravity's torques differ from those of the robot file.
+        scale: source of the drive gains.
+        torque: the logs hold joint torques in N m instead of currents, as ROS 2 efforts may. A
+            JSON file of columns states this by its field "torque" instead.
+        accept: write the file although a check fails. alarms: a log has bursts of torque like those
+            of contacts. error: the error of a joint's prediction exceeds twice its friction.
+            gravity: the gravity torques differ from those of the robot file.
         reading: how logs are read.
         json: write the results here as JSON.
     """
@@ -89,8 +89,8 @@ def command(
         check_loads(arm, given.logs, data)
     elif (ratio := torque_per_ampere(found.arm, traces)) < SMALL_GAIN:
         print(
-            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as is typical "
-            "of joint torques: if they are in N m, add --torque"
+            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as for joint "
+            "torques: if they are in N m, add --torque"
         )
     held = (
         left_out(arm, recordings, scale=given.scale, data=data)

@@ -1,4 +1,4 @@
-"""``tauguard bench`` and ``tauguard report``: they run ``studies``, which only a checkout has."""
+"""``tauguard bench`` and ``tauguard report``: run the package ``studies`` of a checkout."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ def run_studies(name: str, args: Sequence[str]) -> int:
     """Run a command of ``studies`` in a separate process and return its exit code.
 
     Raises:
-        ValueError: there is no checkout: tauguard is installed without its sources.
+        ValueError: there is no checkout, because tauguard is installed without its sources.
     """
     root = checkout()
     if root is None:
@@ -33,7 +33,7 @@ def run_studies(name: str, args: Sequence[str]) -> int:
 
 
 def checkout() -> Path | None:
-    """Find the folder that holds ``studies``: the package's source tree or the working folder."""
+    """The folder that contains ``studies``: the package's source tree or the working folder."""
     for root in (Path(tauguard.__file__).resolve().parents[2], Path.cwd()):
         if (root / "studies" / "__main__.py").is_file():
             return root

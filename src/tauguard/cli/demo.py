@@ -1,4 +1,4 @@
-"""``tauguard demo``: all steps from the arm to the replay."""
+"""``tauguard demo``: all steps from simulation to replay."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
-#: False alarms per hour on the training motions for which the threshold is set. An alarm stops a
-#: robot; a person who works beside it may accept one an hour, but hardly ten.
+#: Rate of false alarms on the training motions for which the threshold is set [1/h]. An alarm stops
+#: a robot; one false alarm per hour may be acceptable in practice, ten are hardly so.
 FALSE_ALARMS_PER_HOUR = 1.0
 
 
@@ -26,20 +26,20 @@ def command(
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
-    """Simulate an arm at work, strike it, detect the collisions, leave a recording.
+    """Simulate a moving arm with collisions, train a detector on it, and record its alarms.
 
-    The folder then holds demo.mcap (a run with collisions, truth and detection), demo.rrd (the same
-    for rerun), model.skops (the trained detector), summary.json and summary.png (its metrics on
-    collisions and motions that it was not trained on).
+    The folder then contains demo.mcap (a run with collisions, truth and detection), demo.rrd (the
+    same for rerun), model.skops (the trained detector), summary.json and summary.png (metrics of
+    the detector on motions and collisions that it was not trained on).
 
     Args:
-        out: folder of the results; it is created if it does not exist.
+        out: folder for the results; it is created if it does not exist.
         seed: seed of the arm and of all random draws; the same seed gives the same files.
         robot: name or file of the arm; see `tauguard robot`.
-        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+        arm_joints: for a file with several chains, the arm's joints: names separated by commas, or
             FIRST..LAST.
         workers: processes for the simulation (default: all processors).
-        json: write the summary here as well.
+        json: additional file for the summary.
     """
     from tauguard.cli import expect
 
@@ -57,7 +57,7 @@ def command(
     from tauguard.report import write_json
 
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
-    load_arm(robot)  # an unknown arm is an error before anything is simulated
+    load_arm(robot)  # raises an error for an unknown arm before the simulation
     plan = demo_plan(seed, robot)
     print(
         f"simulating {plan.seconds / 60:.0f} minutes of motion, then training and testing a "

@@ -43,35 +43,34 @@ def command(
 ) -> None:
     """Look for collisions in a log of joint positions, velocities and motor currents.
 
-    With --model a trained detector watches the log. Its states are those of `tauguard listen`:
+    With --model a trained detector runs on the log. Its states are those of `tauguard listen`:
     free, collision, or fault if the samples are wrong (frozen, missing, of another arm). Without a
-    model, the detector of `tauguard train --free` learns from the first --quiet seconds, in which
-    nothing may touch the arm, and watches the rest. `tauguard train --free` learns from whole logs
+    model, the detector of `tauguard train --free` is trained on the first --quiet seconds, in which
+    nothing may touch the arm, and runs on the rest. `tauguard train --free` itself uses whole logs
     and makes a better detector.
 
-    A column called label, contact, collision or touch with the values 0 and 1 is taken as ground
-    truth. The output then says which contacts were detected, how late, and which alarms were false.
+    A column called label, contact, collision or touch with the values 0 and 1 is the ground truth.
+    The output then states which contacts were detected, the delays, and the false alarms.
 
-    A log is refused if the motion does not explain its torques, because its currents have a wrong
-    unit or sign. Exchanged joints are noticed only if gravity loads them.
+    A log is refused if its motion does not explain its torques, for example because currents have a
+    wrong unit or sign. Exchanged joints are noticed only if they carry gravity loads.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone, a name that `tauguard robot` lists, or the TOML
             file of `tauguard twin`.
         columns: columns of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, libfranka,
-            doosan, lbr), auto for what the names and numbers suggest, or a JSON file with the
-            fields of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"],
-            "torque": ["tau1", "tau2"]}; numbers instead of names count columns from 0.
-        model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
-        payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
-            a model of `train --free` or no model; 0 for no load. Without it the load is estimated
-            from the motion, and until then only hard contacts are detected.
+            doosan, lbr), auto to find them from names and values, or a JSON file with the fields
+            of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"],
+            "torque": ["tau1", "tau2"]}; a number instead of a name is the column's index from 0.
+        model: a model file of `tauguard train` for this arm and the log's sample rate.
+        payload: load that the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m),
+            for a model of `train --free` or no model; 0 for no load. Without it the load is
+            estimated from the motion, and until then only hard contacts are detected.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
         at_tool: all contacts are at the tool, which narrows the intervals of the forces.
-        quiet: without --model, length of the log's beginning in which nothing touches the arm, in
-            seconds (default: 20). A collision in it raises the thresholds, and similar ones are
-            missed later.
+        quiet: without --model, length of the log's beginning in which nothing touches the arm [s]
+            (default: 20). A collision in it raises the thresholds, so that later ones are missed.
         gains: without --model, N m per ampere, one number for each joint (known for calibrated
             robot files and for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.
@@ -114,7 +113,7 @@ def command(
 
 
 def refuse_touched(log: Path, read: Log, quiet: float) -> None:
-    """Refuse a log whose labels say that something touches the arm in its first seconds."""
+    """Raise ``ValueError`` if labels mark a contact in the first ``quiet`` seconds."""
     begin = read.trace.t[0]
     early = [start - begin for start, _ in read.touched or () if start < begin + quiet]
     if early:
@@ -198,7 +197,7 @@ def explained(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """The diagnosis of each alarm; only torques if the robot's file gives no chain of links."""
+    """Diagnosis of each alarm, and notes; torques only if the robot file has no chain of links."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
@@ -324,7 +323,7 @@ def report(result: dict[str, Any]) -> None:
 def leave(
     out: Path, trace: Trace, found: LogDetection, result: dict[str, Any], robot: Path
 ) -> None:
-    """Write events, MCAP and recording into the folder ``out``."""
+    """Write events.json, detect.mcap and detect.rrd into the folder ``out``."""
     from tauguard.replay import write_rrd
     from tauguard.report import write_json
     from tauguard.traces import write_mcap

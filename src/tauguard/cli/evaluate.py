@@ -30,9 +30,9 @@ def command(
 
     Args:
         traces: folder of MCAP recordings with truth.
-        data: instead, a dataset (`tauguard generate`): its episodes of the model's arm, split by
+        data: a dataset (`tauguard generate`) instead: its episodes of the model's arm, split by
             split.
-        splits: with --data, which ones (default: those whose name begins with "test").
+        splits: with --data, names of the splits (default: those that begin with "test").
         model: a model file that `tauguard train` wrote.
         alarms: with --data, the alarms of any other detector instead of a model: a CSV file with
             one line per alarm and the columns episode (SPLIT/NUMBER, as for `tauguard inspect
@@ -41,10 +41,9 @@ def command(
         json: write the metrics here as JSON.
         figure: draw the metrics here (PNG).
         events: a folder for ten seconds of every missed collision, late detection and false
-            alarm, with pictures and a page that `tauguard replay --web` opens. A recording is
-            named by its file; with --data as SPLIT/NUMBER, from 0, which `tauguard inspect
-            --episode` takes.
-        late: with --events, a collision found later than this is an event [s].
+            alarm, with pictures and a page for `tauguard replay --web`. An event is named by the
+            file of its recording; with --data by SPLIT/NUMBER, as for `tauguard inspect --episode`.
+        late: with --events, a detection with a longer delay is late [s].
     """
     if alarms is not None:
         if data is None or detector is not None or events is not None:
@@ -128,7 +127,7 @@ def evaluated(
 def _judged(
     alarm: CollisionAlarm, recordings: Iterable[Trace]
 ) -> Iterator[tuple[str, JudgedRecording]]:
-    """Recordings with their names; an error message contains the name."""
+    """Judged recordings with their names; error messages contain the name."""
     from tauguard.detectors.evaluation.recordings import judged_recordings
 
     names: list[str] = []

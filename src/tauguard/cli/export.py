@@ -15,12 +15,12 @@ def command(
 ) -> None:
     """Write a dataset, or some of its splits, for LeRobot or Minari.
 
-    pandas, polars, DuckDB and scikit-learn need no export: they read data/*.parquet as it is.
+    pandas, polars and DuckDB need no export: they read data/*.parquet directly.
 
     Args:
         folder: folder of a dataset that `tauguard generate` made.
         out: for LeRobot a new folder; for Minari a dataset id such as tauguard/collisions-v0, which
-            goes where Minari keeps its datasets.
+            Minari stores in its own folder.
         to: "lerobot" (LeRobotDataset v3.0) or "minari" (extra `export`).
         splits: names of the splits to write (default: all).
         arm: write only this arm's episodes.

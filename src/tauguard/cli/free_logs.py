@@ -20,11 +20,11 @@ class FreeLogs:
     """Logs in which some joint moves, and the initial arm of an identification."""
 
     numbers: RobotNumbers  #: numbers of the robot file
-    all_traces: dict[str, Trace]  #: by file name, with those in which no joint moves
+    all_traces: dict[str, Trace]  #: by file name; includes logs in which no joint moves
     logs: dict[str, Recording]  #: by file name, with their loads
     arm: ArmModel
-    source: str  #: what fixes the scale of the torques, as text for the user
-    scale: str  #: the same as :func:`tauguard.detectors.calibration.identification.identify` has it
+    source: str  #: source of the drive gains, as text for the user
+    scale: str  #: the same as the argument ``scale`` of `calibration.identification.identify`
 
 
 def free_logs(
@@ -72,10 +72,10 @@ def free_arm(
     columns: str | None,
     gains: tuple[float, ...],
 ) -> tuple[ArmModel, str]:
-    """The arm that free motion begins with, and where its gains come from, in words.
+    """The initial arm model of a training on free logs, and the source of its gains, as text.
 
     Raises:
-        ValueError: gains that do not fit, or a torque of the wrong sign in a log.
+        ValueError: gains that do not fit the arm, or torques of the wrong sign.
     """
     from tauguard.datasets.real_arms import known_arm
     from tauguard.detectors.calibration.checks import check_signs
@@ -125,7 +125,7 @@ def explain(
         accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
-        ValueError: much torque is not explained, or torque has bursts, as contacts cause them.
+        ValueError: the model explains too little torque, or torque has bursts as of contacts.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.real_arms import calibration_notes
@@ -143,7 +143,7 @@ def explain(
 def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
     """Run a check; ``--accept NAME`` turns its error into a printed note.
 
-    None for ``accept``: the command has no such flag.
+    ``accept`` is None if the command has no such flag.
 
     Raises:
         ValueError: the message of the check, with the flag.

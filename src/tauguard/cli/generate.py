@@ -20,12 +20,12 @@ def command(
     the same for any number of workers.
 
     Args:
-        config: a TOML file, or one that comes with tauguard: tauguard-collisions-v2,
+        config: a TOML file, or a description in the package: tauguard-collisions-v2,
             tauguard-collisions-v1, cura6-twin.
-        out: folder of the dataset: a new or empty one, or one that holds a part of this dataset.
+        out: folder of the dataset, new, empty or with a part of this dataset.
         workers: processes (default: all processors).
-        ray: address of a Ray cluster to work on instead; "local" starts one on this machine.
-        quick: only the first episodes of every split; the configuration states how many.
+        ray: address of a Ray cluster to use instead; "local" starts one on this machine.
+        quick: simulate only the first episodes of every split; the configuration states how many.
     """
     import time
 

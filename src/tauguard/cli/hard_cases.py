@@ -8,11 +8,11 @@ def command(
     case: tuple[str, ...] = (),
     json: Path | None = None,
 ) -> None:
-    """Put the hard cases to every library that is installed and print the verdicts.
+    """Run the hard cases on every installed library and print the verdicts.
 
     Args:
-        adapter: libraries to ask: names, or module:Class of your own adapter, whose module is
-            looked for in the working folder too (default: all).
+        adapter: libraries to test: names, or module:Class of your own adapter, whose module may be
+            in the working folder (default: all).
         case: names of cases, or beginnings of names (default: all).
         json: write a row for every answer here as JSON.
     """

@@ -12,10 +12,9 @@ ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
 def tidy(command: Callable[..., Any]) -> None:
-    """Join the lines of an argument's text, and name its default once.
+    """Take the help of each flag from the docstring, with lines joined.
 
-    The terminal breaks the lines. tyro's note of the default is omitted if the default is
-    nothing or the text names it.
+    tyro's note on the default is omitted if the default is empty or the text states it.
     """
     hints = get_type_hints(command, include_extras=True)
     texts = dict(ARGUMENT.findall(inspect.getdoc(command) or ""))

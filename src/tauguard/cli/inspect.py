@@ -1,4 +1,4 @@
-"""``tauguard inspect``: the content of a dataset, and whether it is intact."""
+"""``tauguard inspect``: show the content of a dataset and check its files."""
 
 from __future__ import annotations
 
@@ -20,23 +20,22 @@ def command(
     mcap: Path | None = None,
     robot: Path | None = None,
 ) -> None:
-    """Show the content of a generated dataset; with --verify read every byte of it.
+    """Show the content of a generated dataset; with --verify check all its bytes.
 
     The exit code is 2 if --verify finds damaged, missing or foreign files or leaks between splits,
-    or if --episode gives other bytes. The command that generated the dataset writes damaged files
-    again, and only those.
+    or if --episode gives other bytes. To repair damaged files, run the command that generated the
+    dataset again.
 
     Args:
         folder: folder of the dataset.
         verify: compare every file with its checksum.
         json: write the report here as JSON.
         figure: draw the report here (PNG).
-        episode: simulate this episode again, split/number (from 0), from its line of the manifest,
-            and check that it has the same bytes.
-        mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
-            turns that into an .rrd.
-        robot: with --episode, the file of its arm, if the arm does not come with the package.
-            The dataset holds the file's hash and the numbers for training, but not the shapes.
+        episode: simulate this episode, SPLIT/NUMBER (from 0), again from its line in the manifest,
+            and compare its bytes.
+        mcap: with --episode, write it here as a recording with obstacles, for `tauguard replay`.
+        robot: with --episode, the robot file of an arm that is not in the package. The dataset
+            contains only the file's hash and the parameters for training, not the shapes.
     """
     from tauguard.datasets import inspection
     from tauguard.datasets.dataset_folder import HEAD
@@ -110,7 +109,7 @@ def classes(name: str, one: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(report: Mapping[str, Any]) -> list[str]:
-    """Lines of text on missing and damaged files, and on what splits share."""
+    """Lines of text on missing and damaged files, and on leaks between splits."""
     lines = []
     gone, damaged = report["missing"], report["damaged"]
     if gone:

@@ -1,4 +1,4 @@
-"""``tauguard listen``: a detector beside a running robot, read-only."""
+"""``tauguard listen``: run a detector on a running robot, read-only."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ def command(
     record: Path | None = None,
     rerun: str | None = None,
 ) -> None:
-    """Watch a robot as it runs: free, collision or fault, live. Nothing is sent to the robot.
+    """Detect collisions of a running robot: free, collision or fault. Nothing is sent to the robot.
 
     One of --ur, --play, --stdin and --ros names the source of the samples. The command ends after
-    --seconds, with Ctrl-C, or when the robot has been gone for --reconnect seconds (exit code 3).
-    When no sample comes for 20 ms (2.5 sample intervals where that is longer), the state is
+    --seconds, with Ctrl-C, or if the robot is disconnected for --reconnect seconds (exit code 3).
+    After 20 ms without a sample (or 2.5 sample intervals, if longer) the state is
     `fault: no samples`.
 
     Args:
-        model: a detector that `tauguard train` wrote, for this arm and this rate.
+        model: a model file of `tauguard train` for this arm and sample rate.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         ur: host of a Universal Robots controller, read by RTDE.
         port: port of RTDE.
@@ -54,13 +54,13 @@ def command(
         columns: columns of a CSV file, see `tauguard detect`.
         stdin: read lines "t, q1.., qd1.., current1.." from the standard input.
         ros: topic with sensor_msgs/JointState, currents (or torques) in effort; needs ROS 2.
-        payload: what the arm carries, as KG or KG,X,Y,Z, see `tauguard detect`.
+        payload: load that the arm carries, as KG or KG,X,Y,Z, see `tauguard detect`.
         torque: the source gives joint torques [N m] instead of currents.
-        seconds: how long to listen (default: without end).
-        reconnect: seconds to go on trying when the connection breaks.
+        seconds: duration (default: without end).
+        reconnect: time for attempts to reconnect after a broken connection [s].
         json: write events and latencies here.
         record: write the received samples as MCAP here.
-        rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
+        rerun: `view` opens the rerun viewer; FILE.rrd records the same display in a file.
     """
     from tauguard.cli import expect
     from tauguard.datasets.real_arms import check_robot
@@ -119,7 +119,11 @@ def command(
 def with_load(
     alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
 ) -> CollisionAlarm:
-    """The detector for an arm with this load; refuses ``torque`` if it was trained on currents."""
+    """The detector for an arm with this load.
+
+    Raises:
+        ValueError: ``torque``, although the detector was trained on currents.
+    """
     from tauguard.datasets.arm_logs import parse_load
     from tauguard.detectors.alarms.training import carrying
 
@@ -129,7 +133,7 @@ def with_load(
 
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
-    """Refuse another number of joints or another rate than training's: ``ValueError``."""
+    """Raise ``ValueError`` if joints or sample rate differ from those of training."""
     from tauguard.detectors.samples import same_rate
 
     joints, dt = alarm.detector.arm.robot.joints, alarm.detector.dt
@@ -176,7 +180,7 @@ def opened(
 
 
 class Terminal:
-    """Prints a line at each change of state and, to a terminal, the score."""
+    """Prints a line at each change of the state and, on a terminal, the current score."""
 
     def __init__(self, threshold: float = 1.0, every: float = 0.1) -> None:
         """Keep the threshold of the score and the interval of its display [s]."""
@@ -185,7 +189,7 @@ class Terminal:
         self._live = sys.stdout.isatty()
 
     def show(self, sample: Sample, answer: Answer) -> None:
-        """Show an answer: a line at a change of state, and one for each new kind of reason."""
+        """Print a line if the state changes or a new kind of reason occurs."""
         now = time.monotonic()
         kind = answer.reason.removeprefix("settling again after ").partition(":")[0]
         changed = answer.state != self._state
@@ -296,7 +300,7 @@ def _us(value: float | None) -> str:
 
 
 def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
-    """Write the kept samples and their alarms as MCAP."""
+    """Write the recorded samples and their alarms as MCAP."""
     import numpy as np
 
     from tauguard.detectors import find_alarms

@@ -1,4 +1,4 @@
-"""``tauguard play-ur LOG``: send a log as a UR controller would, to test against."""
+"""``tauguard play-ur LOG``: send a log as a UR controller would, to test `listen`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,18 +13,18 @@ def command(
     port: int = 30004,
     fault: tuple[str, ...] = (),
 ) -> None:
-    """Play a log as a UR controller would send it: RTDE on 127.0.0.1, in real time.
+    """Send a log as a Universal Robots controller would: by RTDE on 127.0.0.1, in real time.
 
-    The log starts with the first client, and the command ends with the log. Inputs are refused,
-    because there is no robot that could move.
+    The log starts when the first client connects, and the command ends with the log. RTDE inputs
+    are refused.
 
     Args:
         log: CSV or MCAP of an arm with six joints.
         columns: columns of CSV files, see `tauguard detect`.
-        port: port of the server; 0 takes a free one and prints it.
-        fault: one or more faults to inject, NAME@SECONDS or NAME@SECONDS+DURATION. Names: frozen,
-            stale, encoder, missing, late, repeated, rate, jump, bias, saturated, swapped, sign,
-            nan.
+        port: port of the server; 0 chooses a free one and prints it.
+        fault: one or more faults to inject, NAME@SECONDS (lasts 1 s) or NAME@SECONDS+DURATION.
+            Names: frozen, stale, encoder, missing, late, repeated, rate, jump, bias, saturated,
+            swapped, sign, nan.
     """
     from tauguard.cli import expect
     from tauguard.datasets.logs import read_log

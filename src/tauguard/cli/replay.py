@@ -1,4 +1,4 @@
-"""``tauguard replay PATH``: convert recordings for rerun, show them there or in a browser."""
+"""``tauguard replay PATH``: convert recordings for rerun and show them."""
 
 import signal
 import subprocess
@@ -20,19 +20,19 @@ def command(
     web: bool = False,
     port: int = 0,
 ) -> None:
-    """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
+    """Convert an MCAP recording into an .rrd file that shows the moving arm and its signals.
 
-    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser. For a
-    folder of MCAP recordings, the newest one is taken. With --web or --open, an .rrd that was made
-    from PATH before is shown unchanged, unless --out, --robot or --whole is given.
+    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser. Of a
+    folder of MCAP recordings the newest one is converted. --web and --open use an existing .rrd of
+    PATH, unless --out, --robot or --whole is given.
 
     Args:
         path: an MCAP file written by tauguard, an .rrd file, or a folder of either.
         out: the .rrd file to write (default: PATH with the extension .rrd, if it does not exist).
-        robot: MJCF or URDF file of the robot (default: the one attached to PATH).
-        whole: keep the part before the first detection.
-        open: show it in the rerun viewer, which listens on 127.0.0.1 only.
-        web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
+        robot: MJCF or URDF file of the robot (default: the file attached to PATH).
+        whole: include the part before the first detection.
+        open: show the recording in the rerun viewer, which listens on 127.0.0.1 only.
+        web: serve the recording and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, port of the page (default: a free one).
     """
     from tauguard.cli import expect

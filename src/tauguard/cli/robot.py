@@ -1,4 +1,4 @@
-"""``tauguard robot``: known and derived numbers of an arm, and the source of each."""
+"""``tauguard robot``: the parameters of an arm, each with its source."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ def command(
     seed: int = 0,
     pictures: Path | None = None,
 ) -> None:
-    """Print the description of an arm as tauguard simulates it; without a name, the names.
+    """Print the parameters with which tauguard simulates an arm; without ROBOT, all named arms.
 
     Args:
         robot: a name, an MJCF or URDF file, or a TOML file that describes a robot.
-        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+        arm_joints: for a file with several chains, the arm's joints: names separated by commas, or
             FIRST..LAST.
-        download: download the model through mujoco-menagerie if it is not there yet.
+        download: download a missing model through mujoco-menagerie.
         json: write the description as JSON.
-        try_: run episodes of every environment with the arm, and report initial contacts, the
-            largest force and its bound, divergences, and tasks that standing still solves. The exit
-            code is 1 if something is wrong.
+        try_: run episodes of every environment with the arm. Reported are initial contacts, the
+            largest force and its bound, divergences, and tasks in which an arm at rest succeeds.
+            The exit code is 1 if something is wrong.
         episodes: with --try, number of episodes of each environment.
         seed: with --try, seed of the first episode.
         pictures: with --try, write a PNG of the start of an episode in each environment.
@@ -87,7 +87,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
     """Run the trial and print a line for each environment.
 
     Raises:
-        ValueError: ``pictures`` are asked for without OpenGL; raised before the trial.
+        ValueError: ``pictures`` need OpenGL, which is missing; raised before the trial.
         SystemExit: an environment does not pass.
     """
     from tauguard.envs.gym.trial import picture, try_arm

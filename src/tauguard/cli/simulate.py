@@ -1,4 +1,4 @@
-"""``tauguard simulate``: labelled episodes, as many as asked."""
+"""``tauguard simulate``: simulate labelled episodes and record them."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def command(
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
-    """Simulate labelled episodes of the arm at work and write one MCAP each.
+    """Simulate labelled episodes of a moving arm and write one MCAP file per episode.
 
-    A second run with the same flags continues where the first stopped.
+    A second run with the same flags continues where the first run stopped.
 
     Args:
         out: folder for the recordings; it is created if it does not exist.
@@ -51,7 +51,7 @@ def command(
         checkers: contact checkers (mujoco, cloth, rigid) to run at every step; the recordings and
             the replay show the contacts that they report.
         robot: name or file of the arm; see `tauguard robot`.
-        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+        arm_joints: for a file with several chains, the arm's joints: names separated by commas, or
             FIRST..LAST.
         objects: TOML file that describes the objects around the arm; the page "Build a scene of
             your own" explains its format.

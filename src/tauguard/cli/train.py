@@ -41,16 +41,16 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces it learns from labelled recordings, some with collisions. The threshold comes from
-    the collision-free ones, each scored by a detector that was trained without it. With
-    --calibration the threshold guarantees a rate of false alarms on motion like those recordings.
-    With --free and --robot it learns from logs of a real arm in which nothing touched the arm: at
-    least 10 s of motion, better two minutes. A card then says what the detector can find, and which
-    kinds of motion the logs lack.
+    --traces: it is trained on labelled recordings, some of them with collisions. The threshold
+    comes from the collision-free recordings, each scored by a detector that was trained without it.
+    With --calibration the threshold guarantees a rate of false alarms on motion like that in the
+    folder. --free and --robot: it is trained on logs in which nothing touched a real arm, with at
+    least 10 s of motion, better two minutes. A printed card then states the torques and forces that
+    the detector can find, and the kinds of motion that the logs lack.
 
     Args:
-        traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), or a
-            dataset (`tauguard generate`), whose first split it is trained on.
+        traces: folder of MCAP recordings with truth, as from `tauguard simulate`, or a dataset
+            (`tauguard generate`), of which the first split is used.
         model: the model file (default: model.skops). A file that you name is overwritten.
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Recordings with
@@ -60,11 +60,11 @@ def command(
             detector's own logs show a higher rate.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
-            the thresholds, so a log with conspicuously many alarms is named and left out.
-        twin: with --free, the TOML file that `tauguard twin` wrote of that arm: contacts are
-            learned on it and quietness from the logs, as with --traces; --robot is not needed.
-        robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains,
-            and so does the TOML file of `tauguard twin`.
+            the thresholds, so a log with far more alarms than the others is named and left out.
+        twin: with --free, the TOML file of `tauguard twin` for that arm. --detector is trained on
+            simulated contacts of the twin and on the logs; --robot is not needed.
+        robot: URDF or MJCF file of that arm; files of `tauguard calibrate` and `tauguard twin`
+            contain its gains.
         columns: columns of CSV files, see `tauguard detect`.
         gains: N m per ampere, one number for each joint (known for calibrated robot files and for
             ur10e).
@@ -72,12 +72,12 @@ def command(
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
         accept: with --free, names of logs to keep even if they stand out, and of checks that may
-            fail. alarms: cross-validated alarms above --false-alarms-per-hour, or bursts of torque
-            as contacts cause them. error: the residual exceeds its bounds half of the time.
-            gravity: gravity's torques differ from those of the robot file.
-        arm: of a dataset with several arms, the one that the detector is for.
-        folds: with --traces, number of folds of the cross-validation that sets the threshold, load
-            by load; each needs another fit (default: 3). 1 is quicker and keeps a third of the
+            fail. alarms: more alarms in cross-validation than --false-alarms-per-hour, or bursts
+            of torque as of contacts. error: the residual exceeds its bounds half of the time.
+            gravity: the gravity torques differ from those of the robot file.
+        arm: for a dataset with several arms, the arm of the detector.
+        folds: with --traces, number of folds of the cross-validation that sets the threshold; each
+            fold is a further training (default: 3). 1 is quicker and keeps a third of the
             recordings for the threshold.
         reading: with --free, how logs are read.
     """
@@ -126,7 +126,7 @@ def command(
 
 
 def _target(model: Path | None) -> Path:
-    """The file to write, in a folder that there is; one that was not named is not replaced."""
+    """The file to write; an existing file is replaced only if --model names it."""
     target = model or Path("model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
@@ -188,7 +188,7 @@ def labelled_motion(
 
 
 def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
-    """The rate that the threshold aims at, and its interval from the motion, as text."""
+    """The requested rate of false alarms, and the interval of rates that the motion allows."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
 
@@ -214,7 +214,7 @@ def free_motion(
     per_hour: float = 10.0,
     reading: Reading | None = None,
 ) -> None:
-    """Train on logs in which nothing touched the arm, as far as that is known."""
+    """Train on logs in which nothing should have touched the arm."""
     from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, hold_to
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown, read_logs, with_loads
@@ -244,7 +244,7 @@ def free_motion(
 def sifted_logs(
     recordings: dict[str, Recording], arm: ArmModel, accept: Sequence[str]
 ) -> tuple[dict[str, Recording], CrossValidation]:
-    """The logs to learn from; prints a note on each other one, and on what differs in these.
+    """The logs for the training; prints notes on logs that are left out or differ.
 
     Args:
         recordings: by file name.
@@ -252,7 +252,7 @@ def sifted_logs(
         accept: names of logs to keep in any case.
 
     Raises:
-        ValueError: a name of no log.
+        ValueError: ``accept`` names no log.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import log_named
@@ -267,7 +267,7 @@ def sifted_logs(
 
 
 def odd_notes(sifted: CrossValidation) -> list[str]:
-    """A line on each log that stands out, and on each whose torques differ all along."""
+    """A line on each log that stands out, or whose torques differ throughout."""
     from tauguard.detectors.evaluation.card_page import times
 
     notes = []
@@ -304,7 +304,7 @@ def _others(logs: Sequence[CrossValidatedLog]) -> str:
 def show_card(
     detector: FittedFreeMotion, traces: list[Trace], sifted: CrossValidation, target: Path | None
 ) -> None:
-    """Print what the detector can find, and draw it."""
+    """Print the threshold card of the detector, and draw it if ``target`` is given."""
     from tauguard.detectors.evaluation.card_page import draw, text
     from tauguard.detectors.evaluation.threshold_card import threshold_card
 

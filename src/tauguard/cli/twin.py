@@ -1,4 +1,4 @@
-"""``tauguard twin LOGS --robot FILE``: a simulated arm that is like the one in the logs."""
+"""``tauguard twin LOGS --robot FILE``: a simulated arm that behaves like the arm in the logs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from tauguard.detectors.calibration.recording import Recording
     from tauguard.twin import Likeness, Twin
 
-#: Parts of the logs of which each is left out in turn, for the intervals.
+#: Number of parts of the logs; leaving out each in turn gives the intervals.
 PARTS = 5
-#: Half a 95 % interval in standard deviations.
+#: Half width of a 95 % interval in standard deviations.
 WIDE = 1.96
 
 
@@ -37,24 +37,25 @@ def command(
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
-    """Identify a twin from logs in which nothing touched the arm, and judge it on others.
+    """Identify a twin from logs in which nothing touched the arm, and compare both in other motion.
 
-    The twin is a robot file: `simulate`, `generate` and every environment take it as --robot.
+    The twin is a robot file for `simulate --robot`, `generate` and the environments.
 
     Args:
         logs: CSV or MCAP files, or a folder of them.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
-        out: the twin, a TOML file; its bodies are written beside it.
+        out: the twin, a TOML file; its bodies are written into the same folder.
         columns: as for `tauguard calibrate`.
         gains: N m per ampere, one per joint.
         payload: loads that were carried, LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
-        torque: the logs hold joint torques in N m where they would hold currents.
-        judge: free logs without a load of programs that LOGS do not have; without them, each third
-            log of LOGS is left out for the judgement, and used for the twin afterwards.
-        accept: make a twin although a log has torque in bursts as of contacts (alarms).
-        figure: a PNG of residuals, real and simulated, with the verdict.
+        torque: the logs hold joint torques in N m instead of currents.
+        judge: free logs of other programs, without a load, for the comparison. By default every
+            third log of LOGS is compared with a twin of the others, and the written twin is
+            identified from all.
+        accept: alarms: make a twin although a log has bursts of torque like those of contacts.
+        figure: a PNG of real and simulated residuals with the results.
         reading: how logs are read.
-        json: write the figures here as JSON.
+        json: write the results here as JSON.
     """
     from tauguard.cli.free_logs import explain, free_logs
     from tauguard.cli.help_text import print_notes

@@ -17,16 +17,16 @@ def command(
     width: int = 640,
     height: int = 480,
 ) -> None:
-    """Draw an MCAP recording of the simulation: the scene, the arm and what moves around it.
+    """Render an MCAP recording of the simulation: arm, obstacles and people.
 
-    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Drawing needs OpenGL:
-    without a display install libegl1 or libosmesa6.
+    MP4 needs the extra `video`. Rendering needs OpenGL: without a display install libegl1 or
+    libosmesa6.
 
     Args:
-        recording: an MCAP file written by tauguard, or a folder, whose newest is taken.
+        recording: an MCAP file written by tauguard, or a folder, of which the newest is used.
         out: .gif, .webp, .png or .mp4 (default: RECORDING with the extension .gif).
-        start: start of the part that is drawn [s].
-        seconds: length of the drawn part [s] (default: to the end).
+        start: start of the rendered part [s].
+        seconds: length of the rendered part [s] (default: to the end).
         slower: factor by which the video is slower than real time.
         rate: frames per second.
         width: width of the picture [px].

@@ -24,19 +24,19 @@ def command(
     save: Path | None = None,
     port: int = 9876,
 ) -> None:
-    """Run an environment and show it as it happens: the scene, forces, limits, the detector.
+    """Run an environment and show scene, forces, limits and detector live.
 
     Args:
         environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
         policy: target (straight to the target, Cartesian control), random, still, or a file of
             examples/learn.py, which contains the keywords of its training.
-        seconds: simulated time; episodes follow one another.
+        seconds: simulated time, over one or more episodes.
         seed: seed of the first episode.
-        set: keywords of the environment, each NAME=VALUE, as in --set detector=observer.
+        set: keywords of the environment, NAME=VALUE each, as in --set detector=observer.
         reaction: reaction to an alarm or, without a detector, to a contact: stop0, stop1, stop2,
             retract, admittance.
-        save: instead of opening the viewer, write an .rrd file or, into a folder, an MCAP
-            recording of each whole episode for `tauguard video`.
+        save: instead of opening the viewer, write an .rrd file, or write an MCAP recording of each
+            complete episode into a folder, for `tauguard video`.
         port: port of the viewer, which listens on 127.0.0.1 only.
     """
     import gymnasium
@@ -75,7 +75,7 @@ def command(
 
 
 def policy_of(file: str, name: str) -> Any:
-    """The policy in a file, if it was trained in the environment of that name."""
+    """The policy in a file; ``ValueError`` if it was trained in another environment."""
     from tauguard.envs.policies import MlpPolicy
 
     if not Path(file).is_file():
@@ -119,7 +119,7 @@ def opened(inner: Any, save: Path | None, port: int) -> Any:
 
 
 def run(env: Any, policy: Any, seconds: float, seed: int, save: Path | None, port: int) -> None:
-    """Run episodes until the time is over, in real time unless they go into a file."""
+    """Run episodes for a simulated time, in real time unless they are written to a file."""
     inner = env.unwrapped
     view = opened(inner, save, port) if save is None or save.suffix == ".rrd" else None
     env.action_space.seed(seed)
@@ -167,7 +167,7 @@ def chosen(env: Any, inner: Any, policy: Any) -> Any:
     left = batch.observation[0, at : at + 3 * arms].reshape(arms, 3)
     action = np.zeros((arms, 6))
     largest = np.array([entry.high for entry in batch.actions]).reshape(arms, 6)[:, :3]
-    # A tenth of the distance a step, so that the tool slows down before it arrives.
+    # A tenth of the distance per step, so that the tool slows down before it arrives.
     action[:, :3] = np.clip(0.1 * left / largest, -1, 1)
     return action.ravel()
 
