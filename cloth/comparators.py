@@ -1,8 +1,7 @@
 """For comparison only: narrow phases of earlier work, with missed and false collisions.
 
-They use the candidates, data layout, compiler flags and threads of ab2pf, so a comparison
-measures the narrow phase alone. ``comparators.hpp`` says what was taken from which publication
-and what was inferred.
+They have the candidates, data layout, compiler flags and threads of ab2pf, so a comparison
+measures only the narrow phase. ``comparators.hpp`` names the publications and what was inferred.
 """
 
 import numpy as np
@@ -25,7 +24,7 @@ class ComparedMeshCCD(MeshCCD):
 
     Raises:
         ValueError: as :class:`MeshCCD`; isolated vertices or a minimum distance with a comparator,
-            which has neither.
+            which supports neither.
     """
 
     methods = METHODS
@@ -36,7 +35,7 @@ class ComparedMeshCCD(MeshCCD):
         checked, isolated = super()._checked_parts(faces, edges, points, groups)
         if isolated.points.size and self.method in COMPARATORS:
             raise ValueError(
-                f"method {self.method!r} has no queries of points; expected ab2pf or exact"
+                f"points: not available with method {self.method!r}; expected ab2pf or exact"
             )
         return checked, isolated
 
@@ -50,17 +49,17 @@ def solve(
     hit: NDArray[np.uint8],
     *out: NDArray[np.float64],
 ) -> dict[str, int]:
-    """Answer queries on shared positions with any of :data:`METHODS`, into the caller's arrays.
+    """Solve queries on shared positions with any of :data:`METHODS`, into the caller's arrays.
 
     Args:
-        vertex: Vertex and face, otherwise edge and edge.
+        vertex: True for vertex-face queries, False for edge-edge queries.
         x_t0: Positions at the start of the step. Shape (V, 3).
         x_t1: Positions at its end. Shape (V, 3).
         rows: Four vertices per query. Shape (N, 4).
         method: One of :data:`METHODS`.
         hit: Output. Shape (N,).
-        out: Output: toi, point, normal, weights as in :class:`tauguard.cloth.Impacts`, for hits
-            only.
+        out: Output: toi, point, normal and weights as in :class:`tauguard.cloth.Impacts`. Rows
+            without a hit are not written.
 
     Returns:
         The number of queries that each stage decided, as in :class:`tauguard.cloth.FrameStats`.

@@ -13,21 +13,28 @@ class FrameStats:
     """Counts and times of a frame.
 
     Attributes:
-        vf: Counts of the vertex-face side. Broad phase: ``node_tests``; ``front``, entries kept
-            for the next frame; ``leaf_pairs``; pairs left out because they share a vertex
-            (``adjacent``) or their groups never touch (``kept_apart``); ``candidates``. Candidates
-            without contact: ``axes`` (apart on an axis; counted with sweeping volumes only),
-            ``cubic_sign`` (the cubic has no root), ``roots`` (no contact at a root). Decided in
-            other ways: ``at_start`` (touch at the start), ``sliding`` (on a plane across an axis),
-            ``resolved`` (one by one, in ``intervals`` pieces of time), ``exact`` (in exact
-            arithmetic; ``long_exact`` of them with integers of any length). ``hits``: collisions.
-        ee: The same counts of the edge-edge side.
-        seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
-            ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),
-            ``total``; and ``vf_narrow``, ``ee_narrow``: the narrow phase alone, summed over
-            threads [s].
-        builds: Trees that were built anew in this frame.
-        bytes: Memory that the mesh keeps between frames.
+        vf: Counts of vertex-face pairs, by name. ``hits`` is the number of collisions.
+
+            Broad phase: ``node_tests``; ``front``, the entries kept for the next frame;
+            ``leaf_pairs``, the overlapping pairs of leaves; ``adjacent``, the pairs left out
+            because they share a vertex; ``kept_apart``, the pairs left out because of their groups;
+            ``candidates``.
+
+            Candidates without contact: ``axes``, apart on an axis (0 with moving volumes);
+            ``cubic_sign``, without a root of the coplanarity cubic; ``roots``, without contact at a
+            root.
+
+            Other candidates: ``at_start``, in contact at the start; ``sliding``, decided in a plane
+            perpendicular to an axis; ``resolved``, decided one by one by dividing the step into
+            ``intervals``; ``exact``, decided in exact arithmetic, of which ``long_exact`` needed
+            integers of any length.
+        ee: The same counts of edge-edge pairs.
+        seconds: Wall time of each phase [s]: ``project`` (positions onto the axes), ``build``,
+            ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each kind),
+            and ``total``. ``vf_narrow`` and ``ee_narrow`` are the time of the narrow phase summed
+            over threads [s].
+        builds: Number of trees that were built in this frame.
+        bytes: Memory that the mesh keeps between frames [bytes].
     """
 
     vf: dict[str, int]

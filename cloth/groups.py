@@ -10,20 +10,17 @@ from tauguard.geometry import Rebuilt, frozen, frozen_indices
 
 @dataclass(frozen=True, eq=False)
 class Groups(Rebuilt):
-    """The group of every vertex, and a table of the pairs of groups to test.
-
-    Both are read-only copies.
+    """The group of every vertex, and a table of the pairs of groups to test; read-only copies.
 
     Attributes:
         ids: Shape (V,), the group of every vertex, 0 to G - 1. All vertices of a face belong to one
             group.
         meets: Shape (G, G), symmetric. ``meets[a, b]`` is False where features of ``a`` and ``b``
-            are not to be tested; ``meets[a, a]`` is False for a body that is not tested against
-            itself.
+            are not tested; ``meets[a, a]`` is False for a body that is not tested against itself.
 
     Raises:
         ValueError: the table is not square, not symmetric or not of bools (or 0 and 1), or an id
-            has no row in it.
+            has no row in the table.
 
     Example:
         A cloth (group 0) that meets itself and a rigid body (group 1) that meets the cloth only::

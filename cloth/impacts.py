@@ -1,18 +1,22 @@
 """Single queries: contact of a moving vertex and face, or of two moving edges.
 
-There are also queries of points with edges and points, which the kernels treat as faces
-without area.
+Queries of a point with an edge or with a point are vertex-face queries with a degenerate face.
 
-ab2pf takes the given doubles as exact. A query is a hit if and only if there is a contact at
-some time of the step in exact arithmetic. ``toi`` is at most 1e-9 of the step before the first
-such time. The cost of a query is bounded. First its cubic is split three times, into at most three
-pieces with one root each, which take 40 Newton steps each. Undecided queries are split into at
-most 124 intervals, with 20 separating directions each. A fixed number of signs decides the rest:
-signs of polynomials of degree 3, in integers of fixed width and then of any length. Most queries
-take some 20 ns, and those that need the fixed width 3 us. The worst take 200 us for positions of
-similar magnitude, and 0.2 s if magnitudes within one query span 10^600, the widest range of
-doubles. A query with a minimum distance takes at most 4001 cuts, uses no exact arithmetic and is
-conservative.
+The method ``ab2pf`` takes the given doubles as exact. A query is a hit if and only if the features
+touch, in exact arithmetic, at some time of the step. ``toi`` is at most 1e-9 of the step before the
+first such time. The cost of a query is bounded:
+
+1. The coplanarity cubic is cut at most three times, into at most three pieces with one root each.
+   A root takes at most 40 Newton steps.
+2. Undecided queries are divided into at most 124 intervals of time, each with 20 tests of a
+   separating direction.
+3. The rest is decided by a fixed number of signs of polynomials of degree 3, in integers of fixed
+   width and, if these are too short, of any length.
+
+Most queries take some 20 ns; those that need integers of fixed width take 3 us. The slowest take
+200 us for positions of similar magnitude, and 0.2 s if magnitudes within one query span 10^600,
+the range of doubles. A query with a minimum distance is conservative: it takes at most 4001 cuts
+and uses no exact arithmetic.
 """
 
 from collections.abc import Mapping
@@ -24,8 +28,8 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.geometry import finite
 
-#: Methods of the narrow phase by name; both are correct for all finite doubles. "exact" uses exact
-#: arithmetic throughout (some 100 us a query) and is the reference of "ab2pf".
+#: Methods of the narrow phase by name; both are correct for all finite doubles. "exact" uses only
+#: exact arithmetic (some 100 us per query) and is the reference for "ab2pf".
 METHODS: dict[str, int] = {"ab2pf": 0, "exact": 1}
 
 
@@ -34,16 +38,17 @@ class Impacts:
     """First contacts, one per row.
 
     Attributes:
-        hit: Shape (N,).
+        hit: Whether there is contact within the step. Shape (N,).
         toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
         point: The point of contact at that time; NaN without a hit. Shape (N, 3).
         normal: Unit normal at that time: of the face by its winding, (f1 - f0) x (f2 - f0), or of
             both edges, (ea1 - ea0) x (eb1 - eb0). Its sign does not tell from which side the
-            features approach, and with a ``min_distance`` it is not the direction between them. It
-            is zero for a face without area or parallel edges, and NaN without a hit. Shape (N, 3).
-        weights: Weights of a row's four vertices: (1, w, w, w) of the vertex and the face's
-            vertices, or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4); (N, 3) of a
-            point and an edge's ends, (N, 2) of two points.
+            features approach. With a ``min_distance`` it is not the direction between the features.
+            It is zero for a face without area or for parallel edges, and NaN without a hit. Shape
+            (N, 3).
+        weights: Barycentric weights of the contact point: (1, w0, w1, w2) for the vertex and the
+            vertices of the face, or (1 - s, s, 1 - t, t) for the ends of both edges, shape (N, 4).
+            For a point and the ends of an edge shape (N, 3), for two points (N, 2).
 
     If coordinates exceed 1e75 or are all below 1e-60, normal and weights can be zero or NaN.
     """
@@ -58,17 +63,19 @@ class Impacts:
 def vertex_face(
     x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
 ) -> Impacts:
-    """First contact of a vertex with a face, all four vertices moving linearly.
+    """First contact of a vertex with a face; all four vertices move linearly.
 
     Args:
-        x_t0: Positions at the start of the step [any unit]: vertex, three of the face. (N, 4, 3).
-        x_t1: At its end. Shape (N, 4, 3).
+        x_t0: Positions at the start of the step [any unit]: the vertex, then the three vertices of
+            the face. Shape (N, 4, 3).
+        x_t1: Positions at the end of the step. Shape (N, 4, 3).
         method: One of :data:`tauguard.cloth.METHODS`.
-        min_distance: Counts as contact, in the unit of the positions; conservative there. Only
-            ab2pf has one.
+        min_distance: Distance that counts as contact, in the unit of the positions. Above 0 the
+            result is conservative, and the method must be ``ab2pf``.
 
     Raises:
-        ValueError: wrong shapes, entries that are not finite, no such method, a negative distance.
+        ValueError: wrong shapes, entries that are not finite, an unknown method, or a distance that
+            is negative or not available with the method.
     """
     return _solve(True, x_t0, x_t1, method, min_distance)
 
@@ -76,26 +83,27 @@ def vertex_face(
 def edge_edge(
     x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
 ) -> Impacts:
-    """First contact of two edges (two ends each, four rows a query); see :func:`vertex_face`."""
+    """First contact of two edges, given by the ends of both; see :func:`vertex_face`."""
     return _solve(False, x_t0, x_t1, method, min_distance)
 
 
 def point_edge(
     x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
 ) -> Impacts:
-    """First contact of a point with an edge, all moving linearly; as exact as the others.
+    """First contact of a point with an edge; the point and both ends move linearly.
 
     Args:
-        x_t0: Positions at the start of the step [any unit]: point, both ends. Shape (N, 3, 3).
-        x_t1: At its end. Shape (N, 3, 3).
-        method: One of :data:`tauguard.cloth.METHODS`.
-        min_distance: Counts as contact, in the unit of the positions; conservative there.
+        x_t0: Positions at the start of the step [any unit]: the point, then both ends. Shape
+            (N, 3, 3).
+        x_t1: Positions at the end of the step. Shape (N, 3, 3).
+        method: As for :func:`vertex_face`.
+        min_distance: As for :func:`vertex_face`.
 
     Returns:
-        Impacts with weights of the point and the ends, shape (N, 3), and zeros for normals.
+        Impacts with weights of the point and the ends, shape (N, 3). Normals are zero.
 
     Raises:
-        ValueError: as :func:`vertex_face`, or another method.
+        ValueError: as :func:`vertex_face`.
     """
     found = _solve_points([0, 1, 2, 2], x_t0, x_t1, method, min_distance)
     weights = np.concatenate(
@@ -123,28 +131,28 @@ def _solve_points(
 
 
 def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
-    """The number of a method; ``ValueError`` with the known names for another name."""
+    """The number of a method; an unknown name raises a ``ValueError`` with the known ones."""
     if not isinstance(method, str) or method not in methods:
         raise ValueError(
-            f"method {method!r}: expected one of {', '.join(methods)}; the methods that "
-            "tauguard.cloth.comparators has are for comparison only"
+            f"method {method!r}: expected one of {', '.join(methods)}; for comparison only, there "
+            "are more in tauguard.cloth.comparators"
         )
     return methods[method]
 
 
 def checked_distance(min_distance: float, method: str) -> float:
-    """A finite distance of at least 0 (0 unless the method is ab2pf); ``ValueError`` otherwise."""
+    """Return the distance; ``ValueError`` if it is not finite, negative, or not for the method."""
     distance = np.nan
     try:
         array = np.asarray(min_distance)
         value = array.item() if array.ndim == 0 else None
         if isinstance(value, int | float | np.floating) and not isinstance(value, bool):
             distance = float(value)
-    except (ValueError, OverflowError):  # lists of different lengths, a number beyond the doubles
+    except (ValueError, OverflowError):  # a ragged list, or an integer too large for a double
         pass
     if distance > 0 and method != "ab2pf":
         raise ValueError(
-            f"min_distance: {min_distance} with method {method!r}: only ab2pf takes one"
+            f"min_distance: {min_distance} with method {method!r}; expected 0, or method ab2pf"
         )
     if not (np.isfinite(distance) and distance >= 0):
         raise ValueError(f"min_distance: {min_distance!r:.40}, expected a finite number >= 0")

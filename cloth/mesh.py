@@ -1,11 +1,14 @@
 """Continuous collision detection of a deforming triangle mesh, with one call per frame.
 
-The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), refitted every frame, and the
-front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). Three choices are
-our own. Vertices, edges and faces have separate trees with 16 features per leaf, so that no
-elementary pair is tested twice. Volumes may *move*: instead of one interval that covers
-the step they have an interval at each of its ends. This gives fewer candidates and no misses (see
-``k_dop.hpp``). Features can be added and removed without a rebuild (``update_topology``).
+The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), which is refitted every frame,
+and the front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). It differs
+from these publications in three points:
+
+* Vertices, edges and faces have separate trees with 16 features per leaf, so that no elementary
+  pair is tested twice.
+* *Moving* volumes have an interval at each end of the step instead of one that covers the step.
+  They give fewer candidates and miss no collision (see ``k_dop.hpp``).
+* Features can be added and removed without a rebuild (``update_topology``).
 """
 
 import time
@@ -23,14 +26,15 @@ from tauguard.cloth.impacts import METHODS, Impacts, checked_distance, method_nu
 from tauguard.cloth.topology import Isolated, Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
-#: Bounding volumes by name: k, and whether they move with the step or sweep it.
+#: Bounding volumes by name: k, and whether the volume is moving (two intervals per axis, one at
+#: each end of the step) or covers the whole step.
 VOLUMES: dict[str, tuple[int, bool]] = {
     f"{prefix}k_dop{k}": (k, bool(prefix))
     for prefix in ("", "moving_")
     for k in (6, 14, 16, 18, 26)
 } | {"aabb": (6, False), "moving_aabb": (6, True)}
 
-#: Default limits of ``find`` and ``candidates``, for each kind.
+#: Default limits of ``find`` and ``candidates``, for each kind of pair.
 MOST_COLLISIONS, MOST_CANDIDATES = 4_000_000, 50_000_000
 
 _NO_GROUPS = (np.zeros(0, dtype=np.int32), np.zeros((0, 0), dtype=np.uint8))
@@ -40,30 +44,31 @@ class MeshCCD:
     """Every collision of a deforming mesh with itself (or between its parts) in each step.
 
     Args:
-        faces: Shape (F, 3), three different vertices each; may be empty. Only vertices that a face,
-            an edge or a point uses take part.
+        faces: Shape (F, 3), three different vertices each; may be empty. Vertices that no face,
+            edge or point uses are ignored.
         method: Method of the narrow phase, one of :data:`tauguard.cloth.METHODS`.
         threads: 0 means all processors. Results do not depend on it.
-        groups: Parts to test against each other. ``None``: every part against all and itself.
+        groups: Groups of vertices, and the pairs of groups to test. ``None``: test everything.
         volume: One of :data:`VOLUMES`. All find the same collisions; they differ in cost.
         edges: Edges without a face (rods, wires), shape (L, 2); edges of faces are ignored.
         points: Vertices without face or edge to test (particles), shape (P,).
 
     Attributes:
-        method, threads, volume: As given, ``threads`` with 0 as the number of processors.
+        method, threads, volume: As given; ``threads`` 0 is replaced by the number of processors.
         broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
 
-    The hierarchy is built in the first frame and kept; a call is one step of a motion in which
-    every vertex moves linearly. It works on copies of its arguments. Calls from several Python
-    threads on one object wait for each other; Ctrl-C ends a call, and the object can be used again.
-    Its copy in a forked process can be used, too. If another thread was in a call at the fork, the
-    copy raises a ``RuntimeError``. Attributes cannot be assigned; :meth:`update_topology` changes
-    faces and groups.
+    A call handles one step, in which every vertex moves linearly. The hierarchy is built in the
+    first call and kept. Arguments are copied.
+
+    Calls from several Python threads on one object wait for each other. Ctrl-C ends a call, and the
+    object can be used again. So can its copy in a forked process, unless another thread was in a
+    call at the fork; then the copy raises a ``RuntimeError``. Attributes cannot be assigned;
+    :meth:`update_topology` changes faces and groups.
 
     Raises:
         ValueError: a face repeats a vertex, an index is negative, a face mixes groups, ``groups``
-            is no :class:`Groups`, ``threads`` no int from 0 to 1024, or there is no such method or
-            volume.
+            is not a :class:`Groups`, ``threads`` is not an integer from 0 to 1024, or the method or
+            volume is unknown.
     """
 
     #: Values of ``method``, with the numbers of the native module.
@@ -93,14 +98,14 @@ class MeshCCD:
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Faces as rows of vertices, read-only; ``Frame.vf`` refers to them. Shape (F, 3)."""
+        """Faces as rows of vertices, read-only; ``Frame.vf`` has row numbers. Shape (F, 3)."""
         return self._topology.faces
 
     @property
     def edges(self) -> NDArray[np.int32]:
-        """Edges of the faces and the given ones, each once, smaller vertex first, read-only.
+        """All edges, of faces and given ones, each once, smaller vertex first, read-only.
 
-        ``Frame.ee`` refers to them. Shape (E, 2).
+        ``Frame.ee`` has row numbers of this array. Shape (E, 2).
         """
         return self._topology.edges
 
@@ -142,11 +147,12 @@ class MeshCCD:
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
-            min_distance: Pairs that come this close count, in the unit of the positions. The
-                answer is conservative, and exact at 0 (with an exact method).
-            fresh: Descend from the root instead of the last frame's front. The answer is the same.
-            limit: Most collisions of either kind (some 300 bytes each), and an eighth of the pairs
-                of leaves that may be held (16 bytes each).
+            min_distance: Distance that counts as contact, in the unit of the positions. Results are
+                exact for 0 and conservative otherwise.
+            fresh: Start the traversal at the root instead of the last frame's front. The result is
+                the same.
+            limit: Largest number of collisions of each kind (some 300 bytes each). The number of
+                overlapping pairs of leaves (16 bytes each) is limited to 8 times this number.
 
         Raises:
             ValueError: as :meth:`candidates`.
@@ -179,23 +185,27 @@ class MeshCCD:
         fresh: bool = False,
         limit: int = MOST_CANDIDATES,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Candidates of the broad phase: volumes overlap, no common vertex, groups to test.
+        """Candidates of the broad phase.
+
+        The two features of a candidate have overlapping volumes, no common vertex, and groups that
+        are to be tested.
 
         Args:
-            x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
-            x_t1: Positions at its end. Shape (V, 3).
-            min_distance: Pairs that come this close count, in the unit of the positions.
-            fresh: Descend from the root instead of the last frame's front. The answer is the same.
-            limit: Largest number of candidates of either kind (some 30 bytes each).
+            x_t0: As for :meth:`find`.
+            x_t1: As for :meth:`find`.
+            min_distance: As for :meth:`find`.
+            fresh: As for :meth:`find`.
+            limit: Largest number of candidates of each kind (some 30 bytes each).
 
         Returns:
             Rows (vertex, face), shape (M, 2), and rows of two edges (smaller first), shape (K, 2),
             sorted.
 
         Raises:
-            ValueError: positions that are not finite or not (V, 3), of different sizes at both
-                ends, of a size that the faces or earlier frames do not have; a distance that is
-                negative or no number; ``fresh`` that is no bool; more than ``limit``.
+            ValueError: positions that are not finite or not of shape (V, 3); a number of vertices
+                that differs between the ends of the step, from earlier frames or from ``groups``,
+                or that is too small for the faces; a distance that is not a number or negative; a
+                ``fresh`` that is not a bool; or more candidates than ``limit``.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
             *self._checked_step(x_t0, x_t1),
@@ -213,22 +223,22 @@ class MeshCCD:
         fraction: float = 0.9,
         limit: int = MOST_COLLISIONS,
     ) -> float:
-        """A fraction ``s`` of a step without contact, by which a solver scales its step.
+        """A fraction ``s`` such that the step scaled by ``s`` has no contact.
 
-        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)`` is rounded to doubles and tested
-        again until it has no contact. So rounding cannot add a contact, and the next step starts
-        without one.
+        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)`` is rounded to doubles and tested;
+        ``s`` is reduced until this step has no contact. So rounding cannot add a contact, and the
+        next step starts without one.
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
             min_distance: Smallest distance allowed, in the unit of the positions.
-            fraction: Fraction of the path to the first contact to use, above 0 and below 1.
+            fraction: Part of the time until the first contact that is used, above 0 and below 1.
             limit: As in :meth:`find`.
 
         Returns:
-            1.0 if the whole step has no contact. 0.0 if there is contact at its start, or no
-            positive step is found.
+            1.0 if the whole step has no contact. 0.0 if there is contact at its start or no
+            positive fraction is found.
 
         Raises:
             ValueError: as :meth:`find`, or a ``fraction`` outside (0, 1).
@@ -254,23 +264,23 @@ class MeshCCD:
         edges: ArrayLike | None = None,
         points: ArrayLike | None = None,
     ) -> dict[str, Any]:
-        """Replace the faces: some removed, added or split (cutting, tearing).
+        """Replace the faces, for example by a cut or tear that removes, adds or splits some.
 
-        The hierarchy is updated and the front is reused; only the first change that adds features
-        rebuilds it, with room for more. Later answers, and the numbers of edges and faces, are
-        those of a new ``MeshCCD`` of ``faces``. The number of vertices may change.
+        The hierarchy is updated and the front is reused. Only the first change that adds features
+        rebuilds the hierarchy, with free room for more. Later results, and the numbers of edges and
+        faces, are those of a new ``MeshCCD`` of ``faces``. The number of vertices may change.
 
         Args:
-            faces: Shape (F', 3), the complete new list. Rows that were there before count
-                as unchanged.
+            faces: Shape (F', 3), the complete new list. Rows that were present before count as
+                unchanged.
             groups: Groups of all vertices; ``None`` keeps the present ones.
             edges: Isolated edges; ``None`` keeps the present ones.
             points: Isolated vertices; ``None`` keeps the present ones.
 
         Returns:
-            ``{"vertices", "edges", "faces"}``: (removed, added); isolated edges and vertices count
-            as faces, too. ``"rebuilt"``: how many of the three trees had no room left and are
-            rebuilt in the next frame.
+            ``"vertices"``, ``"edges"``, ``"faces"``: numbers (removed, added); isolated edges and
+            vertices also count as faces. ``"rebuilt"``: how many of the three trees had no room
+            left, so that they are rebuilt in the next frame.
 
         Raises:
             ValueError: as the constructor.

@@ -17,11 +17,11 @@ _MOST = np.iinfo(np.int32).max
 
 @dataclass(frozen=True, eq=False)
 class Isolated:
-    """Isolated edges (of no face) and isolated vertices (of no face and no edge), sorted, unique.
+    """Edges that belong to no face, and vertices that belong to no face and no edge.
 
     Attributes:
-        edges: Smaller vertex first. Shape (L, 2).
-        points: Isolated vertices. Shape (P,).
+        edges: Isolated edges, smaller vertex first, sorted and unique. Shape (L, 2).
+        points: Isolated vertices, sorted and unique. Shape (P,).
     """
 
     edges: NDArray[np.int32]
@@ -53,7 +53,7 @@ class Isolated:
         )
 
     def rows(self) -> NDArray[np.int32]:
-        """Faces without area, as the kernel takes them: edges (a, b, b), points (p, p, p)."""
+        """Degenerate faces for the kernel: edges as (a, b, b), points as (p, p, p)."""
         return np.concatenate([self.edges[:, [0, 1, 1]], np.repeat(self.points, 3).reshape(-1, 3)])
 
 
@@ -67,7 +67,7 @@ class Topology:
         edges: NDArray[np.int32],
         groups: Groups | None,
     ) -> None:
-        """Check everything; the edges are those of the faces and the isolated ones, sorted."""
+        """``edges``: all edges, of faces and isolated ones, sorted."""
         self.faces, self.isolated, self.edges, self.groups = faces, isolated, edges, groups
         used = max(
             (int(x.max()) for x in (faces, isolated.edges, isolated.points) if x.size), default=-1
@@ -99,7 +99,7 @@ class Topology:
         self._vertices = start
 
     def parts(self, pairs: NDArray[np.int32], impacts: Impacts) -> dict[str, Any]:
-        """Split pairs into vertex-face pairs and those with isolated vertices or edges."""
+        """Divide vertex-face pairs of the kernel by the second feature: face, edge or vertex."""
         number = pairs[:, 1] - len(self.faces)
         edges = len(self.isolated.edges)
         of_face, of_point = number < 0, number >= edges

@@ -15,7 +15,7 @@ def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArra
 
 
 def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """As :func:`finite`, but an entry may be NaN or infinite."""
+    """As :func:`finite`, but NaN and infinite entries are accepted."""
     try:
         given = np.asarray(value)
         if given.dtype.kind in "cSUVMm":
@@ -31,7 +31,7 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
 
 
 def all_finite(name: str, array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``array``, if every entry is finite; else the error of :func:`finite`."""
+    """Return ``array``, or raise the error of :func:`finite` if an entry is not finite."""
     if not np.isfinite(array).all():
         bad = np.argwhere(~np.isfinite(array))[0]
         where = f"row {bad[0]}" if array.ndim > 1 else f"index {bad[0]}"
@@ -45,7 +45,8 @@ def indices(
     """``value`` as a C-contiguous int32 array of ``shape`` with entries in ``[0, upper)``.
 
     Raises:
-        ValueError: not integers, another shape, or an index out of range (named with its row).
+        ValueError: entries that are not integers, another shape, or an index out of range (the
+            message names its row).
     """
     array = np.asarray(value)
     if array.size == 0:

@@ -1,4 +1,4 @@
-"""Immutable arrays for native kernels, which keep arrays after they were checked."""
+"""Immutable arrays: native kernels read them long after they were checked."""
 
 from dataclasses import fields
 from typing import Any, TypeVar
@@ -12,14 +12,14 @@ _T = TypeVar("_T", bound=np.generic)
 
 
 def frozen(array: NDArray[_T]) -> NDArray[_T]:
-    """A C-contiguous copy over immutable memory, which no flag makes writeable again."""
+    """A C-contiguous copy in immutable memory; ``setflags`` cannot make it writeable."""
     if array.size == 0:
         return sealed(np.empty(array.shape, dtype=array.dtype))
     return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape)
 
 
 def sealed(array: NDArray[_T]) -> NDArray[_T]:
-    """A read-only view, without a copy, of an array that only the caller holds."""
+    """A read-only view without a copy. The caller must have the only reference to ``array``."""
     array.setflags(write=False)
     return array[:]
 
@@ -27,19 +27,19 @@ def sealed(array: NDArray[_T]) -> NDArray[_T]:
 def frozen_finite(
     name: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
-    """As :func:`finite`, but a private copy, so that nothing can change it after the check."""
+    """As :func:`finite`, but an immutable copy."""
     return all_finite(name, frozen(numbers(name, value, shape)))
 
 
 def frozen_indices(
     name: str, value: ArrayLike, shape: tuple[int | None, ...], upper: int
 ) -> NDArray[np.int32]:
-    """As :func:`indices`, but a private copy, so that nothing can change it after the check."""
+    """As :func:`indices`, but an immutable copy."""
     return indices(name, frozen(indices(name, value, shape, upper)), shape, upper)
 
 
 class Rebuilt:
-    """Mixin of frozen dataclasses: a copy or an unpickled value passes the constructor's checks."""
+    """Mixin for frozen dataclasses: ``copy`` and ``pickle`` call the constructor and its checks."""
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """The class and the arguments of its constructor."""

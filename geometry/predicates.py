@@ -16,10 +16,11 @@ def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
-        Shape (N,), each -1, 0 or 1, never wrong.
+        Exact signs -1, 0 or 1. Shape (N,).
 
     Raises:
-        ValueError: wrong shape, an entry that is not finite, or ``threads`` no int from 0 to 1024.
+        ValueError: wrong shape, an entry that is not finite, or ``threads`` is not an integer from
+            0 to 1024.
     """
     array = finite("points", points, (None, 4, 3))
     out = np.empty(len(array), dtype=np.int8)

@@ -1,5 +1,5 @@
-# -DTAUGUARD_SANITIZE=address (with undefined), thread, or fuzzer (of Clang, with both of the first):
-# what native targets are built with.
+# Sanitizers of the native targets. -DTAUGUARD_SANITIZE=address: AddressSanitizer and
+# UndefinedBehaviorSanitizer; =thread: ThreadSanitizer; =fuzzer (Clang only): libFuzzer with the first two.
 set(TAUGUARD_SANITIZE "" CACHE STRING "address (and undefined behaviour), thread or fuzzer; empty: none")
 
 function(tauguard_sanitize target)

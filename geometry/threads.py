@@ -8,10 +8,10 @@ MOST_THREADS = 1024
 
 
 def thread_count(threads: int) -> int:
-    """The number of threads; 0 stands for all processors.
+    """The number of threads; 0 means all processors.
 
     Raises:
-        ValueError: no integer, negative, or more than 1024.
+        ValueError: ``threads`` is not an integer from 0 to 1024.
     """
     try:
         count = operator.index(threads)

@@ -1,8 +1,9 @@
 """For comparison only: methods that the studies measure; no query of the package uses them.
 
-Textbook separating axes (Ericson 2005, 5.2.1) in plain arithmetic, whose answers rounding can
-make wrong; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and single bounding
-volumes, which are built, moved and tested as in figure 1.1 of the dissertation.
+* Textbook separating axes (Ericson 2005, 5.2.1) without error bounds: rounding can make an answer
+  wrong.
+* Mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls.
+* Single bounding volumes, which are built, moved and tested as in figure 1.1 of the dissertation.
 """
 
 from typing import Any
@@ -16,7 +17,7 @@ from tauguard.rigid.mesh import MeshTree
 from tauguard.rigid.queries import native, native_overlap, refuse_hulls, rows
 from tauguard.rigid.shapes import Bodies
 
-#: Classes of single bounding volumes over runs of triangles, by name.
+#: Classes of single bounding volumes by name; each volume contains consecutive triangles.
 VOLUMES: dict[str, Any] = {
     "sphere": _rigid_mesh.BallVolumes,
     "aabb": _rigid_mesh.AabbVolumes,
@@ -35,7 +36,7 @@ def overlap_by(
     Besides the methods of :func:`tauguard.rigid.overlap` there is ``"sat_textbook"``.
 
     Raises:
-        ValueError: lengths that do not match, ``sat_textbook`` of hulls or polygons.
+        ValueError: lengths that do not match, or ``sat_textbook`` for hulls or polygons.
     """
     if method != "sat_textbook":
         return native_overlap(a, b, method, threads)

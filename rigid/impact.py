@@ -41,21 +41,22 @@ def time_of_impact(
     with a bound on the second derivative: it converges quadratically, from below.
 
     Args:
-        a: N convex bodies of one kind, rounded or not, or one; or a mesh, of which only the surface
-            is tested (not its inside).
-        b: The same for the other side; two meshes may have different bounding volumes.
+        a: N convex bodies of one kind, with or without radii, or one body. Or a mesh: its surface
+            is tested, not its inside.
+        b: As ``a``. Two meshes may have different bounding volumes.
         motion_a: N motions, or one.
         motion_b: N motions, or one.
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
-        ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b), with
-        meshes also the ``faces``. If two bodies overlap at t = 0, the time is 0, the normal NaN
-        and the point common to both.
+        ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b); with a
+        mesh also ``faces``. If two bodies overlap at t = 0, the time is 0, the normal is NaN and
+        the point is in both bodies.
 
     Raises:
-        ValueError: lengths that do not match, no motion, polygons, or a coordinate beyond 1e100,
-            whose products would overflow (for bodies beside a mesh beyond 1e30, as for the mesh).
+        ValueError: lengths that do not match, a motion that is not a ``Motion``, polygons, or a
+            coordinate beyond 1e100, whose products would overflow (with a mesh: a coordinate of
+            the bodies beyond 1e30).
     """
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
         if not isinstance(motion, Motion):

@@ -18,12 +18,12 @@ Volume = Literal["obb", "aabb"]
 
 @dataclass(frozen=True, eq=False)
 class MeshOverlap:
-    """First hit of two meshes, one row per pose.
+    """Overlap of two meshes, or of a mesh and convex bodies, one row per pose or body.
 
     Attributes:
-        hit: True if the surfaces share a point (touching is a hit). Shape (N,).
-        faces: A pair of faces that meet, (face of this mesh, face of the other); -1 where there is
-            none, and for convex bodies. Shape (N, 2).
+        hit: True if the two share a point (touching is a hit). Shape (N,).
+        faces: One intersecting pair, (face of this mesh, face of the other). Without a hit, and on
+            the side of a convex body, the entry is -1. Shape (N, 2).
     """
 
     hit: NDArray[np.bool_]
@@ -32,15 +32,15 @@ class MeshOverlap:
 
 @dataclass(frozen=True, eq=False)
 class MeshContacts:
-    """Every pair of faces that intersect, in the order of pose, face, other face.
+    """Every intersecting pair of faces, sorted by pose, face and other face.
 
     Attributes:
         pose: The row of the pose. Shape (M,).
         faces: Face of this mesh and face of the other. Shape (M, 2).
         point: The middle of the triangles' intersection, in this mesh's frame. Shape (M, 3).
-        normal: Unit, from this mesh to the other: the direction of the shortest path on which the
-            other's triangle separates from this one. Shape (M, 3).
-        penetration: Length of that path, 0 if they just touch. Shape (M,), m.
+        normal: Direction of the shortest translation of the other mesh's triangle that separates
+            the two triangles. Unit vector. Shape (M, 3).
+        penetration: Length of this translation; 0 if the triangles just touch. Shape (M,), m.
     """
 
     pose: NDArray[np.int32]
@@ -56,17 +56,18 @@ class MeshContacts:
 class MeshTree:
     """A bounding-volume tree over the triangles of one rigid mesh.
 
-    Nodes have eight children, split by the surface-area heuristic. ``obb``, the default, gives
-    every child an oriented box along the principal axes of its surface (Gottschalk, Lin and Manocha
-    1996), kept in single precision and tested eight at a time; it was fastest on all measured
-    meshes (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's own
-    frame. They are tested in the same way against the other mesh's boxes, which the pose turns. It
-    builds in two thirds of the time, so it is the better choice for at most a few thousand poses.
-    The volume never changes an answer.
+    Nodes have eight children, divided by the surface-area heuristic. The children's volumes are
+    stored in single precision and tested eight at a time. The volume never changes an answer:
+
+    * ``obb``, the default: oriented boxes along the principal axes of each child's surface
+      (Gottschalk, Lin and Manocha 1996). Their queries are the fastest on all meshes that
+      ``tauguard bench rigid`` measures.
+    * ``aabb``: boxes along the axes of the mesh's frame. The tree builds in two thirds of the time,
+      which pays off for at most a few thousand poses.
 
     Exactness: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
-    double precision and rounded. Whether two triangles of the resulting corners share a point is
-    then decided without error, degenerate triangles included.
+    double precision and rounded. Whether two triangles with these corners share a point is decided
+    exactly, also for degenerate triangles.
 
     Args:
         vertices: Shape (V, 3), m.
@@ -135,7 +136,7 @@ class MeshTree:
         The search stops as soon as it finds a pair.
 
         Args:
-            other: A mesh that was built with the same volume.
+            other: A mesh whose tree has the same volume.
             pose: Shape (N, 4, 4), or (4, 4) for a batch of one.
             threads: 0 means all processors; the answer does not depend on it.
 
@@ -151,12 +152,19 @@ class MeshTree:
     def contacts(
         self, other: MeshTree, pose: ArrayLike, threads: int = 1, limit: int = 10_000_000
     ) -> MeshContacts:
-        """All intersecting pairs of triangles: points, normals, penetrations; see :meth:`overlap`.
+        """All intersecting pairs of triangles, with points, normals and penetrations.
 
-        With the meshes exchanged (and the inverse pose) the contacts are the same and the
-        normals opposite. If both meshes are moved together, the contacts move with them, except
-        for rounding. More than ``limit`` pairs over all poses are a ``ValueError``: coincident
-        meshes have them.
+        Up to rounding the contacts are symmetric: exchanging the meshes and inverting the pose
+        only reverses the normals.
+
+        Args:
+            other: As for :meth:`overlap`.
+            pose: As for :meth:`overlap`.
+            threads: 0 means all processors; the answer does not depend on it.
+            limit: Largest number of pairs over all poses; coincident meshes can exceed it.
+
+        Raises:
+            ValueError: as for :meth:`overlap`, a bad limit, or more pairs than ``limit``.
         """
         self._check(other)
         if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
@@ -173,9 +181,9 @@ class MeshTree:
         )
 
     def time_of_impact(self, other: MeshTree, motion: Motion, threads: int = 1) -> MeshImpacts:
-        """The first contact with the other mesh, which has ``motion`` in this one's frame.
+        """The first contact with the other mesh, which has ``motion`` in this mesh's frame.
 
-        See :func:`tauguard.rigid.time_of_impact`; this mesh is at rest.
+        This mesh is at rest; see :func:`tauguard.rigid.time_of_impact`.
         """
         bounded("motion", motion)
         rest = Motion(np.eye(4), np.zeros(3), np.zeros(3))
@@ -184,7 +192,7 @@ class MeshTree:
     def sweep(
         self, other: MeshTree, pose: ArrayLike, displacement: ArrayLike, threads: int = 1
     ) -> MeshImpacts:
-        """The first contact with the other mesh, which moves straight from ``pose``.
+        """The first contact with the other mesh, which moves from ``pose`` without rotation.
 
         Args:
             other: Any mesh.

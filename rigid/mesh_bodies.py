@@ -1,4 +1,4 @@
-"""A mesh against convex bodies, for `overlap`, `distance` and `time_of_impact`."""
+"""A mesh with convex bodies: the kernels of `overlap`, `distance` and `time_of_impact`."""
 
 from typing import cast
 
@@ -12,7 +12,7 @@ from tauguard.rigid.queries import native
 from tauguard.rigid.results import MeshDistances, MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
 
-#: Largest coordinate and radius beside a mesh; meshes have the same limit.
+#: Largest coordinate and radius of bodies in a query with a mesh; meshes have the same limit.
 MOST_COORDINATE = 1e30
 
 
@@ -24,8 +24,8 @@ def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Sol
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ValueError(
-            "a, b: both are meshes; MeshTree.overlap, contacts and sweep take two, distance takes "
-            "a mesh and convex bodies, such as Hulls of the vertices"
+            "a, b: both are meshes; MeshTree.overlap, contacts and sweep work on two meshes, and "
+            "distance on a mesh and convex bodies, such as Hulls of the vertices"
         )
     if isinstance(a, MeshTree):
         return a, cast(Solid, b), False
@@ -42,7 +42,7 @@ def bodies_of(name: str, solid: Solid) -> Native:
 
 
 def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOverlap:
-    """Whether the surface intersects each body, and one triangle that does."""
+    """Whether the surface intersects each body, and one intersecting triangle."""
     bodies = bodies_of(_other(swapped), solid)
     face = np.empty(len(solid), dtype=np.int32)
     mesh._mesh.meets(*bodies, face, thread_count(threads))
@@ -89,7 +89,7 @@ def first_contact(
 
 
 def faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:
-    """Faces of a and of b, -1 for the side that is no mesh. Shape (N, 2)."""
+    """Faces of a and of b; -1 for the side of the bodies. Shape (N, 2)."""
     none = np.full_like(face, -1)
     return np.stack([none, face] if swapped else [face, none], axis=1)
 

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
 
-#: Largest component of the rotation vector of a step [rad]: every radian costs time, and the
-#: rounding of the angle grows with it.
+#: Largest component of the rotation vector of a step [rad]. Computing time and the rounding error
+#: of the angle grow with the rotation.
 MOST_TURN = 1e4
 
 
 def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    """``value`` as a batch of homogeneous matrices, shape (N, 4, 4); one (4, 4) is a batch of one.
+    """``value`` as homogeneous matrices of shape (N, 4, 4); a (4, 4) matrix is a batch of one.
 
     Raises:
         ValueError: another shape, an entry that is not finite, a bottom row other than 0 0 0 1, or
@@ -35,7 +35,7 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
         row = int(np.argmax(bad))
         raise ValueError(
             f"{name}: the rotation in row {row} is not proper orthonormal "
-            f"(R^T R is off by {off[row]:.3g}, at most {ORTHONORMAL_TOLERANCE:g} is accepted)"
+            f"(R^T R differs from I by {off[row]:.3g}, allowed is {ORTHONORMAL_TOLERANCE:g})"
         )
     return batch
 
@@ -44,8 +44,9 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
 class Motion(Rebuilt):
     """Constant linear and angular velocity over a step, t in [0, 1].
 
-    A body's point y moves as ``x(t) = x0 + t linear + exp(t [angular]x) R0 y`` with ``R0, x0`` the
-    pose at t = 0: world frame, rotation about the pose's origin.
+    A point y of the body moves as ``x(t) = x0 + t linear + exp(t [angular]x) R0 y``, where ``R0``
+    and ``x0`` are the pose at t = 0. Both velocities are in the world frame; the body rotates about
+    the origin of its pose.
 
     Args:
         pose_t0: Shape (N, 4, 4), or (4, 4) for a batch of one.
@@ -77,8 +78,8 @@ class Motion(Rebuilt):
         if fast.any():
             row = int(np.argmax(fast))
             raise ValueError(
-                f"angular: {self.angular[row]} in row {row}, at most {MOST_TURN:g} rad a step can "
-                "be followed; cut the step"
+                f"angular: {self.angular[row]} in row {row}, expected at most {MOST_TURN:g} rad; "
+                "divide the step"
             )
 
     def __len__(self) -> int:
@@ -86,11 +87,11 @@ class Motion(Rebuilt):
 
     @property
     def packed(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """The three arrays in the form that native kernels read."""
+        """The three arrays, for native kernels."""
         return self.pose_t0, self.linear, self.angular
 
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Poses at time ``t`` (a number, or one for each row). Shape (N, 4, 4)."""
+        """Poses at time ``t``, a number or an array of shape (N,). Shape (N, 4, 4)."""
         from scipy.spatial.transform import Rotation
 
         time = np.broadcast_to(np.asarray(t, dtype=np.float64), (len(self),))[:, None]
@@ -102,7 +103,7 @@ class Motion(Rebuilt):
 
 
 def bounded(name: str, motion: Motion) -> None:
-    """Refuse coordinates beyond 1e100, whose products would overflow."""
+    """Raise a ``ValueError`` for coordinates beyond 1e100, whose products would overflow."""
     for value in (motion.pose_t0[:, :3, 3], motion.linear):
         if np.abs(value).max(initial=0.0) > 1e100:
             raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")

@@ -1,4 +1,4 @@
-"""Overlap in coherent frames: test the separating planes of the last frame first."""
+"""Overlap in successive frames: test the separating planes of the last frame first."""
 
 from threading import Lock
 
@@ -15,15 +15,15 @@ from tauguard.rigid.shapes import Bodies
 class PlaneCache:
     """Overlap queries on the same pairs frame after frame.
 
-    A pair that was apart keeps the normal of its separating plane. As long as this normal separates
-    the bodies, nothing else is computed. Answers are those of :func:`tauguard.rigid.overlap`,
-    whatever is cached. Calls from several threads wait for each other.
+    The cache keeps the normal of a separating plane for each pair that was apart. While this normal
+    separates the bodies, nothing else is computed. The result always equals that of
+    :func:`tauguard.rigid.overlap`. Calls from several threads wait for each other.
 
     Args:
         count: The number of pairs N, the same in every frame.
 
     Raises:
-        ValueError: a count that is no integer of 0 or more.
+        ValueError: ``count`` is not an integer of 0 or more.
     """
 
     def __init__(self, count: int) -> None:
@@ -32,15 +32,14 @@ class PlaneCache:
             raise ValueError(f"count: {count!r:.40}, expected an integer of 0 or more")
         self._lock = Lock()
         self._normals: NDArray[np.float64] = np.zeros((count, 3))
-        #: Number of rows of the last frame that their cached plane decided.
+        #: Number of pairs of the last frame that were decided by their cached plane.
         self.answered = 0
 
     def overlap(self, a: Bodies, b: Bodies, threads: int = 1) -> Overlap:
-        """Answer one frame and keep its separating planes; arguments as for ``overlap``.
+        """Overlap in one frame; the separating planes are kept. Arguments as for ``overlap``.
 
         Raises:
-            ValueError: another number of pairs than the cache was made for, and what ``overlap``
-                raises.
+            ValueError: the number of pairs is not ``count``, or an error of ``overlap``.
         """
         count = rows(a, b)
         if count != len(self._normals):

@@ -1,9 +1,10 @@
-"""Overlap and sweeps of sharp convex bodies, row by row.
+"""Overlap and sweeps of convex bodies without radii, row by row.
 
-``abfme`` eliminates the unknowns of a separating plane (Fourier-Motzkin elimination with facet
-functions scaled by determinants, redundant combinations left out); ``sat`` tests separating axes
-(Gottschalk et al. 1996; Ericson 2005, 5.2). Both run in floating point with derived error
-bounds. Exact arithmetic decides the remaining rows.
+* ``abfme`` eliminates the unknowns of a separating plane by Fourier-Motzkin elimination. Facet
+  functions are scaled by determinants; redundant combinations are left out.
+* ``sat`` tests separating axes (Gottschalk et al. 1996; Ericson 2005, 5.2).
+
+Both run in floating point with derived error bounds. Exact arithmetic decides the remaining rows.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,7 +29,7 @@ _NO_OFFSETS = np.zeros(1, dtype=np.int64)
 
 
 def check_method(method: object, known: Sequence[str]) -> None:
-    """Refuse what is no name of a method, such as a pose given in its place (``ValueError``)."""
+    """Raise a ``ValueError`` if ``method``, which may be of any type, is not in ``known``."""
     if not (isinstance(method, str) and method in known):
         given = repr(method) if isinstance(method, str) else f"a {type(method).__name__}"
         raise ValueError(f"method: {given}, expected one of {', '.join(known)}")
@@ -54,7 +55,7 @@ def native_overlap(
 
 
 def refuse_hulls(a: Bodies, b: Bodies) -> None:
-    """Refuse hulls and polygons, whose facets are not known (``ValueError``)."""
+    """Raise a ``ValueError`` for hulls and polygons, whose facets are not known."""
     if isinstance(a, Hulls | Polygons) or isinstance(b, Hulls):
         raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
 
@@ -80,10 +81,10 @@ def sweep(
         a: N bodies of one kind at rest, or one.
         b: N bodies, or one.
         displacement: Displacement over the step t in [0, 1]. Shape (N, 3) or (3,).
-        method: ``abfme`` eliminates the separating plane with t as a further unknown, and casts
-            separating axes only for the times of hits. ``sat`` always casts separating axes.
-            ``auto`` is the faster of both. ``hit`` is exact for each, ``time_of_impact`` never
-            late.
+        method: ``abfme`` decides ``hit`` by eliminating the separating plane, with t as a further
+            unknown, and computes times on separating axes for hits only. ``sat`` uses separating
+            axes for both. ``auto`` is the faster of the two. With each method, ``hit`` is exact
+            and ``time_of_impact`` is never late.
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
@@ -114,7 +115,7 @@ def native_sweep(
     threads: int = 1,
     points: bool = True,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], int]:
-    """``hit`` (N,); time of impact, point and normal (N, 7); rows left to exact arithmetic."""
+    """``hit`` (N,); time of impact, point and normal (N, 7); number of exactly decided rows."""
     count = rows(a, b)
     moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
     hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))
@@ -148,7 +149,7 @@ def native(bodies: Bodies) -> tuple[int, NDArray[np.float64], NDArray[np.int64]]
 
 
 def rows(a: Bodies, b: Bodies) -> int:
-    """The common number of rows of two batches, one of which may hold a single body.
+    """The common number of rows of two batches; a batch of one body fits any number.
 
     Raises:
         ValueError: not batches of bodies, or lengths that do not match.
@@ -156,16 +157,16 @@ def rows(a: Bodies, b: Bodies) -> int:
     for name, bodies in (("a", a), ("b", b)):
         if isinstance(bodies, Rounded | Spheres | Capsules):
             raise ValueError(
-                f"{name}: {type(bodies).__name__}, expected bodies without a radius; overlap, "
-                "distance and time_of_impact (with a Motion that does not turn) take them"
+                f"{name}: {type(bodies).__name__}, expected bodies without a radius; for bodies "
+                "with radii use overlap, distance, or time_of_impact with a Motion of angular = 0"
             )
         if type(bodies) not in _KINDS:
             kinds = ", ".join(kind.__name__ for kind in _KINDS)
             given = type(bodies).__name__
-            way = "; two meshes meet by MeshTree.sweep" if given == "MeshTree" else ""
-            raise ValueError(f"{name}: {given}, expected one of {kinds}{way}")
+            advice = "; for two meshes use MeshTree.sweep" if given == "MeshTree" else ""
+            raise ValueError(f"{name}: {given}, expected one of {kinds}{advice}")
     if isinstance(a, Polygons) != isinstance(b, Polygons):
-        raise ValueError("b: polygons meet polygons only, for there is no third coordinate")
+        raise ValueError("b: polygons are tested against polygons only; both must be Polygons")
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ValueError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
     return max(len(a), len(b)) if len(a) and len(b) else 0

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """The evidence for overlap or separation, to rounding; rows of the other case are NaN.
+    """Evidence of overlap or of separation, subject to rounding.
+
+    ``point`` is NaN for pairs that are apart; ``normal`` and ``offset`` are NaN for overlap.
 
     Attributes:
-        point: A common point of a pair that overlaps. Shape (N, 3).
-        normal: Unit normal, from a to b, of a plane that separates the pair. Shape (N, 3).
-        offset: The plane is ``normal @ x = offset``: a lies below it, b above. Shape (N,).
+        point: A common point. Shape (N, 3).
+        normal: Unit normal, from a to b, of a separating plane. Shape (N, 3).
+        offset: The separating plane is ``normal @ x = offset``. Shape (N,).
     """
 
     point: NDArray[np.float64]
@@ -25,7 +27,7 @@ class Witness:
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """Answer of an overlap query.
+    """Result of an overlap query.
 
     Attributes:
         hit: True if the two sets share a point (touching is a hit). Shape (N,).
@@ -48,7 +50,7 @@ class Impacts:
         hit: True if they touch within the step. Shape (N,).
         time_of_impact: Fraction of the step in [0, 1]; inf without a hit. Shape (N,).
         point: A common point at that time, world frame; NaN without a hit. Shape (N, 3).
-        normal: Unit contact normal from a to b at that time; NaN where there is none, or where the
+        normal: Unit contact normal from a to b at that time. NaN without a hit, and where the
             bodies overlap from the start and no normal is defined. Shape (N, 3).
     """
 
@@ -60,11 +62,11 @@ class Impacts:
 
 @dataclass(frozen=True, eq=False)
 class MeshImpacts(Impacts):
-    """First contact of two moving meshes, or of one and convex bodies, row by row.
+    """First contact of two moving meshes, or of a mesh and convex bodies, row by row.
 
     Attributes:
-        faces: The triangles that touch first, (face of a, face of b); -1 where there is no hit, and
-            for a side that is no mesh. Shape (N, 2).
+        faces: The triangles that touch first, (face of a, face of b). Without a hit, and on the
+            side of a convex body, the entry is -1. Shape (N, 2).
     """
 
     faces: NDArray[np.int32]
@@ -75,14 +77,14 @@ class Distances:
     """Signed distance of two bodies, row by row: ``(point_b - point_a) . normal``.
 
     Attributes:
-        distance: Above zero the length of the shortest path between the bodies, zero where they
-            touch, below zero minus the penetration: the length of the shortest path that separates
-            them. Shape (N,).
-        point_a: The point of a nearest to b; if they overlap, a's deepest point along the normal.
-            Shape (N, 3).
-        point_b: The point of b nearest to a; if they overlap, b's deepest point along the normal.
-            Shape (N, 3).
-        normal: Unit vector from a to b: the direction in which b separates from a. If bodies
+        distance: If the bodies are apart, the length of the shortest segment between them. If they
+            overlap, minus the length of the shortest translation that separates them. Zero if they
+            touch. Shape (N,).
+        point_a: The point of a nearest to b; if they overlap, the deepest point of a in b along
+            the normal. Shape (N, 3).
+        point_b: The point of b nearest to a; if they overlap, the deepest point of b in a along
+            the normal. Shape (N, 3).
+        normal: Unit vector from a to b, along the shortest segment or translation. If bodies
             without thickness touch, any normal of the plane or line that they span. Shape (N, 3).
     """
 
@@ -92,10 +94,10 @@ class Distances:
     normal: NDArray[np.float64]
 
     def within(self, min_distance: float) -> NDArray[np.bool_]:
-        """Whether each pair is no further apart than ``min_distance`` [m]. Shape (N,).
+        """Whether each distance is at most ``min_distance`` [m]. Shape (N,).
 
         Raises:
-            ValueError: a distance that is not a number.
+            ValueError: ``min_distance`` is not a number.
         """
         least = np.asarray(min_distance)
         if least.dtype.kind not in "fiu" or np.isnan(least).any():
@@ -107,11 +109,11 @@ class Distances:
 class MeshDistances(Distances):
     """Signed distance of a mesh and convex bodies, row by row.
 
-    A negative distance belongs to the triangle deepest in the body: the distance that the body must
-    move to leave that triangle, not the whole mesh.
+    If mesh and body overlap, the distance is that of the body and the deepest triangle alone:
+    moving the body by it separates the body from this triangle, not always from the whole mesh.
 
     Attributes:
-        face: The triangle nearest to the body, or deepest in it. Shape (N,).
+        face: The triangle nearest to the body, or the deepest one in it. Shape (N,).
     """
 
     face: NDArray[np.int32]

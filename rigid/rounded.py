@@ -43,8 +43,8 @@ class Rounded(Rebuilt):
         radius: Zero or more. Shape (N,), or one number for all.
 
     Raises:
-        ValueError: a core that is no batch of bodies in space, wrong lengths, an entry that is not
-            finite, a negative radius (named with its row).
+        ValueError: a core that is not a batch of three-dimensional bodies, wrong lengths, an entry
+            that is not finite, or a negative radius (named with its row).
     """
 
     core: Tetrahedra | Boxes | Parallelepipeds | Hulls
@@ -101,7 +101,7 @@ class Spheres(Rebuilt):
 
 @dataclass(frozen=True, eq=False)
 class Capsules(Rebuilt):
-    """Segments grown by a ball; a segment without length is a sphere.
+    """Segments grown by a ball; a segment may have length zero.
 
     Args:
         start: One end of the segment. Shape (N, 3).
@@ -141,7 +141,7 @@ _SHARP = np.zeros(1)
 
 
 def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
-    """The core of a batch and its radii; a single zero if it has none."""
+    """The core of a batch and its radii; one zero for bodies without radii."""
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
     return solid, _SHARP
@@ -150,10 +150,10 @@ def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
 def solid_parts(
     name: str, solid: Solid, most: float = MOST_COORDINATE
 ) -> tuple[Bodies, NDArray[np.float64]]:
-    """Core and radii of bodies in space.
+    """Core and radii of three-dimensional bodies.
 
     Raises:
-        ValueError: no batch of bodies, polygons, or a number beyond ``most``.
+        ValueError: not a batch of bodies, polygons, or a number beyond ``most``.
     """
     core, radius = parts(solid)
     if isinstance(core, Polygons):

@@ -1,10 +1,8 @@
 """Batches of convex bodies on plain arrays: tetrahedra, boxes, parallelepipeds, hulls, polygons.
 
-A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
-thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
-
-A batch keeps an immutable copy of its arrays, so the kernels read the values that were
-checked.
+A batch has N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
+thickness, a single point. Lengths may be in any unit; both sides of a query must use the same one.
+A batch has its own immutable copy of its arrays.
 """
 
 from dataclasses import dataclass, field
@@ -26,12 +24,12 @@ class _Batch(Rebuilt):
 
     @property
     def packed(self) -> NDArray[np.float64]:
-        """Its numbers, for native kernels."""
+        """The numbers of the batch, for native kernels."""
         raise NotImplementedError
 
     @cached_property
     def largest(self) -> float:
-        """The size of its largest number."""
+        """The largest magnitude in ``packed``."""
         return float(np.abs(self.packed).max(initial=0.0))
 
 
@@ -69,8 +67,8 @@ class Tetrahedra(_Batch):
 class Boxes(_Batch):
     """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
 
-    The set is that of the given doubles. A rotation that is orthonormal only up to rounding spans a
-    slightly oblique box, and the answers hold for that box.
+    A rotation that is not exactly orthonormal gives a slightly oblique box. Queries are exact for
+    this box.
 
     Args:
         center: Shape (N, 3).
@@ -126,9 +124,10 @@ class Boxes(_Batch):
 
     @cached_property
     def blocks(self) -> NDArray[np.float64]:
-        """Eight boxes per row for batched queries: centres in double, the rest in single precision.
+        """Eight boxes per row, for batched queries. Shape (ceil(N / 8), 72).
 
-        The last block is filled up with copies of the last box. Shape (ceil(N / 8), 72).
+        Centres are in double precision, the rest in single precision. The last row is filled up
+        with copies of the last box.
         """
         out = np.empty((-(-len(self) // 8), 72))
         _rigid.pack_boxes(self.packed, out)
@@ -173,7 +172,7 @@ class Parallelepipeds(_Batch):
 
 @dataclass(frozen=True, eq=False)
 class PointSets(_Batch):
-    """Bodies given by any number of points each; :class:`Hulls` and :class:`Polygons`."""
+    """Base of :class:`Hulls` and :class:`Polygons`: bodies of any number of points each."""
 
     vertices: NDArray[np.float64]
     offsets: NDArray[np.int64]
@@ -219,8 +218,8 @@ class Hulls(PointSets):
 class Polygons(PointSets):
     """Convex polygons in the plane: the hulls of any number of points each, in any order.
 
-    They are tested against polygons only. Arguments and errors as for :class:`Hulls`, vertices of
-    shape (M, 2).
+    They are tested against polygons only. Arguments and errors are those of :class:`Hulls`, with
+    ``vertices`` of shape (M, 2).
     """
 
     dimensions = 2
@@ -232,7 +231,7 @@ def _partition(given: NDArray[np.int64], count: int) -> NDArray[np.int64]:
         raise ValueError(
             f"offsets: shape {array.shape} of {array.dtype}, expected (N + 1,) integers"
         )
-    offsets = frozen(array.astype(np.int64))  # beyond int64 an entry turns negative: refused below
+    offsets = frozen(array.astype(np.int64))  # an overflow becomes negative and is refused below
     if offsets[0] != 0 or offsets[-1] != count:
         raise ValueError(f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {count}")
     empty = offsets[1:] <= offsets[:-1]

@@ -11,7 +11,7 @@ from tauguard.rigid.rounded import Solid, solid_parts
 
 
 def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
-    """Signed distances of convex bodies, for the public query."""
+    """Signed distances of convex bodies; see :func:`tauguard.rigid.distance`."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     out = np.empty((rows(core_a, core_b), 10))
     _rigid_mesh.distances(
@@ -21,7 +21,7 @@ def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
 
 
 def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
-    """Whether bodies with radii share a point, as exact as the sign of their distance."""
+    """Whether bodies with radii share a point, decided exactly."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
     _rigid_mesh.meets(
@@ -35,13 +35,13 @@ def rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1
     """A common point or a separating plane of each row, to rounding."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     cores = solid_distances(core_a, core_b, threads)
-    # If the cores meet they have a common point; otherwise it lies on the line between them.
+    # Cores that overlap have a common point. Otherwise the point is on the segment between them.
     point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
-    way = np.maximum(cores.distance, 0.0)
-    share = 0.5 * (np.maximum(way - radius_b, 0.0) + np.minimum(way, radius_a))
-    between = cores.point_a + share[:, None] * cores.normal
+    gap = np.maximum(cores.distance, 0.0)
+    along = 0.5 * (np.maximum(gap - radius_b, 0.0) + np.minimum(gap, radius_a))
+    between = cores.point_a + along[:, None] * cores.normal
     point = np.where((cores.distance > 0)[:, None], between, point)
-    middle = cores.point_a + 0.5 * (way + radius_a - radius_b)[:, None] * cores.normal
+    middle = cores.point_a + 0.5 * (gap + radius_a - radius_b)[:, None] * cores.normal
     offset = np.einsum("ij,ij->i", cores.normal, middle)
     return Witness(
         np.where(hit[:, None], point, np.nan),

@@ -1,4 +1,4 @@
-"""Overlap and distance of convex bodies, rounded or not, and of meshes with them."""
+"""Overlap and distance of convex bodies, and of meshes with convex bodies."""
 
 from typing import Literal, cast, get_args, overload
 
@@ -29,29 +29,29 @@ def overlap(
     """Whether the convex bodies ``a[i]`` and ``b[i]`` share a point; touching is a hit.
 
     Args:
-        a: N bodies of one kind, rounded or not, or one body that meets every ``b[i]``; or a mesh,
-            whose surface counts (not its inside) and whose frame the bodies' numbers are in.
-        b: likewise; kinds mix freely, and at most one side is a mesh.
-        method: ``abfme``, ``sat`` (not for hulls, which have no facets) or ``auto`` (what the
-            study ``rigid`` shows fastest for the two kinds): never wrong on any finite input.
-            Rounded bodies and meshes know ``auto``, which is as exact.
+        a: N bodies of one kind, with or without radii, or one body for all rows. Or a mesh: its
+            surface is tested, not its inside, and the bodies' coordinates are in its frame.
+        b: As ``a``. The two kinds may differ, and at most one side may be a mesh.
+        method: ``abfme``, ``sat`` (needs facets, so not for hulls) or ``auto`` (the fastest for the
+            two kinds in the study ``rigid``). Each is exact for any finite input. For bodies with
+            radii and for meshes, only ``auto`` is available.
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
-        ``hit`` of shape (N,); of bodies ``witness``, which is found at its first access, and of a
-        mesh the ``faces`` that are met.
+        ``hit`` of shape (N,). For two batches of bodies also ``witness``, which is computed at the
+        first access; for a mesh also ``faces``.
 
     Raises:
-        ValueError: lengths that do not match, an unknown method, ``sat`` of hulls,
-            another method than ``auto`` of rounded bodies or a mesh, two meshes,
-            a coordinate beyond 1e100 of rounded bodies (1e30 beside a mesh).
+        ValueError: lengths that do not match, a method that is unknown or not available for the
+            arguments, two meshes, or a coordinate beyond 1e100 of bodies with radii (with a mesh:
+            a coordinate of the bodies beyond 1e30).
     """
     check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
     if special and method != "auto":
         raise ValueError(
-            f"method: {method!r} takes bodies without a radius only, which {special[0]} is not; "
-            "expected auto"
+            f"method: {method!r} needs bodies without radii, but {special[0]} is a "
+            f"{type(a if special[0] == 'a' else b).__name__}; expected auto"
         )
     if not special:
         return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
@@ -69,22 +69,24 @@ def distance(a: Solid, b: MeshTree, threads: int = 1) -> MeshDistances: ...
 def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Distances:
     """Signed distance, nearest points and normal of the convex bodies ``a[i]`` and ``b[i]``.
 
-    The sign is never wrong, even for degenerate bodies: it agrees with :func:`overlap`, and the
-    distance is 0 exactly where the bodies touch. The error of the length is at most 3e-14 of the
-    pair's extent, which is the diagonal of the box around both. The method is Gilbert, Johnson and
-    Keerthi's descent (1988) with the expanding polytope (van den Bergen 2001) in floating point; a
-    certificate checks each answer. If the certificate fails, or the bodies are within 1e-10 of
-    contact, both algorithms run in exact arithmetic, which takes about a millisecond a pair.
+    The sign is exact, also for degenerate bodies: it agrees with :func:`overlap`, and the distance
+    is 0 if and only if the bodies touch. The error of the distance is at most 3e-14 times the
+    diagonal of the box around both bodies.
+
+    The method is the descent of Gilbert, Johnson and Keerthi (1988) with the expanding polytope
+    (van den Bergen 2001). Both run in floating point, and a certificate checks each result. If the
+    certificate fails, or the bodies are closer to contact than 1e-10 of their size, both run in
+    exact arithmetic, which takes about a millisecond per pair.
 
     Args:
-        a: N bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not its
-            inside) and whose frame the bodies' numbers are in.
-        b: N bodies, or one; kinds mix freely. At most one side is a mesh.
+        a: N bodies of one kind, with or without radii, or one body. Or a mesh: its surface is
+            tested, not its inside, and the bodies' coordinates are in its frame.
+        b: As ``a``. The two kinds may differ, and at most one side may be a mesh.
         threads: 0 means all processors; the answer does not depend on it.
 
     Raises:
         ValueError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
-            (1e30 beside a mesh).
+            (with a mesh: a coordinate of the bodies beyond 1e30).
     """
     if beside := mesh_bodies.mesh_beside(a, b):
         return mesh_bodies.distance(*beside, threads)

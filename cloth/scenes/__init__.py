@@ -1,9 +1,8 @@
 """Deforming meshes for tests and timings, generated in any size.
 
-The motions are prescribed by smooth formulas of time, not simulated. Their
-surfaces fold, touch and pass through themselves, so that queries find collisions. Each
-builder takes the number of triangles to aim for and a seed; the same arguments give the same
-bytes.
+The motions are smooth formulas of time, not simulations. The surfaces fold, touch and pass through
+themselves, so that queries find collisions. The arguments of a builder are the approximate number
+of triangles and a seed; the same arguments give the same bytes.
 """
 
 from collections.abc import Callable

@@ -19,10 +19,10 @@ FLUTES = 9
 
 
 def turning_ball(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """A square sheet drapes over a ball; its skirt falls in flutes, and the ball's turn winds them.
+    """A square sheet drapes over a ball that then turns and winds it up.
 
-    Winding drags the flutes sideways until their flanks meet, first at the corners. Group 0 is the
-    sheet, group 1 the ball, which is not tested against itself.
+    The hanging part forms flutes. Winding drags them sideways until their flanks meet, first at the
+    corners. Group 0 is the sheet, group 1 the ball, which is not tested against itself.
     """
     rng = np.random.default_rng(seed)
     ripple = rng.uniform(0, 2 * np.pi, 2)

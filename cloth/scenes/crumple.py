@@ -8,11 +8,11 @@ WAVES = 28
 
 
 def crumpling(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """A flat sheet is drawn together from all sides, and creases take up its width.
+    """A flat sheet is drawn together from all sides and forms creases.
 
-    The creases are random waves of the sheet in random directions of space, four to thirty in a
+    The creases are random waves of the sheet in random directions of space, 4 to 30 across its
     width. Their slopes grow as the width shrinks, so the area stays about the same. At a fifth of
-    its width the sheet passes through itself in many places. It is one cloth, which meets itself.
+    its width the sheet passes through itself in many places. It is tested against itself.
     """
     rng = np.random.default_rng(seed)
     rows, columns = grid_size(triangles, 1.0)

@@ -12,10 +12,10 @@ DROPPED = 4
 
 
 def packed_cubes(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """A lattice of rigid cubes closes until faces touch exactly; then its layers slide.
+    """Rigid cubes of a lattice approach until their faces touch exactly; then the layers slide.
 
-    From half of the time on, neighbours have coplanar, touching faces. Every cube is a
-    group, which is not tested against itself.
+    In the second half of the time, neighbours have coplanar, touching faces. Every cube is a group
+    that is not tested against itself.
     """
     rng = np.random.default_rng(seed)
     side, fine = _lattice(triangles)
@@ -42,7 +42,8 @@ def packed_cubes(triangles: int = 20_000, seed: int = 0) -> Scene:
 def cubes_on_cloth(triangles: int = 20_000, seed: int = 0) -> Scene:
     """Four cubes fall on a hanging cloth, tumbling, and press dents into it.
 
-    Group 0 is the cloth, which meets itself; the cubes meet it and each other.
+    Group 0 is the cloth, which is tested against itself. The cubes are tested against the cloth and
+    against each other.
     """
     rng = np.random.default_rng(seed)
     rows, columns = grid_size(int(triangles * 0.7), 1.0)
@@ -98,7 +99,7 @@ def _lattice(triangles: int) -> tuple[int, int]:
 
 
 def _cube(fine: int) -> tuple[Points, NDArray[np.int32]]:
-    """The unit cube with ``fine`` squares along each edge, its faces closed."""
+    """The surface of the unit cube, with ``fine`` squares along each edge."""
     square = sheet(fine + 1, fine + 1)
     i, j = np.divmod(np.arange((fine + 1) ** 2), fine + 1)
     corners: list[NDArray[np.intp]] = []

@@ -8,10 +8,10 @@ MATS = 4
 
 
 def twisting_mats(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """Four mats, a gap apart, are twisted twice around; the waist draws in and curls them.
+    """Four stacked mats with gaps between them are twisted by two turns and curled at the waist.
 
-    The twist alone keeps the gaps; the curl of the waist presses the mats together, and ripples
-    that differ from mat to mat make them pass through each other. All are one cloth.
+    The twist alone keeps the gaps. The curl at the waist presses the mats together, and ripples
+    that differ from mat to mat make them pass through each other. All are tested against all.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, (MATS, 2))
@@ -27,7 +27,7 @@ def twisting_mats(triangles: int = 20_000, seed: int = 0) -> Scene:
         offset = offset + 0.02 * ripples * np.sin(17 * along + phase[i, 0] + 6 * time) * np.cos(
             9 * across + phase[i, 1]
         )
-        # The cross-section is an arc of curvature `curl`; mats lie along its normal.
+        # The cross-section is an arc of curvature `curl`; the mats are stacked along its normal.
         bend = across * curl
         y = np.sin(bend) / curl - offset * np.sin(bend)
         z = (1 - np.cos(bend)) / curl + offset * np.cos(bend)

@@ -15,20 +15,20 @@ from tauguard.cloth.scenes.scene import (
 
 LAYERS = 3
 PLEATS = 22
-BODY_SHARE = 0.1  # fraction of the triangles
+BODY_FRACTION = 0.1  # of the triangles
 
 
 def pleats(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """Three ruffles over one another, each a ring of S-shaped pleats, on a swaying body.
+    """Three layers of ruffles, each a ring of S-shaped pleats, on a swaying body.
 
-    The pleats deepen until neighbouring folds and neighbouring layers meet; the dress follows the
-    body's sway with a lag that grows towards the hem. Group 0 is the dress, group 1 the body, which
-    is not tested against itself.
+    The pleats deepen until neighbouring folds and layers meet. The dress follows the body with a
+    lag that grows towards the hem. Group 0 is the dress, group 1 the body, which is not tested
+    against itself.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, LAYERS)
-    rows, columns = grid_size(int(triangles * (1 - BODY_SHARE) / LAYERS), 5.0)
-    ball, ball_faces = sphere(int(triangles * BODY_SHARE))
+    rows, columns = grid_size(int(triangles * (1 - BODY_FRACTION) / LAYERS), 5.0)
+    ball, ball_faces = sphere(int(triangles * BODY_FRACTION))
     down = np.linspace(0, 1, rows)[:, None]
     turn = np.linspace(0, 2 * np.pi, columns, endpoint=False)
 
@@ -37,7 +37,7 @@ def pleats(triangles: int = 20_000, seed: int = 0) -> Scene:
             1 + 0.15 * np.sin(40 * time + i)
         )
         wave = PLEATS * turn + phase[i] + 2.5 * down * np.sin(5 * time + i)
-        # Overhanging: the angle itself swings with the pleat, so that its flanks fold over.
+        # The angle swings with the pleat, so that the flanks of the pleats overhang.
         overhang = (0.3 + 1.1 * smooth_step(time, 0.1, 0.8)) * down * np.sin(wave) / PLEATS
         radius = 0.30 + 0.05 * i + 0.35 * down + depth * np.cos(wave)
         lag = time - 0.05 * down

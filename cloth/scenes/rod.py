@@ -4,18 +4,18 @@ import numpy as np
 
 from tauguard.cloth.scenes.scene import Points, Scene, frames_for, sheet, smooth_step
 
-HALF = 0.05  #: of its square section [m]; its half length is 1
+HALF = 0.05  #: half the side of the rod's square section [m]; the rod's half length is 1 m
 COILS = 6.0
 
 
 def twisting_rod(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A square rod is twisted about its axis; its middle buckles into a coil whose turns touch.
 
-    One closed surface but for its ends, which meets itself.
+    It is one surface, open at the ends, that is tested against itself.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi)
-    # Squares of about the same length along and around.
+    # The sides of the grid's squares have about the same length along the rod and around it.
     around = max(8, 4 * round(float(np.sqrt(triangles * HALF)) / 2 / np.sqrt(2)))
     rows = max(12, round(triangles / (2 * around)) + 1)
     along = np.linspace(-1, 1, rows)

@@ -12,8 +12,8 @@ BODY, BUMPS = 0.32, 24
 def rollers(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A bumpy body is pressed flat between turning rollers, and its bumps fold over each other.
 
-    Group 0 is the body, tested against itself; groups 1 and 2 are the rollers, tested against the
-    body.
+    Group 0 is the body, which is tested against itself. Groups 1 and 2 are the rollers, which are
+    tested against the body.
     """
     rng = np.random.default_rng(seed)
     ball, ball_faces = sphere(int(triangles * 0.6))
@@ -36,7 +36,7 @@ def rollers(triangles: int = 20_000, seed: int = 0) -> Scene:
         room = 1.03 * (RADIUS + HALF_GAP - inside)
         z = room * np.tanh(body[:, 2] / room)
         flat = np.clip(np.abs(body[:, 2]) - np.abs(z), 0.0, None)
-        # What is pressed flat is drawn back by the rollers' skin, in folds.
+        # Flattened parts are drawn back in folds by the surfaces of the rollers.
         x = x - 0.5 * flat + 0.35 * flat * np.sin(40 * body[:, 0] + 9 * body[:, 1])
         soft = np.column_stack([x, body[:, 1] * (1 + 0.6 * flat), z])
         turned, centre = drawn / RADIUS, RADIUS + HALF_GAP

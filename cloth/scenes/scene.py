@@ -18,9 +18,9 @@ class Scene:
     Attributes:
         name: Key in ``SCENES``.
         faces: Shape (F, 3).
-        groups: Groups of vertices; ``None``: one cloth that is tested against itself.
+        groups: Groups of vertices; ``None``: everything is tested against everything.
         positions: Function from a time in [0, 1] to positions [m], shape (V, 3).
-        frames: Number of steps in which a typical vertex moves by about an edge length per step.
+        frames: Number of steps with which a typical vertex moves by about an edge length per step.
     """
 
     name: str
@@ -39,11 +39,11 @@ class Scene:
 
 
 def sheet(rows: int, columns: int, closed: bool = False) -> NDArray[np.int32]:
-    """Faces of a grid of vertices numbered row by row; ``closed`` joins the last column to the
-    first.
+    """Faces of a grid of vertices, which are numbered row by row.
 
-    Shape (2 (rows - 1) (columns - 1), 3), or ``columns`` in place of ``columns - 1`` where closed.
-    The diagonals alternate, which leaves no preferred direction.
+    ``closed`` joins the last column to the first. The diagonals of the squares alternate, so there
+    is no preferred direction. Shape (2 (rows - 1) (columns - 1), 3); (2 (rows - 1) columns, 3) if
+    closed.
     """
     wide = columns if closed else columns - 1
     i, j = np.divmod(np.arange((rows - 1) * wide), wide)

@@ -13,7 +13,7 @@ def seated_skirt(triangles: int = 20_000, seed: int = 0) -> Scene:
 
     Sitting lowers the waist while the skirt keeps its length, so the profile buckles into folds
     that come to lie on one another. The folds differ around the body: some meet early, others not
-    at all. It is one cloth, which meets itself.
+    at all. Both layers are tested against themselves and each other.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, (2, 3))
@@ -28,7 +28,7 @@ def seated_skirt(triangles: int = 20_000, seed: int = 0) -> Scene:
         )
         squeeze = np.clip(0.93 * seated * uneven, 0.0, 0.985)
         fold = 2 * np.pi * FOLDS * down + phase[i, 1] + 0.6 * np.sin(2 * turn + phase[i, 2])
-        # Height lost to the squeeze goes into the swing of the folds, which overhang with it.
+        # As the height is squeezed, the folds swing out further and overhang.
         swing = 0.09 * np.sqrt(squeeze * (2 - squeeze)) * down**0.5
         pleat = 0.04 * down * np.cos(HEM_PLEATS * turn + phase[i, 0] + 2 * np.sin(4 * time))
         radius = 0.22 + 0.03 * i + 0.42 * down + swing * np.sin(fold) + pleat

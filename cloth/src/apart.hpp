@@ -1,6 +1,6 @@
 // The first filter of single queries. Two features cannot meet if one axis separates them on the
 // same side at both ends of the step. The filter compares x, y and z, which is exact. If many
-// queries share positions, it uses the seven axes of a 14-DOP in float32, with a margin for
+// queries share positions, it compares the seven axes of a 14-DOP in float32, with a margin for
 // rounding.
 #pragma once
 
@@ -15,7 +15,7 @@ namespace tauguard::cloth {
 
 using namespace geometry;  // lanes.hpp
 
-inline constexpr int ahead = 8;  // queries between asking for positions and using them
+inline constexpr int ahead = 8;  // prefetch distance, in queries
 
 template <bool packed>
 TAUGUARD_INLINE void prefetch(const Ends& x, const std::int32_t* row) {
@@ -32,7 +32,8 @@ TAUGUARD_INLINE Double4 point(const Ends& x, bool end, std::int32_t v) {
   return Double4{p[0], p[1], p[2], p[2]};
 }
 
-// Writes to `left` the numbers of the queries that no axis separates. rows: (n, 4) vertices.
+// Writes the numbers of the queries that no axis separates to `left`, and returns how many there
+// are. rows: (n, 4) vertices.
 template <bool vf>
 TAUGUARD_INLINE int not_apart(const Ends& x, const std::int32_t* rows, int n, std::int32_t* left) {
   int count = 0;
@@ -53,18 +54,19 @@ TAUGUARD_INLINE int not_apart(const Ends& x, const std::int32_t* rows, int n, st
   return count;
 }
 
-// The volume of the second filter: 7 axes at both ends of the step, one cache line (64 bytes) per
-// vertex.
+// The axes of the float32 filter: a vertex has 7 (padded to 8) values at each end of the step,
+// which fill one cache line (64 bytes).
 inline constexpr VolumeKind seven_axes{14, true};
 
-// Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. If x > fl(y + gap),
-// the exact values differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 in the same direction.
+// Whether the exact projection of x is certainly above that of y. A value differs from the exact
+// one, which is at most 1, by at most 2^-24 (k_dop.hpp). If x > fl(y + gap), the exact difference
+// is more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0.
 TAUGUARD_INLINE Mask8 above(Float8 x, Float8 y) {
   constexpr float gap = 0x1p-21f;
   return x > y + gap;
 }
 
-// The axes on which the first feature lies above the second, and those on which it lies below.
+// The axes on which the first feature is above the second, and those on which it is below.
 struct Sides {
   Mask8 over, under;
 };

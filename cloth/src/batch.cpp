@@ -9,19 +9,23 @@
 namespace tauguard::cloth {
 namespace {
 
-// 2^-e for 2^e <= x < 2^(e + 1), of normal x below 2^1023.
+// 2^-e for 2^e <= x < 2^(e + 1), for normal x below 2^1023.
 TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
   const Mask4 exponent = (Mask4)x & (std::int64_t{0x7ff} << 52);
   return (Double4)((std::int64_t{0x7fe} << 52) - exponent);
 }
 
-// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. A difference has a relative error
-// of u. A triple product of differences has 6 terms; each adds 3 u of its factors and 5 u of
-// arithmetic, 48 u M in all. A mixed product doubles the cross product: 108 u M. With the other
-// product (48 u M) and the sums, divided by three, this is 64 u M for each coefficient, which is at
-// most 6 M. Each of three cuts adds 54 u M, a value of the polynomial 60 u M, and the rounding of
-// its argument 324 u M. The total is 610 u M, below the 1024 u M = 2^-43 M in use. Underflow adds
-// less than 2^-1000.
+// Computes the Bernstein coefficients of the cubics and their error bounds. Let u = 2^-53 and M the
+// product of the largest |p|, |q| and |r|. The errors are at most
+//   u           of a difference (relative),
+//   48 u M      of a triple product: 6 terms, each with 3 u of its factors and 5 u of arithmetic,
+//   108 u M     of a mixed product, whose cross product is twice as large,
+//   64 u M      of a coefficient (a mixed product, a triple product and sums, divided by three),
+//   162 u M     from three cuts (54 u M each; a coefficient is at most 6 M),
+//   60 u M      from evaluating the polynomial,
+//   324 u M     from rounding the argument.
+// The last four add up to 610 u M; the bound is 2^-43 M = 1024 u M. Underflow adds less than
+// 2^-1000.
 TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, Group& g) {
   Double4 sizes[3] = {splat(0), splat(0), splat(0)};
   for (int e = 0; e < 2; ++e) {
@@ -132,7 +136,7 @@ TAUGUARD_INLINE Cut cut(const Group* groups, std::int32_t* queries, int n, Piece
   return found;
 }
 
-// Pieces with the differences of their queries, one piece per lane.
+// Pieces and the differences of their queries, one piece per lane.
 struct Pieces {
   Vec3x4 p[2], q[2], r[2];
   Double4 start, length, root, cubic[4], error, big;
@@ -172,16 +176,16 @@ TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const d
   out.big = load4(own[8]);
 }
 
-// In Bernstein form.
+// The value of a cubic in Bernstein form.
 TAUGUARD_INLINE Double4 at(const Double4* b, Double4 x) {
   const Double4 y = 1 - x;
   return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
 }
 
-// Roots in (0, 1) of many cubics by Newton's method, kept within the bracket, until a step is below
-// 2^-24. The root is then off by about 2^-40; larger errors are detected later. Each lane stops by
-// itself, so that a root does not depend on its neighbours. Several groups at once hide the latency
-// of the divisions.
+// Finds the roots in (0, 1) of many cubics by Newton's method, kept within a bracket, until a step
+// is below 2^-24. The error of a root is then about 2^-40; larger errors are detected in at_roots.
+// Each lane stops by itself, so that a root does not depend on other lanes. Several groups are
+// processed together to hide the latency of divisions.
 constexpr int together = 4;
 TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   alignas(64) double value[5][together * width];
@@ -222,12 +226,14 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   }
 }
 
-// At a root the features touch if the hull of their differences g_i contains the origin: if the
-// origin is on the same side of all edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be
-// the error of the time, B the largest |p|, |q|, |r|, and G the largest |g_i| near the root. Then
-// |q|, |r| <= 2 G and |n| <= 8 G^2. Per unit of time g changes by at most 6 B, and q and r by 2 B.
-// So a side changes by at most (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit, which is 2^-23.6 B
-// G^3 in d. Rounding adds less than 2^-38 B G^3. The bound in use is 2^-23 B G^3.
+// Decides whether the features touch at the root of each piece. They touch if the hull of their
+// differences g_i contains the origin, that is, if the origin is on the same side of all edges:
+// (g_i x g_j) . n >= 0 with n = q x r. Error bound of a side:
+// * Let d = 2^-33 be the error of the time, B the largest |p|, |q|, |r|, and G the largest |g_i|
+//   near the root. Then |q|, |r| <= 2 G and |n| <= 8 G^2.
+// * Per unit of time g changes by at most 6 B, and q and r by 2 B. So a side changes by at most
+//   (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit of time, which is 2^-23.6 B G^3 in d.
+// * Rounding adds less than 2^-38 B G^3. The bound is 2^-23 B G^3.
 template <bool vf>
 TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome,
                               double* toi) {

@@ -9,48 +9,46 @@
 
 namespace tauguard::cloth {
 
-using namespace geometry;  // lanes.hpp: vector types have no namespace to be found by
+using namespace geometry;  // lanes.hpp; argument-dependent lookup does not find vector functions
 
 inline constexpr int width = 4;
 
-// `width` queries. Their differences (query.hpp) are stored query by query, because most queries
-// have no root and the others are tested piece by piece.
+// `width` queries. Their differences (query.hpp) are stored query by query: most queries have no
+// root, and the others are tested piece by piece.
 struct Group {
   enum Field { cubic = 0, error = 4, big = 5, scale = 6, fields = 7 };
   enum Difference { p, q, r, differences };
-  alignas(64) double of[width][2][differences][4];  // x, y, z and a spare, at both ends
-  // big: the largest difference times `scale`, a power of two that brings it into [1, 2). The cubic
-  // and its error are of the scaled query.
+  alignas(64) double of[width][2][differences][4];  // x, y, z and padding, at both ends
+  // scale: a power of two that brings the largest difference into [1, 2); big: this scaled
+  // difference. The cubic and its error are those of the scaled query.
   alignas(64) double value[fields][width];
-  // One bit per query. no_root: the Bernstein coefficients of its cubic have one sign. one_root:
-  // they change sign once. Both hold beyond rounding, and both are 0 for queries of an odd size.
-  std::uint8_t no_root, one_root;
-  std::uint8_t odd;   // its size is too small, too large or not finite
-  std::uint8_t open;  // odd, or the cubic may be zero at an end of the step: no cut can decide
+  // One bit per query:
+  std::uint8_t odd;       // the largest difference is too small, too large or not finite
+  std::uint8_t no_root;   // not odd, and the Bernstein coefficients certainly have one sign
+  std::uint8_t one_root;  // not odd, and the coefficients certainly change their sign once
+  std::uint8_t open;      // odd, or the cubic may be zero at an end of the step: no cut can decide
 };
 
-// A part [start, start + length] of a query's time in which its cubic has exactly one root, beyond
-// rounding.
+// A part [start, start + length] of the step in which the cubic of a query certainly has one root.
 struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-// edge: rounding hides on which side of a feature's boundary the contact lies; unknown: rounding
-// hides the root itself.
+// edge: because of rounding it is unknown whether the contact point is in the feature. unknown:
+// because of rounding the root is not certain.
 enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
 
-// Numbers of queries after their cubics were cut once.
+// The result of cutting the cubics of some queries once.
 struct Cut {
-  int pieces = 0;  // that were written, query by query and in order of time
-  int clear = 0;   // queries without a piece
-  int left = 0;    // queries for which one cut does not suffice
+  int pieces = 0;  // number of pieces written, sorted by query and time
+  int clear = 0;   // number of queries without a piece
+  int left = 0;    // number of queries that need more cuts
 };
 
 struct BatchKernels {
-  // Writes to `left` the numbers of the queries that x, y and z do not separate on the same side at
-  // both ends of the step. Exact: it only compares coordinates.
+  // The exact filter of apart.hpp, by x, y and z.
   int (*not_apart)(bool vf, const Ends& x, const std::int32_t* rows, int n, std::int32_t* left);
-  // The same with seven axes (apart.hpp), beyond rounding; points: their projections.
+  // The filter of apart.hpp by seven axes. points: the projections of the vertices.
   int (*not_apart_on_seven)(bool vf, const float* points, const std::int32_t* rows, int n,
                             std::int32_t* left);
   // Gathers n queries into (n + width - 1) / width groups. Copies of the last query fill the last
@@ -64,12 +62,12 @@ struct BatchKernels {
                    double* toi);
 };
 
-// The fastest kernels that this processor runs. Every variant gives the same bits.
+// The fastest kernels that this processor can run. Every variant gives the same bits.
 const BatchKernels& batch_kernels();
-// The kernels of that name, "portable" or "avx2"; null if the processor lacks them.
+// The kernels "portable" or "avx2"; null if the processor cannot run them.
 const BatchKernels* batch_kernels(const char* name);
-// For tests: uses the kernels of that name from now on. If there are none, uses the fastest ones
-// and returns false.
+// For tests: selects the kernels of this name from now on. If there are none, selects the fastest
+// ones and returns false.
 bool force_batch_kernels(const char* name);
 
 }  // namespace tauguard::cloth

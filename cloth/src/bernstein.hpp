@@ -1,11 +1,11 @@
-// Bernstein polynomials on [0, 1] with integer coefficients of fixed width: their roots, and signs
-// of one at a root of another. exact_polynomial.hpp does the same with integers of any length; this
-// file is for the many queries with short coefficients and simple roots.
+// Bernstein polynomials on [0, 1] with integer coefficients of fixed width: their roots, and the
+// sign of one at a root of another. Most queries have short coefficients and simple roots, for
+// which this is enough; exact_polynomial.hpp has integers of any length.
 //
-// A polynomial of degree n is the sum of c_i (1 - t)^(n - i) t^i: the Bernstein basis without its
-// binomial factors. A product is a convolution, the sign variations of the c_i bound the number of
-// roots in (0, 1) (Descartes), and t -> t / 2 keeps integers integers (Vincent). Times are
-// multiples of 2^-52.
+// A polynomial of degree n is sum_i c_i (1 - t)^(n - i) t^i, in the Bernstein basis without
+// binomial factors. In this form a product is a convolution, the number of sign variations of the
+// c_i bounds the number of roots in (0, 1) (Descartes), and the substitution t -> t / 2 gives
+// integers again (Vincent). Times are multiples of 2^-52.
 #pragma once
 
 #include <algorithm>
@@ -23,9 +23,9 @@ using geometry::FixedInt;
 constexpr int time_bits = 52;
 constexpr std::int64_t end_of_time = std::int64_t{1} << time_bits;
 
-// 128 bits for each degree. With coefficients of degree 1 below 2^117, those of a side of the hull
-// are below 2^236, of the sum of its sides below 2^238, of the cubic below 2^356, and of the
-// remainders below 2^834.
+// Coefficients have 128 bits per degree. If those of a motion (degree 1) are below 2^117, those of
+// a side of the hull are below 2^236, of the sum of its sides below 2^238, of the cubic below
+// 2^356, and of the remainders below 2^834.
 template <int degree>
 struct Bernstein {
   std::array<FixedInt<2 * degree>, degree + 1> c;
@@ -64,7 +64,7 @@ Bernstein<a + b> operator*(const Bernstein<a>& x, const Bernstein<b>& y) {
   return r;
 }
 
-// The sign at time t 2^-52: 52 bits more per degree.
+// The sign at time t 2^-52. The value needs 52 bits per degree more than the coefficients.
 template <int degree>
 int sign_at(const Bernstein<degree>& f, std::int64_t t) {
   using Wide = FixedInt<3 * degree>;
@@ -78,7 +78,7 @@ int sign_at(const Bernstein<degree>& f, std::int64_t t) {
   return sum.sign();
 }
 
-// The parts before and after the middle, 2^degree times the polynomial each.
+// The polynomial on the first and on the second half of [0, 1], both multiplied by 2^degree.
 inline void halve(const Bernstein<2>& f, Bernstein<2>& left, Bernstein<2>& right) {
   const auto sum = f.c[0] + f.c[1] + f.c[2];
   left.c = {f.c[0].times(4), f.c[0].times(4) + f.c[1].times(2), sum};
@@ -94,7 +94,8 @@ inline void halve(const Bernstein<3>& f, Bernstein<3>& left, Bernstein<3>& right
 
 constexpr int unknown_sign = 2;
 
-// A root: exactly lo, or the only root of `of` in the open interval (lo, hi), a simple one.
+// A root. It is exactly `lo` if `of` is null. Otherwise it is a simple root of `of`, and the only
+// one in the open interval (lo, hi).
 template <int degree>
 struct BernsteinRoot {
   std::int64_t lo, hi;  // in units of 2^-52
@@ -105,11 +106,11 @@ template <int degree>
 struct BernsteinRoots {
   std::array<BernsteinRoot<degree>, degree> all;  // ascending
   int count = 0;
-  bool complete = true;  // false: there may be others
+  bool complete = true;  // false: there may be more roots
   void add(BernsteinRoot<degree> r) { all[count++] = r; }
 };
 
-// The one root of `part` in (0, 1), in double precision.
+// The only root of `part` in (0, 1), in double precision. before: the sign before the root.
 inline double estimate(const Bernstein<3>& part, int before) {
   double b[4] = {part.c[0].to_double(), part.c[1].to_double() / 3, part.c[2].to_double() / 3,
                  part.c[3].to_double()};
@@ -125,8 +126,8 @@ inline double estimate(const Bernstein<2>& part, int before) {
   return estimate(raised, before);
 }
 
-// Adds the roots of f inside (start, start + length). `part` is f on that interval. Parts are
-// halved at most five times; the integers are wide enough for that.
+// Adds the roots of f in (start, start + length). `part` is f on this interval. It is halved at
+// most five times, for which the integers are wide enough.
 template <int degree>
 void add_roots_inside(const Bernstein<degree>& f, const Bernstein<degree>& part, std::int64_t start,
                       std::int64_t length, BernsteinRoots<degree>& roots) {
@@ -179,8 +180,8 @@ Bernstein<degree> reversed(const Bernstein<degree>& f) {
   return r;
 }
 
-// With a positive factor m, m f = q l + r (1 - t)^(n - 1) for l and r of degree 1: where q
-// is zero, f has the sign of r. The last coefficient of q must not be zero.
+// The r of m f = q l + r (1 - t)^(n - 1), with m > 0 and with l and r of degree 1. Where q is zero,
+// f has the sign of r. The last coefficient of q must not be zero.
 inline std::array<FixedInt<14>, 2> remainder(const Bernstein<3>& f, const Bernstein<2>& q) {
   const auto& [q0, q1, q2] = q.c;
   const auto& [f0, f1, f2, f3] = f.c;
@@ -195,8 +196,8 @@ inline std::array<FixedInt<8>, 2> remainder(const Bernstein<2>& f, const Bernste
   return {r0, r1};
 }
 
-// The sign of q at the one root of f in (lo, hi). q has one root there too, and the signs at_lo and
-// at_hi at the ends.
+// The sign of q at the only root of f in (lo, hi). q also has only one root there; its signs at the
+// ends are at_lo and at_hi.
 template <int degree>
 int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Bernstein<degree>& f,
                            std::int64_t lo, std::int64_t hi) {
@@ -211,7 +212,7 @@ int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Be
   int f_at_q = r_lo;  // the sign of f at the root of q
   if (r_lo == 0 && r_hi == 0) return 0;
   if (r_lo != r_hi) {
-    // r is zero at |r0| / (|r0| + |r1|): is that before the root of q?
+    // r is zero at |r0| / (|r0| + |r1|). Is this before the root of q?
     const auto m0 = r0.magnitude(), m1 = r1.magnitude();
     const auto sum = q.c[0] * (m1 * m1) + q.c[1] * (m0 * m1) + q.c[2] * (m0 * m0);
     if (r_lo == 0 || r_hi == 0) return unknown_sign;
@@ -220,11 +221,11 @@ int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Be
   }
   const int f_lo = sign_at(f, lo);
   if (f_lo == 0) return unknown_sign;
-  return f_at_q == f_lo ? at_hi : at_lo;  // is the root of q before that of f?
+  return f_at_q == f_lo ? at_hi : at_lo;  // equal signs: the root of q is before the root of f
 }
 
-// The sign of a quadratic at a root. unknown_sign: this needs a narrower interval, or Sturm's
-// theorem.
+// The sign of a quadratic at a root. unknown_sign: a narrower interval or Sturm's theorem is
+// needed.
 template <int degree>
 int sign_at(const Bernstein<2>& q, const BernsteinRoot<degree>& root) {
   if (q.zero()) return 0;
@@ -233,7 +234,7 @@ int sign_at(const Bernstein<2>& q, const BernsteinRoot<degree>& root) {
   const int at_hi = sign_at(q, root.hi);
   if (at_lo == 0 || at_hi == 0) return unknown_sign;
   if (at_lo != at_hi) return sign_where_both_change(q, at_lo, at_hi, *root.of, root.lo, root.hi);
-  // Twice the Bernstein coefficient between the ends.
+  // Twice the middle Bernstein coefficient of q on [lo, hi].
   const std::uint64_t t = root.lo, u = root.hi, s = end_of_time - t, r = end_of_time - u;
   const FixedInt<6> a(q.c[0]), b(q.c[1]), c(q.c[2]);
   const auto control = a.times(s).times(r).times(2) + b.times(s).times(u) + b.times(r).times(t) +

@@ -1,5 +1,5 @@
-// Converts doubles to integers of fixed width in a common unit. The unit changes neither the
-// contact nor its time.
+// Converts doubles to integers of fixed width in a common unit, a power of two. The unit has no
+// influence on a contact or its time.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace tauguard::cloth {
 
-// A finite double as mantissa 2^exponent; the mantissa is odd or zero.
+// A finite double as mantissa * 2^exponent; the mantissa is odd or zero.
 struct Binary {
   std::int64_t mantissa;
   int exponent;
@@ -29,7 +29,7 @@ struct Binary {
   int bits() const { return 64 - __builtin_clzll(mantissa < 0 ? -mantissa : mantissa); }
 };
 
-// n doubles in units of a power of two; false where they span more than `coordinate_bits`.
+// Writes n doubles as integers in a common unit; false if they span more than `coordinate_bits`.
 inline constexpr int coordinate_bits = 116;
 inline bool as_integers(const double* x, int n, geometry::FixedInt<2>* out) {
   int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();

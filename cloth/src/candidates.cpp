@@ -5,7 +5,7 @@
 namespace tauguard::cloth {
 namespace {
 
-// `some`: groups or isolated features forbid some pairs.
+// `some`: groups or isolated features exclude some pairs.
 template <int arity_a, int arity_b, bool some>
 void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t* ids_b,
           const std::int32_t* vb, const Overlaps& found, const Groups& groups,
@@ -15,7 +15,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t*
     const int i = __builtin_ctz(rows);
     std::int32_t a[arity_a];
     for (int j = 0; j < arity_a; ++j) a[j] = va[j * lanes + i];
-    // Vertices are named by their own number, not by their position among the vertices in use.
+    // The number of a vertex is its row in the positions, not its rank among the vertices in use.
     const std::int32_t id_a = arity_a == 1 ? a[0] : ids_a[i];
     for (Mask hits = found.lanes_of[i]; hits; hits &= hits - 1) {
       const int lane = __builtin_ctz(hits);
@@ -27,7 +27,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t*
       pair[0] = swap ? id_b : id_a;
       pair[1] = swap ? id_a : id_b;
       bool meet = true;
-      if (some) {  // the pair is written, but the position advances only for those that may meet
+      if (some) {  // the pair is written already; it stays only if the two may meet
         meet = !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
         out.kept_apart += !meet;
         if (arity_a == 1) meet = meet && isolated.meet(a[0], id_b, vb[lane], vb[lanes + lane]);
@@ -47,7 +47,7 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
   LeafLanes left = a.lanes_of(leaves.a);
   const LeafLanes right = b.lanes_of(leaves.b);
-  if (!same)  // x, y and z reject nearly all rows that any axis can
+  if (!same)  // the first three axes reject nearly all rows that can be rejected
     left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3,
                                           a.times(), left.occupied);
   Overlaps found;

@@ -9,11 +9,11 @@
 
 namespace tauguard::cloth {
 
-// Candidates in the form that the narrow phase takes. `rows` holds the 4 vertices of each query (of
-// a vertex and a face, or of two edges). `pairs` holds the numbers of the two features.
+// Input of the narrow phase. `rows` has the 4 vertices of each query (of a vertex and a face, or of
+// two edges). `pairs` has the numbers of the two features.
 struct CandidateBlock {
-  // A block is passed on once it holds `full` candidates. `capacity` leaves room for those of one
-  // more pair of leaves.
+  // A block is passed on when it has at least `full` candidates. `capacity` includes room for the
+  // candidates of one more pair of leaves.
   static constexpr std::size_t full = 2048, capacity = full + lanes * lanes;
   std::vector<std::int32_t> rows = std::vector<std::int32_t>(4 * capacity);
   std::vector<std::int32_t> pairs = std::vector<std::int32_t>(2 * capacity);
@@ -23,9 +23,10 @@ struct CandidateBlock {
   std::uint64_t adjacent = 0, kept_apart = 0;
 };
 
-// Isolated edges and isolated vertices are numbered after the triangles (topology.hpp). `first` is
-// the lowest of these numbers; `point` marks the isolated vertices. Only isolated vertices are
-// tested against isolated features, and each pair of isolated vertices is tested once.
+// Which vertices are tested against isolated features. Isolated edges and isolated vertices are
+// numbered after the triangles (topology.hpp); `first` is the lowest of these numbers. `point`
+// marks the isolated vertices. Only isolated vertices are tested against isolated features, and
+// each pair of isolated vertices is tested once.
 struct Isolated {
   std::int32_t first;
   const std::uint8_t* point;  // null: there are none
@@ -35,8 +36,8 @@ struct Isolated {
 };
 
 // Appends the candidates of one pair of leaves to `out`, which must not be full. The two features
-// of a candidate share no vertex, their bounding volumes overlap, and their groups may touch. Of
-// two edges the one with the smaller number comes first; a vertex comes before a face.
+// of a candidate share no vertex, their bounding volumes overlap, and their groups are tested. The
+// order in a pair is vertex and face, or edge of smaller number and edge of larger number.
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
                      const Groups& groups, const Isolated& isolated, CandidateBlock& out);
 

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t block = 512;  // queries at a time
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tolerance of the barycentric weights at a root, about that of the published codes.
+// Tolerance of the barycentric weights at a root, similar to the published codes.
 constexpr double inside_tolerance = 1e-10;
 
 int variations(const double* a) {
@@ -30,7 +30,7 @@ int variations(const double* a) {
   return count;
 }
 
-// Coefficients in powers of t of the cubic with these Bernstein coefficients.
+// Converts the Bernstein coefficients b of a cubic to its coefficients a in powers of t.
 void powers(const double* b, double* a) {
   a[0] = b[0];
   a[1] = 3 * (b[1] - b[0]);
@@ -80,7 +80,7 @@ double first_root_inside(const Query& k, const Cubic& c, Comparator comparator, 
   double cut[4] = {0, 1, 1, 1};
   int cuts = 1;
   if (!(comparator == Comparator::vcd && variations(c.b) == 1)) {
-    // Split where the derivative vanishes: every piece is monotone.
+    // Split where the derivative is zero, so that the cubic is monotone in every piece.
     double a[4];
     powers(c.b, a);
     const double d = a[2] * a[2] - 3 * a[1] * a[3];

@@ -1,4 +1,4 @@
-// Cubics in Bernstein form, several side by side: whether one has a root, and where to cut it into
+// Cubics in Bernstein form, one per lane: whether they have a root, and where to cut them into
 // pieces with fewer roots.
 #pragma once
 
@@ -14,15 +14,15 @@ struct Cubics {
   Double4 b[4];
 };
 
-// All coefficients have one sign, beyond the error: no root.
+// The lanes in which all coefficients certainly have one sign, so that there is no root.
 TAUGUARD_INLINE Mask4 one_sign(const Cubics& c, Double4 error) {
   const Double4 least = min(min(c.b[0], c.b[1]), min(c.b[2], c.b[3])),
                 most = max(max(c.b[0], c.b[1]), max(c.b[2], c.b[3]));
   return (least > error) | (most < -error);
 }
 
-// The coefficients change their sign once, beyond the error: there is one root. Then the ends have
-// different signs, and the coefficients between them change at most once.
+// The lanes in which the coefficients certainly change their sign once, so that there is one root:
+// the first and the last one have different signs, and the sequence changes its sign only once.
 TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
   const Double4 *b = c.b, below = -error;
   const Mask4 falls = (b[0] > error) & (b[3] < below) & ((b[1] > error) | (b[2] < below)),
@@ -30,9 +30,9 @@ TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
   return falls | rises;
 }
 
-// Where to cut a cubic into pieces with fewer roots. If both ends have one sign, the cut is at the
-// extremum in the direction of the other sign. Otherwise it is at the inflection point, because at
-// most two roots lie on either side of it.
+// Where to cut a cubic into pieces with fewer roots. If both ends have the same sign, the cut is at
+// the extremum towards the other sign. Otherwise it is at the inflection point, which has at most
+// two roots on each side.
 TAUGUARD_INLINE Double4 cut_of(const Cubics& c) {
   const Double4 s = c.b[0] > 0 ? splat(1) : splat(-1), d0 = s * (c.b[1] - c.b[0]),
                 d1 = s * (c.b[2] - c.b[1]), d2 = s * (c.b[3] - c.b[2]), a = d0 - 2 * d1 + d2,
@@ -46,7 +46,7 @@ TAUGUARD_INLINE Double4 cut_of(const Cubics& c) {
   return (cut > 0x1p-20) & (cut < 1 - 0x1p-20) ? cut : splat(0.5);
 }
 
-// By de Casteljau's algorithm.
+// Divides the cubics at `cut` by de Casteljau's algorithm.
 TAUGUARD_INLINE void halve(const Cubics& c, Double4 cut, Cubics& left, Cubics& right) {
   const Double4 *b = c.b, d0 = b[0] + cut * (b[1] - b[0]), d1 = b[1] + cut * (b[2] - b[1]),
                 d2 = b[2] + cut * (b[3] - b[2]), e0 = d0 + cut * (d1 - d0),

@@ -12,9 +12,9 @@ struct Ends {
   const double *t0, *t1;
   std::ptrdiff_t stride;  // doubles from one vertex to the next
 
-  // Arrays (n, 3) of a caller.
+  // The caller's arrays, shape (n, 3).
   static Ends of(const double* x_t0, const double* x_t1) { return {x_t0, x_t1, 3}; }
-  // Both ends of a vertex in one cache line: x, y, z, 0 at t0, then at t1.
+  // Both ends of a vertex in one cache line: x, y, z, 0 at the start, then at the end of the step.
   static constexpr std::ptrdiff_t line = 8;
   static Ends packed(const double* lines) { return {lines, lines + 4, line}; }
   bool in_lines() const { return stride == line; }

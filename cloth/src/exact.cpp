@@ -1,10 +1,13 @@
-// Contact is the origin in the convex hull of the features' differences g_i(t): three for a vertex
-// and a face, four (a parallelogram) for two edges. Its first time is 0, or a root of the
-// coplanarity cubic. If the cubic is zero at all times, the features stay in one plane, which may
-// turn. At the first contact the origin then lies on the boundary of the hull: between two
-// neighbouring corners, where g_i x g_j = 0. If this product is zero at all times too, the origin
-// is at a corner, g_i = 0. Each case gives a finite list of roots. At each root the signs of
-// quadratics tell whether the hull contains the origin.
+// The features touch at time t if the convex hull of their differences g_i(t) contains the origin.
+// There are three differences for a vertex and a face, and four (a parallelogram) for two edges.
+// The first time of contact is one of these:
+// * 0, or a root of the coplanarity cubic.
+// * If the cubic is zero at all times, the features stay in one plane, which may turn. At the first
+//   contact the origin is on the boundary of the hull, between two neighbouring corners, so that
+//   g_i x g_j = 0.
+// * If this product is also zero at all times, the origin is at a corner, g_i = 0.
+// Each case gives a finite list of roots. At each root the signs of quadratics tell whether the
+// hull contains the origin.
 #include "exact.hpp"
 
 #include <algorithm>
@@ -25,12 +28,12 @@ Polynomial cross(const Vector& a, const Vector& b, int k) {
   return a[i] * b[j] - a[j] * b[i];
 }
 
-// The hull's corners in order around it.
+// The corners of the hull, in order around it.
 struct Hull {
   std::array<Vector, 4> corner;
   int corners;
   const Vector& after(int i) const { return corner[(i + 1) % corners]; }
-  // Component k of corner i x the corner after it: on which side of that edge the origin is.
+  // Component k of corner(i) x corner(i + 1). Its sign: the origin's side of this edge.
   const Polynomial& side(int i, int k) const {
     auto& known = sides[i][k];
     if (!known) known = cross(corner[i], after(i), k);
@@ -39,7 +42,7 @@ struct Hull {
   mutable std::array<std::array<std::optional<Polynomial>, 3>, 4> sides{};
 };
 
-// The motion of vertex a as seen from vertex b.
+// The motion of vertex a relative to vertex b.
 Vector motion(const Ends& x, std::int32_t a, std::int32_t b) {
   Vector m;
   for (int k = 0; k < 3; ++k) {
@@ -56,16 +59,16 @@ Hull hull_of(bool vf, const Ends& x, const std::int32_t* row) {
   return {{g(2, 0), g(3, 0), g(3, 1), g(2, 1)}, 4, {}};
 }
 
-// Is the origin between a and b?
+// Whether the origin is on the segment from a to b at time t.
 bool between(const Root& t, const Vector& a, const Vector& b) {
   for (int k = 0; k < 3; ++k)
     if (sign_at(t, cross(a, b, k)) != 0) return false;
   return sign_at(t, dot(a, b)) <= 0;
 }
 
-// Is the origin, coplanar with the hull at t, in it?
+// Whether the hull contains the origin at time t, when both are coplanar.
 bool contains_origin(const Hull& hull, const Root& t) {
-  // Seen along an axis on which the hull has area, the origin is on the same side of every edge.
+  // In a projection with area, along axis k, the origin must be on the same side of every edge.
   for (int k = 0; k < 3; ++k) {
     Polynomial area;
     for (int i = 0; i < hull.corners; ++i) area = area + hull.side(i, k);
@@ -81,7 +84,7 @@ bool contains_origin(const Hull& hull, const Root& t) {
   return false;
 }
 
-// Adds the roots of the first component that is not zero throughout; false where there is none.
+// Adds the roots of the first component that is not the zero polynomial; false if there is none.
 bool add_roots(const Vector& v, std::vector<Root>& times) {
   for (const auto& component : v) {
     if (component.empty()) continue;

@@ -9,8 +9,8 @@ const Dyadic one(1.0);
 
 Dyadic magnitude(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
 
-// The remainder |lead b|^n a - quotient b, of lower degree than b. The multiplier is positive, so
-// that signs are kept. `quotient`, if asked for, is scaled by the same multiplier.
+// The remainder |lead(b)|^n a - quotient b, of lower degree than b. The multiplier is positive, so
+// that signs are kept. `quotient`, if not null, receives the quotient with the same multiplier.
 Polynomial remainder(Polynomial a, const Polynomial& b, Polynomial* quotient = nullptr) {
   const Dyadic lead = magnitude(b.back());
   if (quotient) quotient->assign(a.size() < b.size() ? 0 : a.size() - b.size() + 1, Dyadic());
@@ -52,8 +52,7 @@ int variations(const std::vector<Polynomial>& sequence, const Dyadic& x) {
   return count;
 }
 
-// Divides p by the factors that it shares with its derivative. The result has the same roots, all
-// simple.
+// Divides p by its common factors with its derivative. The result has the same roots, all simple.
 Polynomial square_free(const Polynomial& p) {
   const auto all = sequence(p, derivative(p));
   if (all.back().size() == 1) return p;
@@ -72,7 +71,7 @@ Polynomial deflated(const Polynomial& p, const Dyadic& x) {
 
 // Sign variations of the Bernstein coefficients on [0, 1]: 0 means no root in between, 1 means one.
 int variations_between_ends(const Polynomial& p) {
-  // Of degree n, up to factors: the coefficients of the sum of p_i t^i (1 + t)^(n - i).
+  // For degree n they are, up to positive factors, the coefficients of sum p_i t^i (1 + t)^(n - i).
   Polynomial sum, power{one};
   for (std::size_t i = p.size(); i-- > 0;) {
     Polynomial term(i, Dyadic());
@@ -89,7 +88,7 @@ int variations_between_ends(const Polynomial& p) {
   return count;
 }
 
-// Cuts the interval at `middle` if that lies inside. True if `middle` is the root.
+// Cuts the interval at `middle` if it is inside. True if `middle` is the root.
 bool narrow(Root& root, const Dyadic& middle, int below) {
   if (!(root.lo < middle && middle < root.hi)) return false;
   const int s = value(root.of, middle).sign();
@@ -122,7 +121,7 @@ double estimate(const Root& root) {
   return lo;
 }
 
-// Bisects to 2^-60. It starts from an estimate in doubles if that is good.
+// Narrows the interval to 2^-60 by bisection, around an estimate in doubles first.
 void refine(Root& root) {
   const int below = value(root.of, root.lo).sign();
   const double guess = estimate(root);
@@ -133,8 +132,8 @@ void refine(Root& root) {
   narrow(root, Dyadic(root.hi.to_double()), below);  // a root that is a double is exact
 }
 
-// Intervals with one root of p each. p must have no double roots and none at 0 or 1. If a midpoint
-// is a root, it is returned in `found`, and the intervals are not valid.
+// Intervals with one root of p each. p must have only simple roots, and none at 0 or 1. If a
+// midpoint is a root, it is returned in `found`, and the intervals are not valid.
 std::vector<Root> isolate(const Polynomial& p, Dyadic& found) {
   const auto sturm = sequence(p, derivative(p));
   struct Part {
@@ -214,7 +213,7 @@ std::vector<Root> roots_of(const Polynomial& p) {
   const int variations = variations_between_ends(rest);
   if (variations == 1) roots.push_back({Dyadic(), one, rest});
   if (variations > 1) {
-    // Sturm's count of distinct roots; a midpoint that is a root is divided out.
+    // Sturm's theorem counts distinct roots. A midpoint that is a root is divided out.
     rest = square_free(rest);
     for (bool open = rest.size() > 1; open;) {
       Dyadic found;
@@ -234,7 +233,8 @@ int sign_at(const Root& root, const Polynomial& g) {
   if (g.empty()) return 0;
   const int at_lo = value(g, root.lo).sign();
   if (root.exact()) return at_lo;
-  // Of degree 2 at most, g keeps its sign where both ends and the control point between them agree.
+  // If the degree of g is at most 2, g keeps its sign if it has the same sign at both ends and at
+  // the control point between them.
   if (g.size() <= 3) {
     const Dyadic control =
         value(g, root.lo).scaled(1) + (root.hi - root.lo) * value(derivative(g), root.lo);

@@ -1,7 +1,7 @@
 // Polynomials with dyadic coefficients, and the sign of one at a root of another, by Sturm's
 // theorem and its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic
-// Geometry", chapter 2). Nothing is rounded. A sign of zero is found without bisecting down to the
-// distance of two roots.
+// Geometry", chapter 2). Nothing is rounded. A sign of zero is found algebraically, without
+// bisection down to the distance between two roots.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,7 @@ namespace tauguard::cloth {
 
 using geometry::Dyadic;
 
-// Coefficients in ascending powers. The leading one is not zero; the zero polynomial has no
-// coefficients.
+// Coefficients in ascending powers. The last one is not zero; the zero polynomial is empty.
 using Polynomial = std::vector<Dyadic>;
 
 Polynomial trimmed(Polynomial p);
@@ -23,8 +22,8 @@ Polynomial operator*(const Polynomial& a, const Polynomial& b);
 Polynomial derivative(const Polynomial& p);
 Dyadic value(const Polynomial& p, const Dyadic& x);
 
-// A root in [0, 1]. If `lo` == `hi`, it is exactly there. Otherwise it is the only root of `of` in
-// (lo, hi); it is simple, and `of` is not zero at either end.
+// A root in [0, 1]. If lo == hi, it is lo. Otherwise it is the only root of `of` in (lo, hi); it is
+// simple, and `of` is not zero at either end.
 struct Root {
   Dyadic lo, hi;
   Polynomial of;

@@ -26,7 +26,7 @@ struct Centroid {
   std::int32_t group;
 };
 
-// Sorts order[begin, end) so that its first `left` entries belong to the left child.
+// Sorts order[begin, end) so that the first `left` entries belong to the left child.
 void split(std::vector<std::int32_t>& order, std::size_t begin, std::size_t left, std::size_t end,
            const std::vector<Centroid>& at) {
   Aabb box;
@@ -75,8 +75,9 @@ void FeatureTree::build(const Features& features, const Ends& x, const Groups& g
   const auto at = centroids(features, x, groups);
   std::vector<std::int32_t> order(features.size());
   std::iota(order.begin(), order.end(), 0);
-  // The leaves below each node, the first of them from the left, and their features. Leaf i from
-  // the left starts with feature i * size / n, so that leaves differ by one feature at most.
+  // For each node: the number of leaves below it, the first of them, and the range of their
+  // features. Leaf i from the left starts with feature i * size / n, so the numbers of features in
+  // leaves differ by at most one.
   std::vector<std::size_t> count(2 * n, 1), first(2 * n, 0), begin(2 * n, 0), end(2 * n, 0);
   for (std::size_t i = n - 1; i >= 1; --i) count[i] = count[2 * i] + count[2 * i + 1];
   end[1] = order.size();
@@ -134,8 +135,7 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
   }
 }
 
-// The bounds of a feature on every axis slot at both ends of the step, [end][slot], four values at
-// a time.
+// One bound of a feature on every axis slot at both ends of the step, [end][slot].
 template <int slots>
 struct Row {
   using Four = geometry::Float4;
@@ -164,7 +164,7 @@ Row<slots> other_end(const Row<slots>& row) {
   return other;
 }
 
-// Writes one side of 16 volumes into a block, four lanes by four axis slots at a time.
+// Writes the lower or upper bounds of 16 volumes into a block, 4 x 4 at a time.
 template <int slots>
 void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
   for (int r = 0; r < times * slots; r += 4) {
@@ -306,7 +306,7 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
     }
   for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
 
-  // A leaf for each vertex; new features are placed in the leaf of one of their vertices.
+  // Find a leaf for each vertex; new features are placed in the leaf of one of their vertices.
   const auto used =
       used_vertices(missing.empty() ? std::vector<std::int32_t>() : features.vertices);
   const VertexTable table(used);

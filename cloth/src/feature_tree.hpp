@@ -1,9 +1,9 @@
 // A bounding-volume tree over the features of a mesh (vertices, edges or faces), 16 to a leaf.
 //
 // The tree is a left-complete binary heap: node 1 is the root, the children of i are 2 i and 2 i +
-// 1, leaf l is node leaves() + l. It is built top-down (median of the centroids along the longest
-// axis), refitted every step, and keeps free slots in its leaves so that features come and go
-// without a rebuild.
+// 1, and leaf l is node leaves() + l. It is built top-down (median of the centroids along the
+// longest axis) and refitted every step. Free slots in the leaves allow additions without a
+// rebuild.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace tauguard::cloth {
 
-// Features of one kind: row i holds the `arity` vertices of feature i.
+// Features of one kind: row i has the `arity` vertices of feature i.
 struct Features {
   int arity = 1;
   std::vector<std::int32_t> vertices;
@@ -23,8 +23,8 @@ struct Features {
   const std::int32_t* of(std::size_t i) const { return vertices.data() + arity * i; }
 };
 
-// Vertices to test against each other: a group for each vertex and a symmetric table. If empty, all
-// are tested.
+// The group of each vertex, and a symmetric table of the groups to test against each other. If
+// empty, all vertices are tested.
 struct Groups {
   std::vector<std::int32_t> of_vertex;
   std::vector<std::uint8_t> meets;  // count x count
@@ -36,13 +36,13 @@ struct Groups {
 class FeatureTree {
  public:
   // Places every feature by the centroid of its vertices at the start of the step. The upper levels
-  // of the tree separate groups, the lower ones space.
+  // of the tree divide the groups, the lower ones divide space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
-  // Bounds of every leaf and node for this step.
+  // Computes the bounds of every leaf and node for this step.
   void refit(const Projection& points, int threads);
-  // Replaces the features by `features`. Old feature i becomes new_id[i], or -1 if it is gone. New
-  // features are placed near features that share their vertices. False if the free slots do not
-  // suffice; then build() must be called.
+  // Replaces the features by `features`. Old feature i becomes new_id[i]; -1 removes it. New
+  // features are placed near features that share their vertices. False if there are not enough free
+  // slots; then build() must be called.
   bool update(const Features& features, const std::vector<std::int32_t>& new_id,
               const Groups& groups);
 
@@ -85,7 +85,7 @@ class FeatureTree {
 
   int arity_ = 1, axes_ = 0, slots_ = 0, times_ = 0;
   std::int32_t leaves_ = 0;
-  bool added_ = false;  // features, by update()
+  bool added_ = false;  // update() has added features
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;
   std::vector<std::int32_t> ids_, vertices_,

@@ -20,7 +20,7 @@ double seconds(Instant from, Instant to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// One collision before its point and normal are computed: its pair as one number, and its time.
+// A collision before its point and normal are computed: its pair as one number, and its time.
 struct Hit {
   std::uint64_t pair;
   double toi;
@@ -34,14 +34,14 @@ struct Part {
   double narrow_s = 0;
 };
 
-// What the narrow phase writes for a block of candidates.
+// Output of the narrow phase for a block of candidates.
 struct Answers {
   std::uint8_t hit[CandidateBlock::capacity];
   double toi[CandidateBlock::capacity];
 };
 
-// All collisions in the order of their pairs. A pair occurs once, so that the order is unique.
-// Radix sort from the last digit; bits that no pair uses are skipped.
+// All collisions in the order of their pairs. A pair occurs once, so the order is unique. It is a
+// radix sort from the last digit, which skips bits that no pair uses.
 SpareArray<Hit> in_order(const std::vector<Part>& parts,
                          const std::shared_ptr<SpareMemory>& spare) {
   constexpr int digit = 11;
@@ -67,8 +67,8 @@ SpareArray<Hit> in_order(const std::vector<Part>& parts,
   return hits;
 }
 
-// Writes pairs, times, points, normals and weights to the final arrays. a, b: the features of the
-// pairs' first and second numbers; the first of a vertex and a face is the vertex itself.
+// Writes pairs, times, points, normals and weights to the final arrays. The first number of a pair
+// refers to `a` and the second to `b`; in a vertex-face pair the first number is the vertex itself.
 template <bool vf>
 void describe_all(const Ends& x, const Features& a, const Features& b, const SpareArray<Hit>& hits,
                   int threads, Collisions& out) {
@@ -124,7 +124,7 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
                            std::size_t limit) {
   const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
-  // Moving volumes have compared x, y and z already.
+  // With moving volumes, the broad phase has compared x, y and z already.
   const AxisFilter axes{!ccd.volume().moving};
   return find_collisions(
       ccd, kind,

@@ -1,4 +1,4 @@
-// Every collision of one step: the candidates of a MeshCcd through the narrow phase.
+// Every collision of one step: the narrow phase applied to the candidates of a MeshCcd.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ struct Collisions {
   SpareArray<std::int32_t> pairs;                  // (n, 2)
   SpareArray<double> toi, point, normal, weights;  // shapes (n), (n, 3), (n, 3), (n, 4)
   Stats stats;
-  double narrow_s = 0;  // in the narrow phase, summed over threads
-  double total_s = 0;   // wall time of candidates, narrow phase and sorting
+  double narrow_s = 0;  // time of the narrow phase, summed over threads [s]
+  double total_s = 0;   // wall time of candidates, narrow phase and sorting [s]
   std::size_t size() const { return toi.size(); }
 };
 
-// Decides a block of candidates, rows (n, 4) of vertices, like solve_vf. Only the times of the
-// impacts are needed. Called from several threads.
+// Decides a block of candidates, rows (n, 4) of vertices, as solve_vf does. Only the times of
+// impacts are needed. It is called from several threads.
 using NarrowPhase = std::function<void(const Ends& x, const std::int32_t* rows, std::size_t n,
                                        std::uint8_t* hit, ImpactArrays impacts, Stats& stats)>;
 

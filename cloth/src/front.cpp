@@ -9,10 +9,10 @@
 namespace tauguard::cloth {
 namespace {
 
-// Number of front entries in a chunk. A kept entry costs about one test; an entry near the root
-// costs a whole descent.
+// Numbers of front entries in a chunk. An entry of the last front takes about one test; an entry of
+// the first cut takes a whole descent.
 constexpr std::size_t kept_grain = 1024, root_grain = 16;
-constexpr int first_depth = 5;  // the first cut has all pairs at this depth
+constexpr int first_depth = 5;  // the first cut has all pairs of this depth
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
@@ -25,15 +25,14 @@ struct Total {
   }
 };
 
-// Processes one chunk: reads a run of the old cut, and writes its part of the new cut if that
-// differs.
+// Processes one chunk: reads its part of the old cut, and writes that of the new cut if it differs.
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
       : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
 
-  // Two nodes of one depth are both split. Otherwise the deeper one is split, because the other is
-  // a leaf.
+  // Two nodes of the same depth are both split. Otherwise only the deeper one is; the other is a
+  // leaf.
   int children(NodePair p, NodePair* child) const {
     const int gap = depth(p.a) - depth(p.b);
     const bool split_a = gap >= 0 && !a_.is_leaf(p.a), split_b = gap <= 0 && !b_.is_leaf(p.b);
@@ -46,8 +45,8 @@ class Walk {
     return n;
   }
 
-  // Processes `n` entries of the old cut, at most a chunk. If all children of a pair follow each
-  // other and the pair itself is apart, the pair replaces them.
+  // Processes `n` entries of the old cut, at most a chunk. If all children of a pair are
+  // consecutive entries and the pair itself is apart, the pair replaces them.
   void move(const NodePair* entry, int n) {
     bool meet[kept_grain];
     for (int i = 0; i < n; ++i) {
@@ -58,8 +57,7 @@ class Walk {
       meet[i] = meets(entry[i]);
     }
     look_up();
-    // Most entries stay. Pairs of leaves that meet are written without a branch, which would be
-    // mispredicted.
+    // Most entries stay. Pairs of leaves are written without a (mispredicted) branch.
     NodePair found[kept_grain];
     int count = 0;
     for (int i = 0; i < n; ++i) {
@@ -84,11 +82,11 @@ class Walk {
   }
 
   std::vector<NodePair> cut, leaf_pairs;
-  bool differs = false;  // if false, the run of the old cut is kept and `cut` is empty
+  bool differs = false;  // if false, the old entries are kept and `cut` is empty
   std::size_t tests = 0;
 
  private:
-  static constexpr std::size_t pause = 1024;  // tests between two calls of look_up
+  static constexpr std::size_t pause = 1024;  // number of tests between two calls of look_up
   static constexpr int ahead = 8;
 
   bool meets(NodePair p) {
@@ -121,14 +119,13 @@ class Walk {
     for (int i = 0; i < n; ++i) descend(child[i]);
   }
 
-  // The parent of a pair. The deeper side came from a split; at equal depths both sides did.
+  // The parent of a pair: the deeper node came from a split, or both nodes if their depth is equal.
   NodePair parent(NodePair p) const {
     const int gap = depth(p.a) - depth(p.b);
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
   }
 
-  // The number of entries that together are all children of one pair, if they and the pair are
-  // apart; otherwise 0.
+  // The number of next entries that are all children of one pair, if all of them are apart; else 0.
   int apart_siblings(const NodePair* entry, const bool* meet, int n) {
     const NodePair up = parent(*entry);
     // First children have even numbers.
@@ -169,8 +166,7 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
   Total total{limit};
   const std::size_t step = cut_.empty() ? root_grain : kept_grain;
   if (cut_.empty()) {
-    // Splits every entry, without testing volumes, until it is `first_depth` deep or a pair of
-    // leaves.
+    // Splits every entry, without testing volumes, down to `first_depth` or to leaves.
     const Walk walk(a, b, total);
     cut_.push_back({1, 1});
     for (int level = 0; level < first_depth; ++level) {

@@ -11,17 +11,16 @@
 
 namespace tauguard::cloth {
 
-// Row i is written if query i is a hit. The weights belong to the four vertices of the row: (1, w
-// of the face's vertices), or (1 - s, s, 1 - t, t) for two edges. All pointers but `toi` are null
-// if only times are needed.
+// Output of queries. Row i is written if query i has contact. The weights belong to the four
+// vertices of the row: (1, w0, w1, w2) for a vertex and a face, or (1 - s, s, 1 - t, t) for two
+// edges. All pointers except `toi` are null if only times are needed.
 struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // shapes (n), (n, 3), (n, 3), (n, 4)
 };
 
 inline Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }
 
-// Weights on a face (b, c, d) without area: those of the point on its longest edge that is nearest
-// to `a`.
+// Weights on a degenerate face (b, c, d): those of the point on its longest edge nearest to `a`.
 inline void on_longest_edge(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* w) {
   const Vec3 ends[3][2] = {{b, c}, {b, d}, {c, d}};
   constexpr int weight[3][2] = {{1, 2}, {1, 3}, {2, 3}};
@@ -38,7 +37,7 @@ inline void on_longest_edge(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* w) {
   w[weight[longest][0]] = 1 - w[weight[longest][1]];
 }
 
-// Computes the point, the normal and the weights with which the two features meet at time t.
+// Computes point, normal and weights of the contact at time t.
 template <bool vf>
 void describe(const Ends& x, const std::int32_t* row, double t, ImpactArrays out, std::size_t i) {
   const Vec3 a = at(x, row[0], t), b = at(x, row[1], t), c = at(x, row[2], t), d = at(x, row[3], t);

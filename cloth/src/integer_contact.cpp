@@ -1,4 +1,4 @@
-// The same steps as in exact.cpp, which explains the terms.
+// The steps are those of exact.cpp, which explains the terms.
 #include "integer_contact.hpp"
 
 #include <algorithm>
@@ -14,8 +14,8 @@ namespace {
 
 using Vector = std::array<Bernstein<1>, 3>;
 
-// Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis
-// its own); false where they do not fit.
+// Coordinates k of four vertices at both ends, [vertex][end], as integers in a unit for this axis;
+// false if they do not fit.
 bool on_axis(const Ends& x, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
   double values[8];
   for (int v = 0; v < 4; ++v)
@@ -30,8 +30,7 @@ Bernstein<2> cross(const Vector& a, const Vector& b, int k) {
 
 class Hull {
  public:
-  // The vertices' coordinates as [axis][vertex][end].
-  // wire: a face that is an edge or a point, with its last two vertices the same.
+  // x: coordinates as [axis][vertex][end]. wire: a degenerate face (a, b, b).
   Hull(bool vf, bool wire, const FixedInt<2> (&x)[3][4][2]) : corners_(wire ? 2 : vf ? 3 : 4) {
     constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}},
                   of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
@@ -61,7 +60,7 @@ class Hull {
     return *known;
   }
 
-  // Sets open_ if the sign is unknown; the returned sign is then invalid.
+  // The sign of q at t. If it is unknown, sets open_ and returns an invalid sign.
   template <class Time>
   int sign(const Bernstein<2>& q, const Time& t) {
     const int s = sign_at(q, t);
@@ -129,8 +128,7 @@ class Hull {
     return first_of(times.data(), count, complete);
   }
 
-  // The first coordinate of a corner that is not zero at all times, as a polynomial of degree 2;
-  // null if there is none.
+  // The first coordinate of corner i that is not always zero, with degree 2; null if there is none.
   const Bernstein<2>* raised(int i) {
     i %= corners_;
     for (const Bernstein<1>& x : corner_[i]) {

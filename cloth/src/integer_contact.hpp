@@ -1,5 +1,5 @@
-// Decides like exact.hpp, in integers of fixed width. It is exact and some ten times faster, but
-// gives no answer if numbers are too long or roots too close.
+// The decision of exact.hpp in integers of fixed width. It is exact and some ten times faster, but
+// gives no result if numbers are too long or roots too close.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,11 @@
 
 namespace tauguard::cloth {
 
-// The first time of contact, at most 2^-37 early and never late; infinity without a hit; NaN
-// without an answer. There is no answer if the coordinates of a query on one axis span more than
-// 116 bits, if roots are closer than 1/32 of the step to each other, or if a side of the hull has
-// two roots next to that root.
+// The first time of contact, at most 2^-37 early and never late; infinity without contact; NaN
+// without a result. There is no result in these cases:
+// * The coordinates of the query on one axis span more than 116 bits.
+// * Two roots of the cubic are closer than 1/32 of the step.
+// * A side of the hull has two roots in the interval around a root of the cubic.
 double integer_contact(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

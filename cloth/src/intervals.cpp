@@ -1,10 +1,11 @@
-// A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first.
-// An interval is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or
-// where one direction separates the features at both of its ends (and so in between: the
-// differences are linear in time). If the cubic changes sign, its root is enclosed in a tiny
-// interval. An interval that cannot be cleared down to a width of 2^-34 is a hit at its start, if
-// the signs prove it beyond rounding; if they do not, exact arithmetic decides. Never late, never
-// missed, never false.
+// A query is decided by cutting [0, 1] into intervals of time and testing them, earliest first.
+// * An interval is clear (without contact) if the coplanarity cubic has Bernstein coefficients of
+//   one sign on it, or if one direction separates the features at both ends. The differences are
+//   linear in time, so the direction also separates them in between.
+// * If the cubic changes its sign, its root is enclosed in a tiny interval.
+// * An interval of width 2^-34 that is not clear is a contact at its start if the signs prove this
+//   in spite of rounding. Otherwise exact arithmetic decides.
+// So no contact is missed, none is false, and no time is late.
 #include "intervals.hpp"
 
 #include <algorithm>
@@ -14,9 +15,9 @@
 namespace tauguard::cloth {
 namespace {
 
-// Does m see every gap on one side by more than the distance, at times a and b? Rounding, against
-// |m|_1 big: u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the
-// 16 u in use.
+// Whether the direction m separates the features by more than the distance at times a and b: all
+// gaps are on the same side. Rounding errors in units of |m|_1 big: u of a difference, 3 u of a dot
+// product, 6 u of the interpolation. Together they are 10 u; the bound is 16 u.
 bool separated(const Query& k, Vec3 m, double a, double b) {
   const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
   const double margin = 16 * unit_roundoff * m1 * k.big +
@@ -31,13 +32,13 @@ bool separated(const Query& k, Vec3 m, double a, double b) {
   return above || below;
 }
 
-// The directions that separate nearly everything that is apart: the normal and those in the plane.
+// The normal of the plane and directions in it, which separate nearly all features that are apart.
 bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
   return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
          (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
 }
-// The rest: between vertices, and between a vertex and an edge.
+// The other directions: between two vertices, and between a vertex and an edge.
 bool edge_direction(const Query& k, double t, double a, double b) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
   for (int i = 0; i < k.gaps; ++i) {
@@ -58,14 +59,15 @@ double determinant(const Query& k, double t) {
   return dot(mix(k.p[0], k.p[1], t), cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t)));
 }
 
-// Is there contact between times a and b or within 2^-32 of them, whatever rounding did? The cubic
-// changes sign, so that it has a root there, and throughout the origin is inside every edge of the
-// hull of the gaps.
+// Whether there is certainly contact between times a and b, or within 2^-32 of them. The cubic
+// changes its sign and thus has a root, and during the interval the origin is on the inner side of
+// every edge of the hull of the gaps.
 //
-// With B = big, each component of a mix carries 6 u B (u B of the differences, 5 u B of its own), a
-// determinant of three at most 174 u B^3 < 2^-45 B^3. (g x h) . n with n = q x r is below 12 B^4
-// and changes at most 96 B^4 a unit of time, half the interval from its middle; rounding adds less
-// than 2^-43 B^4.
+// Error bounds, with B = big:
+// * The error of a component of `mix` is 6 u B: u B from the differences, 5 u B from interpolation.
+// * The error of the determinant is at most 174 u B^3 < 2^-45 B^3.
+// * A side (g x h) . n, with n = q x r, is at most 12 B^4. It changes by at most 96 B^4 per unit of
+//   time, over half of the interval. Rounding adds less than 2^-43 B^4.
 bool certain(const Query& k, double a, double b, bool vf) {
   a = std::max(0.0, a - 0x1p-32);
   b = std::min(1.0, b + 0x1p-32);
@@ -101,8 +103,8 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
   const double* c = stack[0].c.b;
   const bool flat =
       std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
-  // Flat features go to exact arithmetic at once. Faces that are an edge or a point are nearly
-  // always apart, so they are filtered first.
+  // Largest number of cuts. Features that stay in one plane go to exact arithmetic at once, except
+  // faces that are an edge or a point: these are nearly always apart, so a few cuts are tried.
   const int most = k.distance > 0 ? 4000 : !flat ? 40 : vf && is_wire(k) ? 12 : 0;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];
@@ -122,7 +124,7 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
     Piece left, right;
     if (crosses) {
       const double x = root(b), delta = 0x1p-37 / width;
-      // Around the root: [x - delta, x + delta] is small enough to be the answer at once.
+      // The interval [x - delta, x + delta] around the root is small enough to be the result.
       const double lo = x - delta, hi = x + delta;
       if (lo > 0 && hi < 1) {
         Piece rest, near;

@@ -1,4 +1,4 @@
-// One query by intervals of time: for what the batch cannot decide, and for a minimum distance.
+// Decides single queries by intervals of time: those left by the batch, and those with a distance.
 #pragma once
 
 #include <limits>
@@ -10,10 +10,10 @@ namespace tauguard::cloth {
 
 inline constexpr double undecided = std::numeric_limits<double>::quiet_NaN();
 
-// The start of the first interval that no filter clears; infinity if there is none; undecided if it
-// is not certain that this is contact. At most 4001 intervals are cut with a minimum distance; what
-// is left then counts as contact. Without one at most 41 are cut, since exact arithmetic is cheaper
-// than more.
+// The time of contact: the start of the first interval that is not clear, or infinity. `undecided`
+// if the contact is not certain. With a minimum distance there are at most 4001 cuts, and an
+// interval that is not clear by then counts as contact. Without one there are at most 41 cuts,
+// because exact arithmetic is cheaper than more cuts.
 double first_contact(const Query& k, bool vf, Stats& stats);
 
 }  // namespace tauguard::cloth

@@ -1,7 +1,7 @@
-// k-DOPs of moving points. A volume either sweeps the step (one interval over both ends of the
-// motion) or moves with it (an interval at each end). Moving volumes are apart where one axis
-// separates them on the same side at both ends: every difference of two points is linear in time,
-// so it keeps its sign in between.
+// k-DOPs of moving points. On each axis a volume has either one interval for the whole step or, if
+// it is *moving*, an interval at each end of the step. Two moving volumes are apart if an axis
+// separates them on the same side at both ends: the difference of two points is linear in time, so
+// it keeps its sign in between.
 #pragma once
 
 #include <cstddef>
@@ -12,32 +12,35 @@
 
 namespace tauguard::cloth {
 
-// The largest number of axes, rounded up to a vector.
+// The largest number of axes, rounded up to a multiple of the vector width.
 inline constexpr int most_slots = 16;
 
 struct VolumeKind {
   int k = 18;          // 6 (axis-aligned box), 14, 16, 18 or 26
-  bool moving = true;  // an interval at each end of the step, not one over both
+  bool moving = true;  // an interval at each end of the step, not one for the whole step
   int axes() const { return k / 2; }
   int times() const { return moving ? 2 : 1; }
-  // Axes rounded up to 4, 8 or 16: the room that points and nodes give them. Spare slots hold
-  // zeros, on which nothing is ever apart.
+  // The number of axes rounded up to 4, 8 or 16. The unused slots of points and nodes are zero, so
+  // nothing is apart on them.
   int slots() const { return axes() <= 4 ? 4 : axes() <= 8 ? 8 : 16; }
 };
 
-// Rows of {-1, 0, 1} of the k / 2 axes: x, y, z first. Throws std::invalid_argument for another k.
+// The k / 2 axes, with components -1, 0 or 1; x, y and z are first. Throws std::invalid_argument
+// otherwise.
 const std::int8_t (*axes_of(int k))[3];
 
-// Positions of both ends of the step as float32 intervals' midpoints on every axis.
+// Projections of the positions at both ends of the step on every axis, in float32.
 //
-// Coordinates are first brought into [-1, 1] by z = (x 2^a - c) 2^b, sums of m coordinates are
-// divided by 2^(m - 1); both make every magnitude here at most 1. Errors, absolute, against the
-// exact image of x: scaling by powers of two is exact but for underflow (x 2^a is off by 2^-1075 at
-// most, and b is at most 1000: 2^-75), the subtraction rounds by 2^-53, which m coordinates and
-// their sum bring to 2^-52, the conversion to float32 by 2^-25: less than 2^-24 in all. Adding
-// `pad` to an interval's end rounds once more, by at most 2^-24 (1 + pad). With a true margin m
-// (half of the minimum distance, as seen on the axis) pad = m (1 + 2^-20) + 2^-22 covers m and both
-// errors: 2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
+// Coordinates are scaled into [-1, 1] by z = (x 2^a - c) 2^b, and sums of m coordinates are divided
+// by 2^(m - 1), so that all magnitudes are at most 1. The absolute error is below 2^-24:
+// * Scaling by powers of two is exact except for underflow. The error of x 2^a is at most 2^-1075,
+//   and b is at most 1000: 2^-75.
+// * The subtraction is rounded by 2^-53. With m coordinates and their sum this is 2^-52.
+// * The conversion to float32 is rounded by 2^-25.
+// Adding `pad` to the end of an interval is rounded by at most 2^-24 (1 + pad). Let m be the margin
+// on the axis for half of the minimum distance. pad = m (1 + 2^-20) + 2^-22 covers m and all
+// errors:
+//   2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
 class Projection {
  public:
   // Projects n vertices with finite coordinates.

@@ -1,4 +1,4 @@
-// tauguard.cloth._mesh: continuous collision detection of a mesh, one call a frame.
+// tauguard.cloth._mesh: continuous collision detection of a mesh, one call per frame.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
@@ -52,12 +52,12 @@ Groups groups_of(const Ids& ids, const Table& meets) {
   return groups;
 }
 
-// The feature numbers of a pair as one key. Sorting by key sorts the rows.
+// The two feature numbers of a pair as one key. Sorting keys sorts the pairs.
 std::uint64_t key_of(const std::int32_t* pair) {
   return std::uint64_t(std::uint32_t(pair[0])) << 32 | std::uint32_t(pair[1]);
 }
 
-// A mesh that processes one step at a time, also with Python threads, signals and forks.
+// A mesh whose lock allows one call at a time, also with Python threads, signals and forks.
 struct Mesh {
   Mesh(Faces faces, Ids ids, Table meets, int k, bool moving, int threads)
       : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving}, threads) {}
@@ -218,7 +218,7 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
     const std::size_t n = rows.shape(0);
     Projection points;
     AxisFilter axes;
-    // Queries for each vertex. Projecting a vertex costs 18 ns and saves 6 ns for each query.
+    // Projecting a vertex costs 18 ns and saves 6 ns per query. So it pays from 4 queries on.
     constexpr std::size_t pays = 4;
     if (Method(method) == Method::ab2pf && min_distance == 0 && n >= pays * x_t0.shape(0)) {
       points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
@@ -259,7 +259,7 @@ Named update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
 
 NB_MODULE(_mesh, m) {
   m.doc() =
-      "Continuous collision detection of a mesh, one call a frame. Arguments are checked in "
+      "Continuous collision detection of a mesh, one call per frame. Arguments are checked in "
       "Python.";
   tauguard::geometry::bind_interrupts();
   nb::class_<Mesh>(m, "Mesh")
@@ -285,8 +285,9 @@ NB_MODULE(_mesh, m) {
       [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,
       "For tests: narrow-phase kernels to use from now on (\"portable\", \"avx2\"); any other name "
       "selects the fastest ones. True if they exist here.");
-  // For tests: the lanes of one leaf that each row of another meets, then the number of pairs that
-  // share a vertex, computed by the named variant. Empty if the processor cannot run it.
+  // For tests: the overlaps of two leaves by the named variant of the kernels. The result has, for
+  // each row of one leaf, the lanes of the other leaf that it overlaps, and then the number of
+  // pairs that share a vertex. It is empty if the processor cannot run the variant.
   m.def(
       "leaf_pair",
       [](const std::string& variant,

@@ -13,9 +13,9 @@ namespace tauguard::cloth {
 namespace {
 
 constexpr std::size_t chunk_pairs = 512;  // number of leaf pairs in a chunk
-// A tree is built again if its leaves are spread wider by this factor than at its last build.
+// A tree is rebuilt if the sum of its leaves' extents has grown by this factor since the build.
 constexpr double worn = 2;
-// The limit of leaf pairs of a step, for each collision that is allowed.
+// Largest number of leaf pairs of a step, per collision that the limit allows.
 constexpr std::size_t leaf_pairs = 8;
 
 // Prefetches the volumes and vertices of a leaf.

@@ -1,5 +1,5 @@
-// Continuous collision detection of a deforming mesh with itself. The broad phase is kept between
-// steps; the narrow phase tests the candidates that it leaves.
+// Continuous collision detection of a deforming mesh with itself. Trees and fronts of the broad
+// phase are kept between steps. The narrow phase (frame.hpp) tests its candidates.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace tauguard::cloth {
 
-// One kind of query (vertex-face or edge-edge) in the last step.
+// Counts of one kind of query (vertex-face or edge-edge) in the last step.
 struct BroadCounts {
   std::uint64_t node_tests = 0, front = 0, leaf_pairs = 0, candidates = 0, adjacent = 0,
                 kept_apart = 0;
@@ -44,17 +44,16 @@ class MeshCcd {
   int threads() const { return threads_; }
   VolumeKind volume() const { return volume_; }
 
-  // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied, so the caller
-  // may change them meanwhile. fresh: descend from the root instead of the last front. Throws
-  // std::invalid_argument if the features use more vertices or a position is not finite, and
-  // TooMany if there are more than 8 `limit` pairs of leaves. The object can be used after an
-  // exception.
+  // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied. fresh: start
+  // the traversal at the root instead of the last front. Throws std::invalid_argument if features
+  // have vertices beyond n or a position is not finite, and TooMany if there are more than 8
+  // `limit` pairs of leaves. The object can be used after an exception.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
                bool fresh, std::size_t limit);
   // The positions of the last prepare.
   Ends ends() const { return Ends::packed(lines_.data()->value); }
-  // Call prepare first. Passes the candidates of one kind to `take(block, chunk)`, from several
-  // threads. A chunk always has the same candidates in the same order, in blocks of some thousand.
+  // Calls take(block, chunk) with all candidates of one kind, from several threads; call prepare
+  // first. The candidates of a chunk and their order do not depend on the threads.
   using Take = std::function<void(const CandidateBlock&, std::size_t)>;
   std::size_t chunks(Kind kind) const;
   void for_each_block(Kind kind, const Take& take);
@@ -62,7 +61,7 @@ class MeshCcd {
   TopologyChange update_topology(std::vector<std::int32_t> faces, Groups groups);
 
   const BroadStats& stats() const { return stats_; }
-  // Memory of the arrays of answers; the arrays may outlive this object.
+  // Memory of the result arrays, which may outlive this object.
   const std::shared_ptr<SpareMemory>& spare() const { return spare_; }
   std::size_t bytes() const;
 

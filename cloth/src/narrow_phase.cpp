@@ -1,8 +1,8 @@
-// Queries are answered in batches. For most queries the coplanarity cubic has no root. For the
-// others the step is split into intervals with one root each, by Descartes' rule in Bernstein form
-// (Vincent's theorem). At each root, earliest first, a test decides whether the features touch; it
-// allows for rounding and for the error of the root. Queries that it cannot decide go to
-// intervals.hpp, and queries that intervals.hpp cannot decide go to exact.hpp.
+// Queries are solved in batches. For most queries the coplanarity cubic has no root. For the others
+// the step is split into pieces with one root each, by Descartes' rule in Bernstein form (Vincent's
+// theorem). At each root, earliest first, a test decides whether the features touch. It takes
+// rounding and the error of the root into account. Queries that it leaves undecided go to
+// intervals.hpp. The rest is decided in exact arithmetic: integer_contact.hpp, then exact.hpp.
 #include "narrow_phase.hpp"
 
 #include <algorithm>
@@ -25,17 +25,16 @@
 namespace tauguard::cloth {
 namespace {
 
-// Numbers of queries that are processed together: `block` in the axis filter, `batch` in the stages
-// after it.
-constexpr int batch = 128, block = 512;
+constexpr int block = 512;  // number of queries that pass the axis filter together
+constexpr int batch = 128;  // number of queries that pass the later stages together
 constexpr double never = std::numeric_limits<double>::infinity();
 
 // The same cubic in all four lanes.
 Cubics cubics_of(const double* b) { return {{splat(b[0]), splat(b[1]), splat(b[2]), splat(b[3])}}; }
 
-// Writes pieces that hold one root each, in order, and together all roots of the cubic. Returns
-// their number, or -1 if rounding prevents a decision. The error bound allows for the limit of
-// three cuts in a row.
+// Writes pieces with one root each, in order of time; together they have all roots of the cubic.
+// Returns their number, or -1 if rounding prevents a decision. There are at most three cuts in a
+// row, which the error bound covers.
 int split(const double* b, double error, std::int32_t query, Piece* pieces) {
   struct Part {
     double start, length;
@@ -72,7 +71,7 @@ double exactly(const Ends& x, const std::int32_t* row, Stats& stats) {
   return exact_contact(vf, x, row);
 }
 
-// Answers one query that the batch left open: by intervals and, if they fail, exactly.
+// Solves one query that the batch left undecided: by intervals and, if they fail, exactly.
 template <bool vf>
 double resolve(const Ends& x, const std::int32_t* row, double distance, Stats& stats) {
   ++stats.resolved;
@@ -80,7 +79,7 @@ double resolve(const Ends& x, const std::int32_t* row, double distance, Stats& s
   return std::isnan(t) ? exactly<vf>(x, row, stats) : t;
 }
 
-// A batch on its way through the stages.
+// Working memory of a batch.
 struct Batch {
   Group groups[batch / width];
   Piece pieces[3 * batch];
@@ -90,8 +89,8 @@ struct Batch {
   int count = 0, left = 0;  // number of pieces; number of undecided queries
 };
 
-// Writes the pieces of all queries that may have contact. Queries with a single piece come first;
-// returns their number.
+// Writes the pieces of all queries that may have contact. Returns how many have one piece; they
+// come first.
 int make_pieces(Batch& b, int n, Stats& stats) {
   std::uint8_t rest[batch / width];
   const int groups = (n + width - 1) / width;
@@ -142,9 +141,9 @@ bool may_touch_at_start(const Batch& b, std::int32_t query) {
          !(std::fabs(group.value[Group::cubic][lane]) > group.value[Group::error][lane]);
 }
 
-// Time of contact of a query whose features are apart at the start. A cubic that is zero at the
-// start may be zero throughout the step: features that slide on a common plane perpendicular to an
-// axis are decided in two dimensions.
+// Time of contact of a query whose features are apart at the start. If the cubic is zero at the
+// start, it may be zero throughout the step. Features that slide on a common plane perpendicular to
+// an axis are then solved in two dimensions.
 template <bool vf>
 double later(const Batch& b, std::int32_t query, const Ends& x, const std::int32_t* row,
              Stats& stats) {
@@ -156,7 +155,7 @@ double later(const Batch& b, std::int32_t query, const Ends& x, const std::int32
   return resolve<vf>(x, row, 0, stats);
 }
 
-// One batch: the time of contact of each query, or `never`.
+// Solves one batch: writes the time of contact of each query, or `never`.
 template <bool vf>
 void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& stats) {
   geometry::Scratch<Batch> scratch;
@@ -198,7 +197,7 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
   }
 }
 
-// Answers a block: queries that no axis separates are answered in batches.
+// Solves a block: applies the axis filter, and solves the remaining queries in batches.
 template <bool vf>
 void in_batches(const Ends& x, const std::int32_t* rows, int n, AxisFilter axes, double* toi,
                 Stats& stats) {

@@ -1,5 +1,4 @@
-// Vertex-face and edge-edge queries: whether a moving vertex meets a moving face, and whether two
-// moving edges meet.
+// Queries whether a moving vertex meets a moving face, and whether two moving edges meet.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +10,21 @@
 
 namespace tauguard::cloth {
 
-// Both methods are exact for the doubles given. `exact` uses exact arithmetic throughout and is the
-// reference of ab2pf. Only ab2pf has a minimum distance, for which it is conservative.
+// Both methods are exact for the given doubles. `exact` uses only exact arithmetic and is the
+// reference for ab2pf. Only ab2pf supports a minimum distance, with conservative results.
 enum class Method : int { ab2pf = 0, exact };
 
-// How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its
-// roots); how many touch at the start of the step; how many were decided while sliding on a plane;
-// how many were resolved one by one and cut into how many intervals of time; how many exact
-// arithmetic decided, and of these with numbers of any length.
+// Numbers of queries.
 struct Stats {
-  std::uint64_t axes = 0, cubic_sign = 0, roots = 0, at_start = 0, sliding = 0, resolved = 0,
-                intervals = 0, exact = 0, long_exact = 0;
+  std::uint64_t axes = 0;        // without contact: apart on an axis
+  std::uint64_t cubic_sign = 0;  // without contact: the cubic has no root
+  std::uint64_t roots = 0;       // without contact at any root
+  std::uint64_t at_start = 0;    // in contact at the start of the step
+  std::uint64_t sliding = 0;     // decided in a plane perpendicular to an axis
+  std::uint64_t resolved = 0;    // decided one by one (resolve)
+  std::uint64_t intervals = 0;   // number of intervals of time that `resolved` queries needed
+  std::uint64_t exact = 0;       // decided in exact arithmetic
+  std::uint64_t long_exact = 0;  // of `exact`: with integers of any length
   Stats& operator+=(const Stats& o) {
     axes += o.axes;
     cubic_sign += o.cubic_sign;
@@ -36,17 +39,16 @@ struct Stats {
   }
 };
 
-// The filter by which ab2pf rejects queries that an axis separates at both ends of the step. It
-// compares x, y and z; or `points`, the projections of the positions onto `seven_axes` (apart.hpp),
-// which pays off from a few queries per vertex; or nothing, if the broad phase has compared
-// already. The answers do not depend on the filter.
+// The filter of apart.hpp, by which ab2pf rejects queries. Results do not depend on it.
 struct AxisFilter {
-  bool look = true;
+  bool look = true;  // false: no filter, because the broad phase has compared the axes already
+  // Projections of the positions onto `seven_axes`, which pay off from a few queries per vertex. If
+  // null, x, y and z are compared.
   const Projection* points = nullptr;
 };
 
-// rows: (n, 4) vertices: vertex and face, or edge and edge. Callable from
-// several threads. Needs round-to-nearest.
+// Solve n queries. rows: (n, 4) vertices: vertex and face, or edge and edge. `hit` and `impacts`
+// are outputs; `stats` is incremented. Callable from several threads. Needs round-to-nearest.
 void solve_vf(const Ends& x, const std::int32_t* rows, std::size_t n, Method method,
               double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats,
               AxisFilter axes);

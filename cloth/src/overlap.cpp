@@ -10,21 +10,20 @@
 namespace tauguard::cloth {
 namespace {
 
-// `row` points at one volume's first value; its values for axis k, end t and side s are
-// row[k * axis_stride + t * end_stride + s * side_stride].
+// Strides of the values of a volume: for axis k, end t and side s (0 lower, 1 upper bound) the
+// value is row[k * axis + t * end + s * side].
 struct RowStride {
   int axis, end, side;
 };
 RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
 RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
-// The lanes that a row is compared with: all lanes in use, or those after the row if both leaves
-// are the same.
+// The lanes with which a row is compared: all in use, or those after the row in the same leaf.
 TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
   return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
 }
 
-// Rows with lanes that x, y and z did not reject.
+// Rows that have lanes that x, y and z do not separate.
 struct Remaining {
   int rows[lanes], count = 0;
   TAUGUARD_INLINE void add(int row, Mask near, Mask shared, Overlaps& out) {
@@ -98,7 +97,7 @@ TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const
                       _mm256_and_ps(above[0], above[times - 1]));
 }
 
-// Every axis is compared, without a branch, which would be mispredicted.
+// Compares all axes without a branch, which would often be mispredicted.
 template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
                                                 int axes, Mask wanted) {

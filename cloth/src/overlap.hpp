@@ -10,25 +10,23 @@ namespace tauguard::cloth {
 using geometry::count_of;
 
 inline constexpr int lanes = 16;
-using Mask = std::uint32_t;  // a bit per lane
+using Mask = std::uint32_t;  // one bit per lane
 
-// A block holds 16 volumes lane by lane: [axis][end of the step][low, high][lane]. A node holds
-// one, axis by axis: [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf)
-// everywhere.
+// A block has 16 volumes, [axis][end of the step][low, high][lane]. A node has one volume,
+// [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) on every axis.
 
-// The 16 features of a leaf: their volumes, their vertices [vertex of the feature][lane], and the
-// lanes in use.
+// The 16 features of a leaf: volumes, vertices [vertex of the feature][lane], and the lanes in use.
 struct LeafLanes {
   const float* block;
   const std::int32_t* vertices;
   int arity;
   Mask occupied;
 };
-// For every lane of one leaf in `rows`, the lanes of the other leaf that it meets, at least one.
+// The overlapping features of two leaves.
 struct Overlaps {
-  Mask rows = 0;
-  unsigned adjacent = 0;  // lanes left out because a vertex is shared
-  std::uint16_t lanes_of[lanes];
+  Mask rows = 0;                  // lanes of the first leaf that overlap a lane of the second
+  unsigned adjacent = 0;          // number of pairs left out because they share a vertex
+  std::uint16_t lanes_of[lanes];  // for each lane in `rows`, the lanes of the second leaf
 
   TAUGUARD_INLINE void set(int row, Mask which) {
     lanes_of[row] = static_cast<std::uint16_t>(which);
@@ -41,19 +39,18 @@ struct OverlapKernels {
   Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
                         Mask candidates);
   // Finds pairs of features whose volumes overlap and that share no vertex. same: b is a, and each
-  // unordered pair is found once. Features that share a vertex overlap in it, so both tests may
-  // come in any order.
+  // unordered pair is found once. Features with a common vertex always overlap, so the order of the
+  // two tests does not matter.
   void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
                     Overlaps& out);
 };
 
-// The fastest kernels that this processor runs. They only compare, so every variant gives the same
-// bits.
+// The fastest kernels that this processor can run. All variants give the same result.
 const OverlapKernels& overlap_kernels();
-// For tests: the kernels named "portable", "avx2" or "avx512"; null if the processor lacks them.
+// For tests: the kernels "portable", "avx2" or "avx512"; null if the processor cannot run them.
 const OverlapKernels* overlap_kernels(const char* name);
 
-// Two nodes: no axis separates them on the same side at every end.
+// Whether no axis separates two nodes on the same side at all ends.
 template <int slots, int times>
 bool nodes_overlap(const float* a, const float* b) {
   int apart = 0;

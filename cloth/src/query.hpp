@@ -16,19 +16,20 @@ using geometry::unit_roundoff;
 using geometry::Vec3;
 
 // Differences of positions at both ends of the step. The cubic is p . (q x r). A direction
-// separates the features if all differences in `gap` have one sign along it. `big` is the largest
-// magnitude of all differences.
+// separates the features if the projections of all differences in `gap` on it have the same sign.
+// `big` is the largest magnitude of a difference.
 struct Query {
   Vec3 p[2], q[2], r[2];
   Vec3 gap[2][4];
   int gaps;
   double big, distance;
-  // Bound on the error of a Bernstein coefficient, with M = big^3. A coefficient sums up to three
-  // triple products of 6 terms, at most 6 M each. The 3 differences, 2 products and 3 sums of a
-  // triple product add 8 u of 6 M, for three of them 144 u M; their sum adds 40 u M. Every cut adds
-  // 3 interpolations of 3 roundings on values up to 6 M, which is 54 u M, and there are at most 70
-  // cuts in a row. The total is (184 + 70 * 54) u M < 2^12 u M. The scale of make() keeps underflow
-  // far below this bound.
+  // Bound on the error of a Bernstein coefficient, with M = big^3:
+  // * A coefficient is the sum of up to three triple products. Each has 6 terms and is at most 6 M.
+  // * A triple product has 3 differences, 2 products and 3 sums: 8 u of 6 M. Three of them have
+  //   144 u M, and their sum adds 40 u M.
+  // * A cut has 3 interpolations with 3 roundings of values up to 6 M: 54 u M. There are at most 70
+  //   cuts in a row.
+  // The total is (184 + 70 * 54) u M < 2^12 u M. The scale of make() keeps underflow far below it.
   double cubic_error() const { return 0x1p-41 * big * big * big; }
 };
 
@@ -59,7 +60,8 @@ Query make(const Ends& x, const std::int32_t* row, double distance) {
     for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, largest(k.gap[e][i]));
     k.big = std::max({k.big, largest(k.q[e]), largest(k.r[e])});
   }
-  // Scales the query by a power of two to about 1, so that no product overflows or underflows.
+  // Scales the query by a power of two to `big` of about 1, so that no product overflows or
+  // underflows.
   if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
   const double s = k.big > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(k.big), -1000, 1000)) : 1;
   for (int e = 0; e < 2; ++e) {
@@ -96,8 +98,7 @@ inline void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
   right = {{f, e1, d2, c.b[3]}};
 }
 
-// A root in (0, 1) of a cubic whose ends have different signs, by Newton's method kept within a
-// bracket.
+// A root in (0, 1) of a cubic whose ends have different signs, by Newton's method in a bracket.
 inline double root(const double* b) {
   double lo = 0, hi = 1, x = b[0] / (b[0] - b[3]);
   for (int i = 0; i < 40; ++i) {

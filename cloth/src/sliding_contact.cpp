@@ -1,6 +1,6 @@
-// For two features in one plane that are apart at the start. At the first contact a vertex of one
-// reaches an edge of the other. The line of the edge passes through the vertex at a root of a
-// quadratic. At that time the vertex is between the ends of the edge, or there is no contact.
+// At the first contact of two features in one plane, a vertex of one reaches an edge of the other.
+// The line of the edge passes through the vertex at a root of a quadratic. There is contact if the
+// vertex is between the ends of the edge at this time.
 #include "sliding_contact.hpp"
 
 #include <algorithm>
@@ -12,11 +12,11 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::infinity(),
                  hidden = std::numeric_limits<double>::quiet_NaN();
-// A vertex and the edge that it may reach.
+// Rows of a vertex and the two ends of an edge that it may reach.
 constexpr int reaches_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 constexpr int reaches_of_ee[][3] = {{0, 2, 3}, {1, 2, 3}, {2, 0, 1}, {3, 0, 1}};
 
-// A root is accepted only if it lies within this distance of its estimate.
+// A root is accepted only if it is certainly within this distance of its estimate.
 constexpr double around = 0x1p-40;
 
 struct Flat {
@@ -27,10 +27,14 @@ double dot(Flat a, Flat b) { return a.x * b.x + a.y * b.y; }
 Flat mix(Flat a, Flat b, double t) { return {(1 - t) * a.x + t * b.x, (1 - t) * a.y + t * b.y}; }
 double largest(Flat a) { return std::max(std::fabs(a.x), std::fabs(a.y)); }
 
-// u and v are the edge's ends as seen from the point, M the product of their largest coordinates. A
-// difference has a relative error of eps (2^-53). A cross or dot product of two differences is then
-// off by at most 8 eps M, the middle coefficient by 12 eps M, and a value between, a sum of three
-// products with positive weights, by 32 eps M. `error` is 2^-45 M, eight times that.
+// The time at which a point reaches an edge, `none`, or `hidden` if rounding prevents a decision. u
+// and v are the ends of the edge relative to the point, at both ends of the step. Let M be the
+// product of their largest coordinates and eps = 2^-53. Errors are at most
+//   eps         of a difference (relative),
+//   8 eps M     of a cross or dot product of two differences,
+//   12 eps M    of the middle coefficient,
+//   32 eps M    of a value of the quadratic, a sum of three products with positive weights.
+// `error` is eight times the last one, 2^-45 M.
 double reach(const Flat (&u)[2], const Flat (&v)[2]) {
   const auto apart = [](double a, double b, double c, double d) {
     return (a > 0 && b > 0 && c > 0 && d > 0) || (a < 0 && b < 0 && c < 0 && d < 0);
@@ -45,7 +49,7 @@ double reach(const Flat (&u)[2], const Flat (&v)[2]) {
   if (std::min({b0, b1, b2}) > error || std::max({b0, b1, b2}) < -error) return none;
   if (b0 < 0) b0 = -b0, b1 = -b1, b2 = -b2;
   if (!(b0 > error && b2 < -error)) return hidden;
-  // One root: 2 b0 / (b0 - b1 + s) would lose digits where b1 is near s.
+  // There is one root. For b1 > 0 this form avoids the cancellation in b0 - b1 + s.
   const double s = std::sqrt(b1 * b1 - b0 * b2);
   const double t = b0 / (b1 > 0 ? b0 - b0 * b2 / (s + b1) : b0 - b1 + s);
   const double before = std::max(t - around, 0.0), after = std::min(t + around, 1.0);
@@ -54,8 +58,8 @@ double reach(const Flat (&u)[2], const Flat (&v)[2]) {
     return left * left * b0 + 2 * at * left * b1 + at * at * b2;
   };
   if (!(value(before) > error && value(after) < -error)) return hidden;
-  // Ends on opposite sides of the point. Between `before` and `after` the product changes by at
-  // most 8 M for each unit of time.
+  // Contact if the ends are on opposite sides of the point. Between `before` and `after` the
+  // product changes by at most 8 M per unit of time.
   const double ends = dot(mix(u[0], u[1], t), mix(v[0], v[1], t));
   if (!(std::fabs(ends) > 0x1p-35 * size)) return hidden;
   return ends < 0 ? before : none;

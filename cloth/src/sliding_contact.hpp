@@ -1,5 +1,5 @@
-// First contact of two features that slide on one plane: one coordinate is the same in all four
-// vertices.
+// First contact of two features that slide on a plane perpendicular to an axis: one coordinate is
+// the same in all four vertices.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace tauguard::cloth {
 
-// For features that are apart at the start. The first time of contact, at most 2^-39 early and
-// never late; infinity without a contact. NaN if rounding hides it, if a vertex may cross the line
-// of an edge twice, or if no coordinate is the same in all vertices at both ends. row: 4 vertices.
+// The first time of contact of features that are apart at the start, at most 2^-39 early and never
+// late; infinity without contact. NaN if rounding prevents a decision, if a vertex may cross the
+// line of an edge twice, or if the four vertices `row` have no common coordinate at both ends.
 double sliding_contact(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

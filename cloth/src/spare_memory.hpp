@@ -1,5 +1,5 @@
-// Reuses the memory of arrays that were returned to the caller and freed, because fresh pages cost
-// more than writing the arrays.
+// Reuses the memory of arrays that were returned to the caller and freed: fresh pages cost more
+// time than writing the arrays.
 #pragma once
 
 #include <algorithm>
@@ -25,8 +25,8 @@ class SpareMemory {
     void* at;
     std::size_t bytes;
   };
-  // A block of at least `bytes`, not zeroed: the smallest kept block that suffices, unless it is
-  // much too large.
+  // A block of at least `bytes`, not zeroed: the smallest kept block of this size, unless it is
+  // much larger.
   Block take(std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -66,7 +66,7 @@ class SpareMemory {
   std::vector<Block> blocks_;
 };
 
-// An array of numbers in such memory. Its last owner returns the memory for reuse.
+// An array of numbers in reused memory. Its last owner returns the memory for reuse.
 template <class T>
 class SpareArray {
  public:

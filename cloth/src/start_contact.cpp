@@ -1,7 +1,6 @@
-// As in exact.cpp, the features touch if the hull of their differences contains the origin,
-// here at one time. In most pairs that touch, one coordinate is the same in all four vertices. Then
-// two dimensions are left, in which signs of differences or a filtered determinant decide. Other
-// pairs are decided in integers.
+// The features touch at a given time if the hull of their differences contains the origin
+// (exact.cpp). In most pairs that touch, one coordinate is the same in all four vertices. They are
+// decided in two dimensions by signs of differences or a filtered determinant, others in integers.
 #include "start_contact.hpp"
 
 #include <array>
@@ -16,20 +15,20 @@ namespace {
 
 using geometry::FixedInt;
 
-// The corners in order around the hull: the first vertex as seen from the second.
+// The corners in order around the hull; a corner is the first vertex relative to the second.
 constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
-// Neighbouring corners share a vertex. Their cross product is that of the two other vertices
-// relative to it.
+// Neighbouring corners have a common vertex (the first of a row). Their cross product is that of
+// the two other vertices relative to the common one.
 constexpr int sides_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 constexpr int sides_of_ee[][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
 
-// If one coordinate is the same in all vertices, the other two, i and j, tell on which sides of the
-// hull's edges the origin lies. With u = 2^-53 a product of two differences has an error of 3 u,
-// and the difference of two products one of 4 u = 2^-51. Faces that lie on one another often share
-// lines along the axes. Their differences are exactly zero there. The loop has no branches because
-// its outcome changes from query to query.
+// Decides a query whose vertices differ only in the coordinates i and j, by the sides of the hull's
+// edges on which the origin is. With u = 2^-53 the relative error of a product of two differences
+// is 3 u, and of the difference of two products 4 u = 2^-51. Faces on top of each other often share
+// lines along the axes, where differences are exactly zero. Branches in the loop would be
+// mispredicted.
 template <bool vf>
 AtStart in_plane(const double* const* p, int i, int j) {
   constexpr int corners = vf ? 3 : 4;
@@ -57,7 +56,7 @@ AtStart in_plane(const double* const* p, int i, int j) {
   }
   if (left & right) return AtStart::apart;
   if (left | right) return AtStart::touching;
-  // All corners are on one line through the origin. The polygon through them covers their hull.
+  // All corners are on one line through the origin. Segments between neighbours cover the hull.
   for (int c = 0; c < corners; ++c) {
     const int *a = vf ? of_vf[c] : of_ee[c],
               *b = vf ? of_vf[(c + 1) % corners] : of_ee[(c + 1) % corners];

@@ -1,5 +1,4 @@
-// Whether two features touch at the start of the step, exactly. This decides bodies at rest on each
-// other, and everything else that starts in contact.
+// Whether two features touch at the start of the step, for example at rest on each other. Exact.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +9,8 @@ namespace tauguard::cloth {
 
 enum class AtStart { apart, touching, unknown };
 
-// unknown if no coordinate is the same in all vertices and the coordinates on one axis span more
-// than 116 bits. row: 4 vertices.
+// The result is `unknown` if no coordinate is the same in all vertices and the coordinates on one
+// axis span more than 116 bits. row: 4 vertices.
 AtStart at_start(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

@@ -1,4 +1,4 @@
-// Thrown if an answer exceeds the limit of the caller.
+// Thrown if a result exceeds the caller's limit.
 #pragma once
 
 #include <stdexcept>

@@ -16,7 +16,7 @@ int compare(const Features& a, std::int32_t i, const Features& b, std::int32_t j
   return 0;
 }
 
-// Walks two sorted orders together.
+// Matches equal rows of two lists, each given by a sorted order.
 void merge(const Features& before, const std::vector<std::int32_t>& old_order,
            const Features& after, const std::vector<std::int32_t>& new_order,
            std::vector<std::int32_t>& match) {
@@ -42,7 +42,7 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
                  [&](std::int32_t v) { return numbers.place(v); });
   triangles = 0;
   while (3 * triangles < f.size() && f[3 * triangles + 1] != f[3 * triangles + 2]) ++triangles;
-  // Buckets by the smaller vertex, then each bucket by the larger.
+  // Sort edges into buckets by the smaller vertex, then each bucket by the larger vertex.
   std::vector<std::size_t> begin(count + 1, 0);
   const auto each_edge = [&](auto&& visit) {
     for (std::size_t i = 0; i < f.size(); i += 3)
@@ -90,7 +90,7 @@ std::vector<std::int32_t> match_sorted(const Features& before, const Features& a
 
 std::vector<std::int32_t> match_faces(const Features& before, const Features& after) {
   std::vector<std::int32_t> match(before.size(), -1), old_order, new_order;
-  // Most rows are the old ones, shifted by those that left. They are copied without sorting.
+  // Most new rows are old rows, shifted by removed ones. These are matched without sorting.
   std::size_t i = 0, j = 0;
   while (i < before.size() && j < after.size()) {
     if (compare(before, i, after, j) == 0) {

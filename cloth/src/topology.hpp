@@ -8,9 +8,9 @@
 
 namespace tauguard::cloth {
 
-// An isolated edge belongs to no face, an isolated vertex to no face and no edge. They follow all
-// triangles in `faces`, as (a, b, b) and (p, p, p). A vertex-face query of such a row tests a point
-// against an edge, or two points.
+// An isolated edge belongs to no face, an isolated vertex to no face and no edge. They follow the
+// triangles in `faces`, as degenerate faces (a, b, b) and (p, p, p). A vertex-face query with such
+// a row tests a point against an edge, or against a point.
 struct Topology {
   Features vertices{1, {}}, edges{2, {}}, faces{3, {}};
   // The least number of rows that positions must have.
@@ -26,7 +26,7 @@ struct Topology {
 // 1 for each isolated vertex, 0 for the others. Shape (n).
 std::vector<std::uint8_t> isolated_vertices(const Topology& topology, std::size_t n);
 
-// For every old feature the number of the equal new one, or -1. Rows must be sorted and unique.
+// For every old feature, the number of the equal new one, or -1. Rows must be sorted and unique.
 std::vector<std::int32_t> match_sorted(const Features& before, const Features& after);
 // The same for faces: equal rows match in order of appearance.
 std::vector<std::int32_t> match_faces(const Features& before, const Features& after);

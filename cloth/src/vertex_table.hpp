@@ -1,5 +1,5 @@
-// The vertices that a list of features uses, and the position of each among them. The memory
-// depends on the number of vertices in use, not on the largest index.
+// The vertices that a list of features uses, and the rank of each among them. The memory depends on
+// the number of vertices in use, not on the largest index.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace tauguard::cloth {
 
-// Whether a table of all numbers up to the largest is short enough, compared with a list of `size`.
+// Whether a table of all indices up to `largest` is not much longer than a list of `size` entries.
 inline bool dense(std::size_t largest, std::size_t size) { return largest <= 8 * size + 1024; }
 
 // The vertices in use, sorted and unique.
@@ -37,7 +37,7 @@ class VertexTable {
     place_.assign(std::size_t(used.back()) + 1, -1);
     for (std::size_t i = 0; i < used.size(); ++i) place_[used[i]] = static_cast<std::int32_t>(i);
   }
-  // The position of a vertex that is in use.
+  // The rank of a vertex that is in use.
   std::int32_t place(std::int32_t v) const {
     if (!place_.empty()) return place_[v];
     return static_cast<std::int32_t>(std::lower_bound(used_.begin(), used_.end(), v) -

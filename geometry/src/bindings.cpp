@@ -47,7 +47,7 @@ NB_MODULE(_geometry, m) {
         });
       },
       "points"_a, "out"_a, "threads"_a);
-  // For tests of the rounding guard: sets a rounding mode, like a careless library.
+  // Sets the rounding mode, as a loaded library might; for tests of RoundToNearest.
   m.def(
       "set_rounding",
       [](int mode) {

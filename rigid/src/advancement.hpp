@@ -1,16 +1,16 @@
-// Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) along separating directions that
-// turn with the bodies.
+// Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) along rotating directions.
 //
-// Take a time t, a unit vector n and any rate r, and let the direction be n(h) = n + h r. Let s(h)
-// = min_b n(h).x_b - max_a n(h).x_a at time t + h. The bodies are apart while s > 0, whatever n and
-// r are. Let c be the centre of a. The projection of x - c differs from its tangent at h = 0 by at
-// most K h^2 / 2, where K bounds the second derivative |2 r.(x - c)' + n(h).x''|. So s(h) >= G(h) =
-// min_b (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and can be
-// computed. A step ends just before the root of G, so the bodies are certainly apart during the
-// step.
+// Let t be a time, n a unit vector and r any rate of change, and n(h) = n + h r the direction at
+// time t + h. The separation of the bodies along n(h) is
+//   s(h) = min_b n(h).x_b(t + h) - max_a n(h).x_a(t + h).
+// The bodies are apart while s > 0, for any n and r. A computable lower bound G of s:
+// 1. Let c be the centre of a. The projection n(h).(x - c) differs from its tangent at h = 0 by at
+//    most K h^2 / 2, where K is a bound on its second derivative 2 r.(x - c)' + n(h).x''.
+// 2. So s(h) >= G(h) = min_b (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding.
+// 3. G is concave. A step ends just before the root of G, so the bodies are apart during the step.
 //
-// Bodies grown by balls, whose radii add up to R, are apart while s(h) > R |n(h)|. For r across n,
-// |n(h)| is at most 1 + (h |r|)^2 / 2. So R is subtracted from G, and R |r|^2 is added to K.
+// Bodies grown by balls, whose radii have the sum R, are apart while s(h) > R |n(h)|. If r is
+// perpendicular to n, |n(h)| <= 1 + (h |r|)^2 / 2. So G is less by R, and K more by R |r|^2.
 #pragma once
 
 #include <algorithm>
@@ -20,13 +20,12 @@
 
 namespace tauguard::rigid {
 
-// A direction, its rate of turning, and a bound on |rate|.
 struct Turning {
-  Vec3 n, rate;
-  double turn;
+  Vec3 n, rate;  // direction and its rate of change
+  double turn;   // bound on |rate|
 };
 
-// The largest tangent over the vertices of a body, and its slope.
+// The largest tangent over the vertices of a body as a function of h, and its slope.
 class VertexTangents {
  public:
   VertexTangents(const MovingBody& body, const Vec3& n, const Vec3& rate, const Vec3& centre,
@@ -72,8 +71,8 @@ inline SupportTangent tangents(const SupportShape& shape, const Vec3& n, const V
   return SupportTangent(shape, n, rate, centre, drift);
 }
 
-// G and its slope at h. The surfaces have the distance `offset` from the cores; `radius` is the
-// part of `offset` that turns with the direction.
+// G and its slope at h. `offset` is what G subtracts from the separation: the radii R, the rounding
+// bound, and for shapes the required distance. `radius` is the R that is added to K.
 template <class Body>
 class SeparationBound {
  public:
@@ -100,10 +99,9 @@ class SeparationBound {
   double offset_, half_k_;
 };
 
-// A large step with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton's method from the right stays
-// to the right of the root of a concave function, and ends when G is negative by less than the
-// fraction `accuracy` of G(0). The chord from (0, G(0)) to that point crosses zero to the left of
-// the root.
+// A step, at most `limit`, with G >= 0 on [0, step]; at_zero = G(0) > 0. G is concave, so Newton's
+// method from `limit` stays to the right of the root. It ends at a point where G > -accuracy G(0).
+// The chord from (0, G(0)) to this point crosses zero to the left of the root; there the step ends.
 template <class Bound>
 double safe_step(const Bound& g, double at_zero, double limit, double accuracy) {
   double slope, h = limit, value = g(h, &slope);
@@ -117,9 +115,9 @@ double safe_step(const Bound& g, double at_zero, double limit, double accuracy) 
   return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
 }
 
-// Advances both bodies from `start` until `close(t)`, in steps `certified(left)` during which they
-// stay apart. True if they came close; the time *t is never late. False if they stay apart on all
-// of [start, end].
+// Advances both bodies from `start` until close(t) is true. certified(left) returns a step during
+// which they stay apart. The result is true if they came close, at a time *t that is never late,
+// and false if they stay apart on all of [start, end].
 template <class Body, class Close, class Certified>
 bool advance(Body& a, Body& b, double start, double end, double most_steps, const Close& close,
              const Certified& certified, double* t) {

@@ -1,4 +1,4 @@
-// Batches of bodies and of motions as Python hands them over.
+// Batches of bodies and of motions, as arrays from Python.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -20,7 +20,7 @@ using Poses = nanobind::ndarray<const double, nanobind::shape<-1, 4, 4>, nanobin
 using Vectors = nanobind::ndarray<const double, nanobind::shape<-1, 3>, nanobind::c_contig,
                                   nanobind::device::cpu>;
 
-// Rows of toi, point, normal.
+// Rows of time of impact, point, normal.
 using Touches =
     nanobind::ndarray<double, nanobind::shape<-1, 7>, nanobind::c_contig, nanobind::device::cpu>;
 
@@ -40,7 +40,7 @@ inline double at(const Radii& radii, std::size_t i) {
   return radii.data()[radii.shape(0) == 1 ? 0 : i];
 }
 
-// A batch of motions: one for all rows of the query, or one for each.
+// A batch of motions: one for all rows of the query, or one per row.
 struct Motions {
   Poses pose;
   Vectors linear, angular;

@@ -1,7 +1,8 @@
-// For comparison only: single bounding volumes as textbooks use them. A volume is fitted in the
-// body's frame and placed in the world under a pose: a ball and an oriented box move, bounds along
-// fixed directions are computed again from the posed corners. Then volumes are tested against each
-// other. The study measures the cost of each of these three steps.
+// For comparison only: single bounding volumes as in textbooks. The study measures three steps:
+// 1. Fit a volume in the body's frame.
+// 2. Place it in the world under a pose. A ball and an oriented box move with the pose; bounds
+//    along fixed directions are computed again from the posed corners.
+// 3. Test volumes against each other.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -99,7 +100,7 @@ struct KDopVolume : KDop {
   }
 };
 
-// Bodies as runs of triangles, each with one volume.
+// Bodies, each of which is a range of triangles and has one volume.
 template <class Volume>
 class Volumes {
  public:

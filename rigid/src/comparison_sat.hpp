@@ -1,7 +1,6 @@
-// For comparison only: separating axes as in textbooks (Ericson 2005, 5.2.1). It tests all face
-// normals of both bodies, then the products of all edge pairs, projects every vertex, and ends at
-// the first axis that separates. The arithmetic has no error bounds, so rounding can make an answer
-// wrong.
+// For comparison only: separating axes as in textbooks (Ericson 2005, 5.2.1). The test projects
+// every vertex on all face normals of both bodies, then on the cross products of all edge pairs,
+// and ends at the first axis that separates. Rounding can make an answer wrong.
 #pragma once
 
 #include "convex_lanes.hpp"

@@ -19,7 +19,7 @@ void each_corner(const Cluster& c, Visit visit) {
     }
 }
 
-// The places of `p` along the axes, in their order.
+// The projections of `p` on the axes of geometry/k_dop.hpp, in their order.
 void project(const double* p, double* out) {
   out[0] = p[0], out[1] = p[1], out[2] = p[2];
   for (int i = 0; i < 2; ++i)
@@ -33,8 +33,8 @@ double along(const std::int8_t* axis, const double* p) {
   return axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2];
 }
 
-// The axis of the normal sx e_x + sy e_y (x != y), and whether that or its opposite is the stored
-// one.
+// The index of the axis parallel to sx e_x + sy e_y (x != y). *flip is 1 if the two have the same
+// direction, -1 if they are opposite.
 int pair_index(int x, int y, double sx, double sy, double* flip) {
   if (x > y) std::swap(x, y), std::swap(sx, sy);
   *flip = sx;
@@ -54,8 +54,8 @@ void bounds(const KDop& k, const KDop::Cone& cone, double* lo, double* hi) {
 
 }  // namespace
 
-// Pad: the chains below have at most 40 operations on values up to 3 (ra + rb): 2^-53 * 40 * 3 <
-// 2^-45.
+// The pad covers rounding: each result below takes at most 40 operations on values of at most
+// 3 (ra + rb), with ra and rb the radii of the trees, and 40 * 3 * 2^-53 < 2^-45.
 Frame::Frame(const Tree& a, const Tree& b, const Pose& pose) {
   double skew = 0, largest = a.magnitude;
   for (int i = 0; i < 3; ++i) {
@@ -168,7 +168,7 @@ KDop KDop::fit(const Cluster& c) {
 }
 
 KDop::Cone KDop::Cone::around(const double* d) {
-  int x = 0, y = 1, z = 2;  // |d| in falling order
+  int x = 0, y = 1, z = 2;  // sorted by falling |d|
   if (std::fabs(d[x]) < std::fabs(d[y])) std::swap(x, y);
   if (std::fabs(d[y]) < std::fabs(d[z])) std::swap(y, z);
   if (std::fabs(d[x]) < std::fabs(d[y])) std::swap(x, y);
@@ -225,7 +225,7 @@ std::vector<Volume> fit_all(const Tree& tree) {
   std::vector<Volume> out(1 + std::size_t(width) * tree.nodes.size());
   const Triangle* t = tree.triangles.data();
   out[0] = Volume::fit({t, t + tree.triangles.size(), tree.centre});
-  // Children come after their parents, so a backward pass knows every node's run of triangles.
+  // Children come after their parents, so a backward pass knows the triangles of every child.
   std::vector<std::pair<int, int>> run(tree.nodes.size());
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     const Node& node = tree.nodes[n];

@@ -1,6 +1,6 @@
-// For comparison only: the bounding volumes that no query uses by default: ball, oriented box,
-// 18-direction polytope. All are in their tree's centred frame, in double, and tested with a pad
-// that covers rounding: never a wrong "clear".
+// For comparison only: bounding volumes that no query uses by default (ball, oriented box, 18-DOP).
+// All are in double precision in their tree's centred frame. Tests add a pad that covers rounding,
+// so volumes that overlap are never reported as apart.
 #pragma once
 
 #include "mesh_traverse.hpp"
@@ -24,7 +24,7 @@ struct Frame {
   Frame() : r{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, t{0, 0, 0}, pad(0) {}
 };
 
-// A run of triangles whose corners a volume must contain, relative to the tree's centre.
+// Triangles whose corners, relative to the tree's centre, a volume must contain.
 struct Cluster {
   const Triangle* begin;
   const Triangle* end;
@@ -54,9 +54,9 @@ struct KDop {
   double lo[directions], hi[directions], centre[3];
   static KDop fit(const Cluster& c);
 
-  // A direction d as a non-negative sum of three of the 18 half-space normals. By duality max d.x
-  // <= sum of weight * bound. The three adjacent normals give the least bound known without solving
-  // a linear program.
+  // A direction d as a sum of three of the 18 half-space normals with weights >= 0. By duality the
+  // maximum of d.x over the polytope is at most the sum of weight * bound. The three normals
+  // adjacent to d give the least such bound that needs no linear program.
   struct Cone {
     int index[3];
     double weight[3];  // negative: the opposite normal with weight -weight
@@ -71,8 +71,7 @@ struct KDop {
   static bool meet(const KDop& a, const KDop& b, const Relation& at);
 };
 
-// The volumes of every child of a tree. Entry 0 is the whole mesh; entry 1 + 8 node + slot is the
-// child in that slot.
+// The volumes of every child of a tree. Entry 0: the whole mesh; 1 + 8 node + slot: a child.
 template <class Volume>
 std::vector<Volume> fit_all(const Tree& tree);
 

@@ -1,28 +1,26 @@
 // Overlap of two convex bodies by eliminating the separating plane.
 //
-// A plane f separates A (f >= 0) from B (f < 0). The unknowns are weights p_i >= 0 of A's facet
-// functions F_i, with f = sum_i p_i F_i. Each vertex b_j of B gives one row of a table:
-// sum_i p_i F_i(b_j) < 0. A generator of B enters by its absolute value. Facet functions are scaled
-// by determinants and never divided.
+// A separating plane is a linear function f with f >= 0 on A and f < 0 on B. Write f = sum_i p_i
+// F_i, where F_i are the facet functions of A, scaled by determinants so that nothing is divided.
+// The unknowns are the weights p_i >= 0. Each vertex b_j of B gives one row of a table:
+//   sum_i p_i F_i(b_j) < 0.
+// For a zonotope B all rows are bounded at once: a generator enters by its absolute value.
+// * A column that is all negative: F_i alone separates the bodies (a facet of A).
+// * A row that is all positive: the vertex b_j is in A, and no plane separates the bodies.
+// * Two columns i and k: eliminating p_k combines the rows of opposite sign and leaves an interval
+//   for the ratio p_i / p_k. If it is not empty, a plane through the edge of A between the facets i
+//   and k separates the bodies. Facets that share no edge give redundant pairs, which are left out.
+// * Three columns: the planes that remain contain a facet of B. They are the columns of the table
+//   with A and B exchanged.
+// Bodies of full dimension need no other plane. So if each of these steps is certified to find no
+// plane, the bodies share an interior point.
 //
-// If a column is all negative, p_i alone separates the bodies (a facet of A). If a row is all
-// positive, the vertex b_j lies in A and no plane can separate them.
-//
-// Eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an interval
-// for the ratio p_i / p_k. If the interval is not empty, a plane through that edge of A separates
-// the bodies. Pairs of facets that share no edge are redundant and left out, because their zero
-// sets meet in less than two bits. Rows that are redundant by this rule are left out, too.
-//
-// The last elimination, of three unknowns, leaves planes through a facet of B. These planes are the
-// columns of the transposed table. No other plane is needed for bodies of full dimension, so if
-// every step is certified to fail, the bodies share an interior point.
-//
-// Every entry has an error bound E, which is derived where the entry is computed (u = 2^-53). The
-// sum of its terms is rounded up to a power of two, which also covers the rounding of E itself.
-// Raising an entry can only prevent a separation. Therefore a separation found with entries raised
-// by E is certain, and so is a failure with entries lowered by E. Any other result is `undecided`.
-// Sizes outside [1e-30, 1e30] are `undecided`, too, so that products up to degree nine neither
-// overflow nor lose their relative accuracy.
+// Every entry has an error bound E, derived where the entry is computed (u = 2^-53). The sum of its
+// terms is rounded up to a power of two, which also covers the rounding of E. Larger entries can
+// only prevent a separation. So a separation that is found with all entries raised by E is certain,
+// and overlap is certain if none is found with all entries lowered by E. Any other result is
+// `undecided`. So are bodies with sizes outside [1e-30, 1e30]: inside this range, products of up to
+// nine lengths neither overflow nor lose relative accuracy.
 #pragma once
 
 #include <algorithm>
@@ -49,7 +47,7 @@ TAUGUARD_INLINE double dot(const double* x, const double* y) {
   return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
 }
 
-// Loads four points relative to `origin`: x[k] holds component k, one point in each lane.
+// Loads four points relative to `origin`: x[k] is component k, with one point per lane.
 TAUGUARD_INLINE void load_points(const double* v, const double* origin, Double4* x) {
   for (int k = 0; k < 3; ++k) x[k] = Double4{v[k], v[3 + k], v[6 + k], v[9 + k]} - origin[k];
 }
@@ -63,8 +61,8 @@ TAUGUARD_INLINE double offsets_from(const double* v, const double* origin, doubl
   return reach;
 }
 
-// Marks the lanes in which some interval of ratios r > 0 gives x_j + r y_j < 0 for all rows j. The
-// rounding of r changes a row by u |y| r; the slack in the callers' bound E covers this error.
+// Marks the lanes in which x_j + r y_j < 0 for all rows j and all r of some interval in r > 0. The
+// rounding of r changes a row by u |y| r, which the slack in the callers' bound E covers.
 template <int Rows = 4>
 TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   Double4 low = splat(0.0), high = splat(HUGE_VAL);
@@ -78,10 +76,9 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   return low < high;
 }
 
-// The facet functions F = n . p - c of a tetrahedron, with points p relative to vertex 0. The
-// function in lane i vanishes on the facet opposite vertex i and is positive at vertex i: it is
-// negated where the determinant is negative. (The sign is applied last, so that no entry waits for
-// the determinant.)
+// The facet functions F = n . p - c of a tetrahedron, for points p relative to vertex 0. Lane i is
+// zero on the facet opposite vertex i and positive at vertex i. For this it is negated if the
+// determinant is negative; the sign is applied last, so that no entry waits for the determinant.
 struct TetrahedronFacets {
   Double4 n[3], c, determinant;
   Mask4 turned;  // the sign bit, in lanes whose normal points outwards
@@ -110,16 +107,16 @@ struct TetrahedronFacets {
   }
 };
 
-// The bound E for a tetrahedron's table at points p - a0 whose 1-norm is at most `reach`. The
-// largest 1-norm of a vertex relative to a0 is a. The errors are at most
+// The bound E for a tetrahedron's table at points p - a0 whose 1-norm is at most `reach`, where a0
+// is vertex 0. Let a be the largest 1-norm of a vertex relative to a0. The errors are at most
 //   4 u a                        in an edge (at most 2 a),
 //   24 u a^2                     in a component of a normal (at most 4 a^2),
 //   (24 + 4 + 12) u a^2 reach    in n . p,
 //   (24 + 4 + 12) u a^3          in c,
 //   4 u a^2 (a + reach)          in the difference of n . p and c,
 //   88 u a^3                     in the determinant, whose sign may be wrong.
-// The ratio of an interval needs a slack of 8 u of an entry. The sum of all errors is at most
-// 164 u a^2 (a + reach).
+// The rounding of an interval's ratio needs a slack of 8 u times an entry. The sum of all errors is
+// at most 164 u a^2 (a + reach).
 TAUGUARD_INLINE double tetrahedron_error(double a, double reach) {
   return 256 * unit * a * a * (a + reach);
 }
@@ -178,14 +175,15 @@ struct Slabs {
 };
 
 // Zonotope A against tetrahedron B. A's table is computed at the points p_j = (b_j - origin) -
-// shift; `reach` is the 1-norm of b_j - origin plus 3 a, so a <= reach / 3. The errors are at most
+// shift. Let a be the size of A's generators and `reach` the 1-norm of b_j - origin plus 3 a. Then
+// a <= reach / 3, and the errors are at most
 //   3 u reach                      in a point,
 //   4 u a^2                        in a normal,
 //   (4 + 3 + 1 + 2) u a^2 reach    in an entry,
 //   8 u a^3                        in the determinant,
-// and one rounding of their sum. Together they are 14 u a^2 reach. With the slack of 8 u, E is
-// rounded up to 32 u a^2 reach. B's planes at A's centre have the error of tetrahedron_error() and
-// 20 u b^2 for each of the three generators; adding 6 a to the reach covers the generators.
+// and one rounding of their sum: together 14 u a^2 reach. With the slack of 8 u, E is 32 u a^2
+// reach. B's facet functions at A's centre have the error of tetrahedron_error(). Each of the three
+// generators adds 20 u b^2 a, with b the size of B; adding 6 a to the reach covers this.
 TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
   const Slabs sa(a);
   Double4 p[3];  // one vertex of B a lane
@@ -236,15 +234,18 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   return certain ? common : undecided;
 }
 
-// Two zonotopes. A's slabs are evaluated at B's generators, C_k = n_i . g_k (lane i), and at the
-// offset of the centres, which gives m. The length w = |origin_b - origin_a|_1 + 3 (a + b) bounds
-// every length. The error of the offset is at most 4 u w.
+// Two zonotopes with generators of sizes a and b. A's slab normals n_i are multiplied by B's
+// generators, C_k = n_i . g_k (lane i), and by the offset of the centres, which gives m. The length
+// w = |origin_b - origin_a|_1 + 3 (a + b) bounds every length. The offset's error is at most 4 u w.
 //
-// For facets the errors are at most 11 u a^2 w in m, 8 u a^3 in the determinant, 8 u a^2 b in each
-// of three entries, and 8 u a^2 w in four sums. Together they are at most 32 u a^2 w; E is twice
-// this bound. For edges two such entries are multiplied, with |C| <= a^2 b. The errors, in units of
-// u a^4 b w, are 42 in the offset's minor, 12 in the determinant's terms, 24 in the generators'
-// minors and 20 in the sums; E is 128 u a^4 b w.
+// Facets. The errors are at most
+//   11 u a^2 w    in m,
+//   8 u a^3       in the determinant,
+//   8 u a^2 b     in each of three entries,
+//   8 u a^2 w     in four sums,
+// together 32 u a^2 w; E is twice this bound. Edges. Two such entries are multiplied, with |C| <=
+// a^2 b. In units of u a^4 b w the errors are 42 in the offset's minor, 12 in the determinant's
+// terms, 24 in the generators' minors and 20 in the sums, together 98; E is 128 u a^4 b w.
 TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
   const Slabs sa(a), sb(b);
   double d[3], w = 0.0;

@@ -1,5 +1,5 @@
-// The batch path of boxes: eight pairs at a time in single precision with certified bounds. Rows
-// that the bounds do not decide (a few in a million, or boxes in contact) are decided one by one.
+// Overlap of many boxes: eight pairs at a time in single precision with certified bounds. Pairs
+// that the bounds leave undecided (boxes close to contact) are then decided one by one.
 #include <atomic>
 #include <cstring>
 

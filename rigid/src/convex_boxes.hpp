@@ -1,20 +1,27 @@
-// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes. It
-// serves the batch path (eight floats) and, in double precision, boxes with parallel edges.
+// Box against box on unit axes (Gottschalk, Lin, Manocha 1996). The same code serves eight floats
+// (convex_batch.cpp) and, in double precision, single pairs with parallel edges.
 //
-// Let C_ik = r_Ai . r_Bk, t_i = r_Ai . (c_B - c_A), and d = c_B - c_A. Each of the 15 axes has a
-// gap, which is negative if the axis does not separate. Let u be the unit roundoff of the lanes and
-// w = |d|_1 + sum h_A + sum h_B. Rounding an input costs u; C is off by 5 u and t by 5 u |d|. The
-// gap of an edge pair is off by 24 u |d| and 2 * 12 u of the half extents, that of a facet of B by
-// 36 u |d| + 12 u. 64 u w covers all of them. The boxes are those of the given rotations R. Using
-// R^T R = I, although entries differ by `skew`, moves a gap by at most 16 skew w.
+// Let r_Ai, r_Bk be the axes, h_A, h_B the half extents, d = c_B - c_A the offset of the centres,
+// C_ik = r_Ai . r_Bk and t_i = r_Ai . d. Each of the 15 separating axes has a gap, which is
+// negative if the axis does not separate. Error bounds, with u the unit roundoff of the lanes and w
+// = |d|_1 + sum h_A + sum h_B:
+//   u                          of an input (relative),
+//   5 u                        of C,
+//   5 u |d|                    of t,
+//   24 u |d| + 24 u sum h      of the gap of an edge pair,
+//   36 u |d| + 12 u sum h      of the gap of a facet of B.
+// 64 u w covers the last two. The boxes are those of the given rotations R. The formulas assume
+// R^T R = I; entries that differ from I by at most `skew` change a gap by at most 16 skew w.
 //
-// The boxes overlap if the offset is on the inner side of every facet of the zonotope A - B. The
-// axis of nearly parallel edges has no certain sign, but may be left out: tilting the shorter edge
-// by the angle between them removes its facet and moves the body by at most tau h. So a margin of
-// that size at all other axes is enough (a ball of that radius about the offset is inside the
-// tilted body). Edges count as parallel if 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 -
-// C^2. At most three pairs can be parallel, with each edge in one of them. So tilting moves the
-// body by less than 2 tau min(sum h_A, sum h_B).
+// The boxes overlap if the offset d is on the inner side of every facet of the zonotope A - B. The
+// gap on the axis of nearly parallel edges has no certain sign, but this axis can be left out:
+// 1. Edges count as parallel if 1 - C^2 < tau^2, where tau^2 is far above the rounding of 1 - C^2.
+// 2. Tilting the shorter of the two edges by the angle between them makes them parallel and removes
+//    their facet. It moves the points of the zonotope by at most tau h.
+// 3. Each edge is in at most one parallel pair, so there are at most three pairs, and tilting moves
+//    points by less than 2 tau min(sum h_A, sum h_B) in all.
+// 4. If the gaps on all other axes are below minus this length, a ball of this radius around d is
+//    in the tilted zonotope, and d is in the given one.
 #pragma once
 
 #include "convex_abfme.hpp"
@@ -31,7 +38,7 @@ struct BoxLanes {
 
 template <class V>
 struct BoxBounds {
-  double unit, tau_squared, tau, low, high;  // pairs with w outside [low, high] stay undecided
+  double unit, tau_squared, tau, low, high;  // pairs with w outside [low, high] are undecided
 };
 template <>
 struct BoxBounds<Float8> {
@@ -44,8 +51,7 @@ struct BoxBounds<double> {
                           high = 1e250;
 };
 
-// out: masks of the lanes that certainly separate and of those that certainly meet (bool for
-// scalars).
+// Sets masks (bool for scalars) of the lanes that are certainly apart or certainly overlap.
 template <class V, class Mask, class Scalar>
 TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const V* d, Scalar skew,
                               Mask& apart, Mask& together) {
@@ -92,7 +98,7 @@ TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const 
   together = fits & (straight < -(error + tilt));
 }
 
-// One pair in double precision; p as packed rows (centre, half extents, rotation).
+// One pair in double precision, as packed rows (centre, half extents, rotation).
 TAUGUARD_INLINE Verdict box_pair(const double* pa, const double* pb, double skew) {
   BoxLanes<double> a, b;
   double d[3];
@@ -110,8 +116,8 @@ TAUGUARD_INLINE Verdict box_pair(const double* pa, const double* pb, double skew
   return apart ? separated : together ? common : undecided;
 }
 
-// Eight boxes as the batch path reads them, coordinate by coordinate. Centres are doubles, so that
-// pairs far from the origin lose no accuracy; the rest is in single precision.
+// Eight boxes, coordinate by coordinate. Centres are doubles, so that pairs far from the origin
+// lose no accuracy; the rest is in single precision.
 struct BoxBlock {
   double center[3][8];
   float half_extents[3][8];

@@ -1,5 +1,6 @@
-// Overlap in successive frames: the plane that separated a pair in the last frame is tried first.
-// It decides nearly every pair that is still apart. A wrong or old plane costs time only.
+// Overlap in successive frames: the plane that separated a pair in the last frame is tested first.
+// It decides nearly every pair that is still apart. A plane that no longer separates costs time,
+// but never makes an answer wrong.
 #include <atomic>
 
 #include "convex_overlap.hpp"
@@ -15,8 +16,7 @@ struct Extent {
   double low, high, reach;
 };
 
-// The range of a body's projections on n, relative to `base`, and a bound on the 1-norm of its
-// points.
+// The range of a body's projections on n relative to `base`, and a bound on its points' 1-norm.
 TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const double* base,
                                     const double* n) {
   const double* p = bodies.row(row);
@@ -46,8 +46,8 @@ TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const
   return out;
 }
 
-// Whether a plane with normal n certainly has a below and b above it. A point is off by 8 u reach,
-// a dot product by 4 u.
+// Whether some plane with normal n certainly has a below and b above it. Error bounds: 8 u reach
+// for a point, 4 u (relative) for a dot product.
 TAUGUARD_INLINE bool plane_holds(const Bodies& a, const Bodies& b, std::size_t row,
                                  const double* n) {
   const double* base = a.row(row);
@@ -56,7 +56,7 @@ TAUGUARD_INLINE bool plane_holds(const Bodies& a, const Bodies& b, std::size_t r
   return in_range(reach) && eb.low - ea.high > 32 * unit * norm1(n) * reach;
 }
 
-// The first of the separating axes that holds, as a unit normal from a to b.
+// Finds the first axis that certainly separates the bodies, as a unit normal from a to b.
 template <class A, class B>
 bool find_axis(const Bodies& a, const Bodies& b, std::size_t row, double* n) {
   constexpr int faces[4][2] = {{0, 1}, {0, 2}, {1, 2}, {3, 4}};

@@ -1,5 +1,5 @@
-// A common point of two bodies that touch along a known normal. The features of both bodies in the
-// contact plane (vertices within `tolerance` of it) are intersected in that plane.
+// A common point of two bodies that touch along a known normal. The contact features of both bodies
+// are their vertices within `tolerance` of the contact plane; they are intersected in that plane.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ class ContactFeature {
  public:
   using Point2 = std::array<double, 2>;
 
-  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane of u, v.
+  // The vertices of `body` that are extreme along sign * normal, as a convex polygon in u, v.
   ContactFeature(const Points<double>& body, const Vec3& normal, double sign, double tolerance,
                  const Vec3& u, const Vec3& v) {
     double top = sign * dot(normal, body[0]);
@@ -27,8 +27,8 @@ class ContactFeature {
     polygon = hull(points);
   }
 
-  // The mean of the corners of the intersection, or of both means if rounding leaves no
-  // intersection.
+  // The mean of the intersection's corners. If rounding leaves no intersection, the middle between
+  // the means of the two polygons.
   static Point2 meet(const ContactFeature& a, const ContactFeature& b, double tolerance) {
     if (a.polygon.size() == 1) return a.polygon[0];
     if (b.polygon.size() == 1) return b.polygon[0];

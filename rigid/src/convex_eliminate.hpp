@@ -1,16 +1,19 @@
-// Elimination for vertex hulls without facets, in D = 2 or 3 dimensions. The unknowns are the
-// values p_i of the separating function at D + 1 affinely independent vertices of A, p_i >= 0; F_i
-// are the barycentric coordinates of that simplex, scaled by its determinant. A vertex of B asks
-// sum p_i F_i(b) < 0, any other vertex of A asks -sum p_i F_i(a) <= 0. Eliminating p_k keeps the
-// rows with a positive entry (with p_k >= 0 that entry drops out) and combines them with the rows
-// of the opposite sign; every row is the difference of a point of B and a point of A. After s
-// eliminations a row made of more than s + 1 inequalities is redundant (Chernikov 1960), and so is
-// one whose inequalities include those of another (Kohler 1967).
-//   * If a row has positive entries only, no plane exists, and the bodies share a point.
+// Overlap of vertex hulls, whose facets are not known, by elimination in D = 2 or 3 dimensions.
+//
+// Choose D + 1 affinely independent vertices of A. The unknowns are the values p_i >= 0 of the
+// separating function at these vertices. F_i are the barycentric coordinates of their simplex,
+// scaled by its determinant. Every vertex gives a row:
+//   sum p_i F_i(b) < 0      for a vertex b of B,
+//   -sum p_i F_i(a) <= 0    for any other vertex a of A.
+// Eliminating p_k, with p_k >= 0, keeps the rows with a positive entry k without this entry, and
+// combines them with the rows of negative entry k. Every row is the difference of a point of B and
+// a point of A. After s eliminations a row is redundant if it is made of more than s + 1
+// inequalities (Chernikov 1960), or if they include those of another row (Kohler 1967).
+//   * If a row has only positive entries, no plane exists, and the bodies share a point.
 //   * Otherwise back-substitution gives a plane, which is then checked against all vertices.
-// Combinations leave an entry of 2 E instead of 0 in the eliminated column (E bounds every entry's
-// error), so that a positive row is positive beyond rounding there too. If rows are too small for
-// that, or the check rejects the plane, the pair stays undecided.
+// Let E bound the error of every entry. Combinations leave 2 E instead of 0 in the eliminated
+// column, so that the test for positive entries holds there in spite of rounding. If entries are
+// too small for that, or if the check rejects the plane, the pair is undecided.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +29,7 @@ namespace tauguard::rigid {
 template <int D>
 class HullElimination {
  public:
-  // Points from a common origin, at most `reach` in 1-norm; two-dimensional ones have z = 0.
+  // Points relative to a common origin, of 1-norm at most `reach`; with D = 2 all have z = 0.
   HullElimination(const Points<double>& a, const Points<double>& b, double reach)
       : a_(a), b_(b), reach_(reach) {}
 
@@ -49,7 +52,7 @@ class HullElimination {
  private:
   struct Row {
     std::array<double, D + 1> entry;
-    std::array<std::uint64_t, 2> support;  // the inequalities it is made of
+    std::array<std::uint64_t, 2> support;  // bit set of the inequalities that the row is made of
   };
 
   static int count(const std::array<std::uint64_t, 2>& s) {
@@ -144,7 +147,7 @@ class HullElimination {
         out.push_back(r);
       }
     }
-    for (const Row& z : rows)  // entries that count as zero stay as they are
+    for (const Row& z : rows)  // rows whose entry counts as zero are kept unchanged
       if (z.entry[k] >= 0 && z.entry[k] <= 4 * error_) out.push_back(z);
     return without_supersets(std::move(out));
   }
@@ -163,7 +166,7 @@ class HullElimination {
     return out;
   }
 
-  // Sets p_D = 1, then each p_k to the middle of the interval that the rows of its stage leave.
+  // Sets p_D = 1, then each p_k to the middle of the interval of stage k, and checks the plane.
   bool plane_separates(const std::array<std::vector<Row>, D>& stages) const {
     std::array<double, D + 1> p{};
     p[D] = 1.0;

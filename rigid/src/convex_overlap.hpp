@@ -11,41 +11,42 @@ namespace tauguard::rigid {
 
 enum class Method : int { abfme = 0, sat = 1, automatic = 2, textbook_sat = 3, exact = 4 };
 
-// Writes 1 (common) or 0 (separated) for rows [0, n). Every method is exact except textbook_sat,
-// which has rounding errors. Returns the number of rows that the filters left undecided.
+// Writes 1 (common) or 0 (separated) for rows [0, n). Every method is exact, except textbook_sat.
+// Returns the number of rows that the filters left undecided.
 std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method method, int threads,
                     std::uint8_t* hit);
 
-// The batch path of boxes. It takes the rows and the same boxes in blocks of eight (see BoxBlock;
-// the last block is padded). `skew` bounds |R^T R - I| over both batches.
+// The same for boxes, given both as rows and as blocks of eight (BoxBlock; the last block is
+// padded). `skew` bounds |R^T R - I| over both batches.
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b,
                           const void* blocks_b, double skew, std::size_t n, int threads,
                           std::uint8_t* hit);
 
-// Sweeps: b moves by t d[i], 0 <= t <= 1. Row i of `out` holds toi (inf without a hit), point and
-// normal; `hit` is as above. `d` holds n rows of 3. Without `points` the points are NaN.
+// Sweeps: b moves by t d[i], 0 <= t <= 1; `d` has n rows of 3. Writes `hit` as above. Row i of
+// `out` receives time of impact (inf without a hit), point (NaN if `points` is false) and normal.
 std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method,
                   int threads, bool points, std::uint8_t* hit, double* out);
 
-// Decides one row by elimination, or by the hulls' method, and writes hit[row].
+// Decides one row by elimination and writes hit[row].
 using RowMethod =
     std::function<void(const Bodies& a, const Bodies& b, std::size_t row, std::uint8_t* hit)>;
 RowMethod row_method(Kind a, Kind b);
 
-// Like `overlap`, but tries the normal of row i first (3 numbers, zeros for none). If it fails and
-// the pair is apart, the normal is replaced. Returns the number of rows that the normals decided.
+// Like `overlap`, but tests the given normal of each row first (3 numbers; zeros if there is none).
+// If it does not separate the pair but the pair is apart, it is replaced by a normal that
+// separates. Returns the number of rows that the given normals decided.
 std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads,
                            double* normals, std::uint8_t* hit);
 
-// The largest |R^T R - I| of n rotations (rounded up), and the first row above `tolerance` (n if
-// there is none).
+// The largest entry of |R^T R - I| of n rotations, rounded up, and the first row above `tolerance`,
+// or n.
 struct Skew {
   double largest;
   std::size_t first_beyond;
 };
 Skew box_skew(const double* rotation, std::size_t n, double tolerance);
 
-// Blocks of eight from packed rows, the last one filled up with copies of the last box.
+// Writes packed rows as blocks of eight; the last block is filled up with copies of the last box.
 void pack_boxes(const double* packed, std::size_t n, double* blocks);
 
 void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads,

@@ -11,7 +11,7 @@ namespace tauguard::rigid {
 
 namespace {
 
-// numerator / denominator to about 50 bits, whatever their exponents.
+// numerator / denominator to about 50 bits, for any exponents.
 double quotient(const Dyadic& numerator, const Dyadic& denominator) {
   if (numerator.is_zero()) return 0.0;
   const auto n = numerator.floor_log2(), d = denominator.floor_log2();
@@ -69,7 +69,7 @@ void write_point(const HullSimplex<Dyadic>& lp, const Points<Dyadic>& a, double*
 
 using Lp = HullSimplex<double>;
 
-// Makes coordinates relative to the first vertex of a. Returns the largest 1-norm.
+// Makes all coordinates relative to the first vertex of a. Returns the points' largest 1-norm.
 double localize(Points<double>& a, Points<double>& b, Vec3& base) {
   base = a[0];
   double reach = 0.0;
@@ -81,8 +81,8 @@ double localize(Points<double>& a, Points<double>& b, Vec3& base) {
   return reach;
 }
 
-// A lower bound of the gap between the projections on the plane's normal. Each dot product is off
-// by 4 u |n| reach, and coordinates by u reach.
+// A lower bound of the gap between the projections on n. Error bounds: u reach for coordinates,
+// 4 u |n| reach for a dot product.
 double certain_gap(const Points<double>& a, const Points<double>& b, const double* n, double reach,
                    double& high, double& low) {
   high = -HUGE_VAL, low = HUGE_VAL;
@@ -131,11 +131,12 @@ bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::s
 
 }  // namespace
 
-// A basis of four real columns with positive weights encloses the origin. Vertices are off by u
-// reach; those computed from generators are off by 8 u of `size`, which includes the distance of
-// the origin. A weight is a determinant of three columns, whose 1-norm is at most 2 size and off by
-// 16 u size. The columns add an error of 3 * 16 * 4 u size^3, the arithmetic 48 u size^3; together
-// less than 512 u size^3.
+// The hulls meet if the basis has four columns a_i - b_j with positive weights: these columns then
+// enclose the origin. Error bounds, where `size` includes the distance of the origin:
+// * A vertex has an error of u reach, and of 8 u size if it is computed from generators.
+// * A column has a 1-norm of at most 2 size and an error of 16 u size.
+// * A weight is a determinant of three columns. The columns add 3 * 16 * 4 u size^3 to its error,
+//   the arithmetic 48 u size^3. Together they are below 512 u size^3.
 Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
   Vec3 base;
@@ -196,7 +197,7 @@ double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::s
     const Dyadic gap = low - high;
     const Dyadic closing = -projection(normal, {Dyadic(d[0]), Dyadic(d[1]), Dyadic(d[2])});
     if (gap.sign() <= 0 || closing.sign() <= 0)
-      return time;  // the rounding of the plane is as large as the gap
+      return time;  // the rounding error of the plane is as large as the gap
     const double next = std::nextafter(time + quotient(gap, closing) * (1 - 0x1p-46), 0.0);
     if (!(next > time) || next > 1.0) return std::min(1.0, std::max(time, next));
     time = next;

@@ -8,29 +8,29 @@
 
 namespace tauguard::rigid {
 
-// Any bodies by the simplex method in double precision, with error bounds; `undecided` near
-// contact.
+// Overlap of any bodies by the simplex method in double precision, with error bounds. The result is
+// `undecided` near contact.
 Verdict resolve_hulls(const Bodies& a, const Bodies& b, std::size_t row);
 
-// Vertex hulls or polygons by elimination in double precision; `undecided` near contact.
+// Overlap of vertex hulls or polygons by elimination in double precision; `undecided` near contact.
 Verdict eliminate_hulls(const Bodies& a, const Bodies& b, std::size_t row);
 
-// Exact: `separated` or `common` for any finite input. Tens of microseconds.
+// Overlap of any bodies in exact arithmetic, in tens of microseconds. Never `undecided`.
 Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row);
 
-// Does B, moving by t d, meet A for some t in [0, 1]? Exact.
+// Whether B, moved by t d, meets A for some t in [0, 1]. Exact.
 Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row);
 
 // The time of impact of a pair that meets, and the unit normal of the last separating plane (NaN if
 // the pair overlaps from the start). Each step finds a separating plane in exact arithmetic and
-// advances until the bodies reach it. It ends when exact arithmetic finds contact or no advance is
-// left, so the time is never late.
+// advances to the time at which this plane separates no longer. The search ends when exact
+// arithmetic finds contact or when no advance is possible, so the time is never late.
 double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
                        double* normal);
 
-// Writes a common point of row `row`, or the unit normal (from a to b) and offset of a separating
-// plane, to rounding. The other numbers are NaN. `known` is the verdict if the caller knows it.
-// out: point 3, normal 3, offset 1.
+// Writes point (3 numbers), normal (3) and offset (1), to rounding: a common point of row `row`, or
+// the unit normal (from a to b) and the offset of a separating plane. The other numbers are NaN.
+// `known` is the verdict on this row.
 void find_witness(const Bodies& a, const Bodies& b, std::size_t row, Verdict known, double* out);
 
 }  // namespace tauguard::rigid

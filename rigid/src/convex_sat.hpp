@@ -1,14 +1,14 @@
-// Separating axes, tuned: normals and edge products are shared by all projections, only vertices
-// that can be extreme are projected, four axes are tested at once, and every test has an error
-// bound, as in convex_abfme.hpp. For an edge e of A and an edge f of B, the projection of a point x
-// on the axis e x f is f . (x cross e), so the products with e serve all edges of B.
+// Overlap by separating axes. All projections share the normals and edge products, only vertices
+// that can be extreme are projected, and four axes are tested at once. Every test has an error
+// bound as in convex_abfme.hpp. For edges e of A and f of B, the projection of a point x on the
+// axis e x f is f . (x cross e), so the product x cross e is computed once for all edges of B.
 #pragma once
 
 #include "convex_abfme.hpp"
 
 namespace tauguard::rigid {
 
-// Edges of a tetrahedron in two groups of three: 01 02 03, and the opposite ones 23 31 12.
+// The edges of a tetrahedron in two groups of three: 01 02 03, and their opposites 23 31 12.
 struct TetrahedronEdges {
   Double4 f[2][3];
   TAUGUARD_INLINE explicit TetrahedronEdges(const double* v) {
@@ -25,8 +25,8 @@ struct TetrahedronEdges {
   TAUGUARD_INLINE Double4 dot(int group, const double* x) const {
     return f[group][0] * x[0] + f[group][1] * x[1] + f[group][2] * x[2];
   }
-  // The range of the four vertices on the group's axes. c[k] holds component k of x cross e for
-  // each vertex.
+  // The range of the four vertices' projections on the axes of a group. c[k] is component k of
+  // x cross e, with one vertex x per lane.
   TAUGUARD_INLINE void range(int group, const Double4* c, Double4& low, Double4& high) const {
     Double4 p, q, r;
     if (group == 0) {
@@ -57,9 +57,11 @@ TAUGUARD_INLINE void cross_with(const double (*p)[3], const double* e, Double4* 
   c[2] = x * e[1] - y * e[0];
 }
 
-// The bound E of an edge axis. A product with e has an error of 6 u reach a, its dot product with f
-// of 10 u reach a b, and the difference of two of them of 22 u reach a b. Their sum is 32 u a b
-// reach; E is twice this bound.
+// The bound E of an edge axis, for edges of sizes a and b. The errors are at most
+//   6 u reach a       in a product x cross e,
+//   10 u reach a b    in its dot product with f,
+//   22 u reach a b    in the difference of two dot products.
+// The last two add up to 32 u reach a b; E is twice this bound.
 TAUGUARD_INLINE double edge_error(double a, double b, double reach) {
   return 64 * unit * a * b * reach;
 }

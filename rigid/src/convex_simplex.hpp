@@ -1,9 +1,9 @@
-// Do two vertex hulls share a point? The origin is in conv{a_i - b_j} or a plane separates it:
-// phase one of the simplex method on 4 rows (three coordinates and the sum of weights) with a basis
-// of 4 columns. All quantities are cofactors of the basis, so there is no division and the
-// arithmetic can be exact: with Dyadic the answer is right for any finite coordinates, degenerate
-// bodies included. Pricing follows Dantzig first and Bland's rule (1977) from then on, which cannot
-// cycle.
+// Whether two vertex hulls share a point: either the origin is in conv{a_i - b_j}, or a plane
+// separates it from this set. Phase one of the simplex method decides, with 4 rows (three
+// coordinates and the sum of weights) and a basis of 4 columns. All quantities are cofactors of the
+// basis, so there is no division. With Dyadic the answer is exact for any finite coordinates, also
+// for degenerate bodies. The entering column is chosen by Dantzig's rule at first, and after 24
+// steps by Bland's rule (1977), which cannot cycle.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ namespace tauguard::rigid {
 inline int sign_of(const Dyadic& x) { return x.sign(); }
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Is x - y positive, for a sum of terms of size `scale`? In doubles the price of a basic column is
-// rounding noise about zero, which must not let the column enter again.
+// Whether x > y, where both are sums of terms of size `scale`. In doubles the price of a column of
+// the basis is zero up to rounding; the margin keeps such a column from entering again.
 inline bool exceeds(const Dyadic& x, const Dyadic& y, const Dyadic&) { return y < x; }
 inline bool exceeds(double x, double y, double scale) { return x - y > 0x1p-46 * scale; }
 inline void grow(Dyadic&, const Dyadic&) {}
@@ -38,7 +38,7 @@ class HullSimplex {
       geometry::poll_interrupt();
       factor();
       if (sign_of(determinant_) == 0)
-        return Answer::gave_up;  // rounding only: exact bases are regular
+        return Answer::gave_up;  // only with doubles: in exact arithmetic every basis is regular
       multipliers();
       if (sign_of(y_[3]) <= 0) return Answer::common;  // no artificial weight is left
       std::size_t i = 0, j = 0;
@@ -48,10 +48,10 @@ class HullSimplex {
     return Answer::gave_up;
   }
 
-  // Where separated: y . (a_i - b_j) <= -y[3] < 0 for all pairs, up to a positive factor.
+  // If `separated`: y . (a_i - b_j) <= -y[3] < 0 for all pairs, up to a positive factor.
   const std::array<Number, 4>& plane() const { return y_; }
-  // Where common: weights (over `determinant`) of the basis columns; column k is a_i - b_j with
-  // basis_pair(k) = {i, j}, or artificial where is_artificial(k).
+  // If `common`: the weight of basis column k, times `determinant`. Column k is a_i - b_j with
+  // basis_pair(k) = {i, j}, or artificial if is_artificial(k).
   const Number& weight(int k) const { return adjugate_[k][3]; }
   const Number& determinant() const { return determinant_; }
   bool is_artificial(int k) const { return basis_[k] < 3; }
@@ -72,8 +72,8 @@ class HullSimplex {
     m_[3][k] = Number(1.0);
   }
 
-  // One vertex pair and three artificial unit columns, signed so that their weights are not
-  // negative.
+  // The first basis: one pair of vertices and three artificial unit columns with signs that make
+  // weights >= 0.
   void start() {
     const auto q = column(0, 0);
     for (int r = 0; r < 3; ++r) side_[r] = sign_of(q[r]) > 0 ? -1.0 : 1.0;
@@ -81,7 +81,7 @@ class HullSimplex {
     set_column(3, 3);
   }
 
-  // Adjugate and determinant of the basis by 2 x 2 minors of its upper and lower halves.
+  // Adjugate and determinant of the basis, from 2 x 2 minors of its upper and lower halves.
   void factor() {
     const auto& m = m_;
     const auto minor = [&](int r, int c, int d) {
@@ -112,7 +112,7 @@ class HullSimplex {
       for (auto& x : r) x = -x;
   }
 
-  // The row of a half whose cofactor is built from row r.
+  // The other row of the half (rows 0 and 1, or 2 and 3) that contains row r.
   static int other(int r) { return r ^ 1; }
 
   void multipliers() {
@@ -127,8 +127,8 @@ class HullSimplex {
     return y_[0] * p[0] + y_[1] * p[1] + y_[2] * p[2];
   }
 
-  // Finds a column a_i - b_j that lowers the artificial weight: the steepest one, or the first one
-  // (Bland's rule).
+  // Finds a column a_i - b_j that lowers the artificial weight: the steepest one, or if `first` the
+  // first one (Bland's rule). False if there is none.
   bool price(bool first, std::size_t& i, std::size_t& j) {
     std::vector<Number>& pa = project_a_;
     std::vector<Number>& pb = project_b_;

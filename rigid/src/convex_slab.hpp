@@ -1,7 +1,7 @@
-// When a moving body meets another, by separating axes: on an axis L the bodies overlap while
-// low <= t s <= high, s = L . d. The latest entry over all axes is the time of impact.
-// Any axis, also a rounded one, keeps the bodies apart until its own entry. So an entry minus its
-// error bound is never late.
+// Time of impact of a translating body, by separating axes. On an axis L the projections overlap
+// while low <= t s <= high, with s = L . d. The entry is the first such time. The latest entry over
+// all axes is the time of impact. The bodies are apart until the entry on any axis, also on an axis
+// with rounding errors. So an entry minus its error bound is never late.
 #pragma once
 
 #include <cmath>
@@ -49,8 +49,8 @@ struct Entry {
   double leave = std::numeric_limits<double>::infinity();  // and after this time
   double surely_in = enter, surely_out = leave;  // between these times they overlap on every axis
   bool certain = true;                           // false if some axis was too short to decide
-  double reliable = enter;                       // `enter` plus twice its error
-  double normal[3] = {0, 0, 0};                  // of the axis of `enter`, from a to b
+  double reliable = enter;                       // `enter` plus twice its error bound
+  double normal[3] = {0, 0, 0};                  // the axis that gave `enter`, from a to b
 
   bool usable = true;  // sizes are in range
 
@@ -60,10 +60,12 @@ struct Entry {
   }
 };
 
-// Errors: let `length` >= |axis|_1 be the product of the sizes of the axis's edges. The axis is off
-// by 4 u length, which matters to `hit` only; a vertex is off by 8 u reach, and a projection by 4 u
-// length reach more. The difference of two projections is off by less than 64 u length reach. The
-// speed is off by 8 u length |d|.
+// Tests one axis. `length` >= |axis|_1 is the product of the sizes of its edges. Error bounds:
+//   4 u length           of the axis, which matters to `hit` only,
+//   8 u reach            of a vertex,
+//   4 u length reach     of a projection, in addition,
+//   64 u length reach    of the difference of two projections,
+//   8 u length |d|       of the speed L . d.
 template <class A, class B>
 TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, double length,
                                const double* d, Entry& out) {

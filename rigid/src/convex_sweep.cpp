@@ -21,7 +21,7 @@ struct Chunk {
   const double* d;
   std::size_t begin, end;
   std::uint8_t* hit;
-  double* out;  // toi, point, normal
+  double* out;  // rows of time of impact, point, normal
   bool points;  // find contact points
 };
 
@@ -37,7 +37,7 @@ TAUGUARD_INLINE Entry cast_row(const Chunk& c, std::size_t i) {
   return cast(a, b, c.d + 3 * i);
 }
 
-// Whether there is a hit at all, by elimination.
+// Whether there is a hit, by elimination.
 template <class A, class B>
 TAUGUARD_INLINE Verdict eliminate_row(const Chunk& c, std::size_t i) {
   const double *pa = c.a.row(i), *pb = c.b.row(i), *d = c.d + 3 * i;
@@ -59,7 +59,8 @@ void write_miss(double* out) {
   std::fill(out + 1, out + 7, nan);
 }
 
-// Contact point of a hit at `time` with a normal, or any common point of a pair that overlaps.
+// Writes a hit at `time`. With a normal the point is the contact point; without one (zero) the
+// bodies overlap at the start, and the point is any common point.
 __attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double time,
                                          const double* normal) {
   double* out = c.out + 7 * i;
@@ -88,8 +89,8 @@ __attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double t
   std::copy(point.begin(), point.end(), out + 1);
 }
 
-// A hit that exact arithmetic found, and every hit of bodies without edge lists.
-// For a contact from the start the normal is that of the axis that just closes, if there is one.
+// Writes a hit that exact arithmetic found. If the bodies touch at the start, the normal is the
+// axis of the latest entry, unless this entry is certainly before the start.
 __attribute__((noinline)) void write_exact_hit(const Chunk& c, std::size_t i, const Entry& entry) {
   double normal[3];
   const double time = advance_exactly(c.a, c.b, c.d + 3 * i, i, normal);

@@ -1,15 +1,16 @@
-// Does a moving body meet another within the step? Body B moves by t d, 0 <= t <= 1. The time t is
-// one more unknown. It is eliminated first: the rows of t = 0 and t = 1 span all others, so every
-// vertex of B gives two rows, one for each end of the motion. The hull of both ends has the facets
-// f x d in addition to those of B. The rest is the elimination of convex_abfme.hpp.
+// Whether a translating body meets another within the step. Body B moves by t d, 0 <= t <= 1. The
+// time t is one more unknown, which is eliminated first: the rows for t = 0 and t = 1 imply all
+// others, so every vertex of B gives two rows, one for each end of the motion. The hull of both
+// ends has facets with normals f x d, for edges f of B, in addition to those of B. The rest is the
+// elimination of convex_abfme.hpp.
 #pragma once
 
 #include "convex_sat.hpp"
 
 namespace tauguard::rigid {
 
-// Points p and p + d are off by 2 u reach, which the bounds of convex_abfme.hpp cover with their
-// slack.
+// The four points p + d. The error of p and of p + d is at most 2 u reach, which the slack of the
+// bounds of convex_abfme.hpp covers.
 TAUGUARD_INLINE void moved(const double (*p)[3], const double* d, double (*out)[3]) {
   for (int j = 0; j < 4; ++j)
     for (int k = 0; k < 3; ++k) out[j][k] = p[j][k] + d[k];
@@ -138,7 +139,7 @@ TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const doub
   return certain ? common : undecided;
 }
 
-// The hull of both ends of a zonotope's motion is a zonotope with d / 2 as a fourth generator.
+// The hull of a zonotope at t = 0 and t = 1 is a zonotope with d / 2 as a fourth generator.
 TAUGUARD_INLINE Verdict swept_zonotopes(const Zonotope& a, const Zonotope& b, const double* d) {
   const Slabs sa(a);
   double g[4][3], m[3], w = norm1(d), size = 0.5 * w;
@@ -161,7 +162,7 @@ TAUGUARD_INLINE Verdict swept_zonotopes(const Zonotope& a, const Zonotope& b, co
 
   Double4 f[3];
   for (int k = 0; k < 3; ++k) f[k] = Double4{g[0][k], g[1][k], g[2][k], g[3][k]};
-  // Facets of B: generators (0, 1), (1, 2), (2, 3), (3, 0), then (0, 2), (1, 3) twice.
+  // Facets of B, by pairs of generators: (0, 1), (1, 2), (2, 3), (3, 0), then (0, 2), (1, 3) twice.
   const double eb = edge_error(size, size, w);
   for (int pass = 0; pass < 2; ++pass) {
     Double4 h[3], n[3];

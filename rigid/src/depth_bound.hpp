@@ -1,26 +1,30 @@
 // A lower bound of the depth of the origin in a polytope of differences computed in doubles.
 //
-// For bodies of very different sizes, faces have edges that are almost parallel, and rounding turns
-// their normals by any angle. So nothing below depends on the accuracy of a normal. For any n, a
-// triangle lies in the half-space n . x >= m, where m is the least n . y of its three corners y.
-// Only the rounding of these products matters. With u the unit roundoff and all coordinates of both
-// bodies at most s, |y| <= 2 sqrt(3) s, and a product is off by 3 u |n| |y| <= 11 u |n| s.
+// If the bodies have very different sizes, faces have nearly parallel edges, and rounding can turn
+// their normals by any angle. The bound therefore holds for any vector n as the normal of a face.
+// For any n, the face is in the half-space n . x >= m, where m is the least n . y of its corners y.
+// Only the rounding of these products matters. Let u be the unit roundoff and s a bound on all
+// coordinates of both bodies. Then |y| <= 2 sqrt(3) s, and the error of a product is at most
+// 3 u |n| |y| <= 11 u |n| s.
 //
-// The surface S of all faces is closed, convex or not: a step replaces faces by the cone over their
-// rim. Let c be the centre of the first tetrahedron.
-// 1. n . c < m for every face ever made. `side` is 4 (n . c - n . y) for one corner y. It is off by
-//    at most 142 u |n| s: twice 42 by its products, 27 by their difference, 31 by the rounding of
-//    c. Four times the largest |n . y - n . y'| of the corners is off by 112. More than 512 is
-//    required (unsure). So the centre is in no face of the first tetrahedron, and thus inside it.
-// 2. A corner w that replaces a face is further along n than y, except for 28 u |n| s of rounding;
-//    the 512 cover four times that too. So c is not in the tetrahedron of w and that face, and the
-//    number of times that S winds around c stays odd.
+// The surface S of all faces is closed, because a step replaces faces by the cone over their rim;
+// it need not be convex. Let c be the centre of the first tetrahedron.
+// 1. n . c < m for every face ever made. The code computes side = 4 (n . c - n . y) for one corner
+//    y, and 4 max |n . y - n . y'| over the other corners y'. Errors, in units of u |n| s: at most
+//    142 of `side` (84 from its products, 27 from their difference, 31 from the rounding of c), and
+//    at most 112 of the maximum. `unsure` requires that |side| exceeds the maximum by 512. So c is
+//    in no face of the first tetrahedron, and thus inside it.
+// 2. A corner w that replaces a face is further along n than y, up to a rounding error of 28 u |n|
+//    s. Four times this error is within the 512, too. So c is not in the tetrahedron of w and that
+//    face, and the number of times that S winds around c stays odd.
 // 3. If 0 < m for all faces of the final S, no face meets the segment from c to the origin, and S
-//    winds around the origin an odd number of times. No face is nearer to the origin than
-//    L = m / |n|, so the same holds around every point of the ball of radius L. A closed surface
-//    does not wind around a point outside the hull of its corners, so the ball is in the hull.
-// L is off by 23 u s. The stored corners are off by 16 u s (two coordinates, two differences and a
-// sum of that size); S keeps its winding if they move by less than L, so this costs 16 u s.
+//    winds around the origin an odd number of times. Let L be the least m / |n|. No face is nearer
+//    to the origin than L, so S winds in the same way around every point of the ball of radius L. A
+//    closed surface does not wind around a point outside the hull of its corners, so the ball is in
+//    the hull, and L is a lower bound of the depth.
+// 4. The error of the computed L is at most 23 u s. The error of a stored corner is at most 16 u s
+//    (two coordinates, two differences and their sum). Moving corners by less than L does not
+//    change how S winds around the origin, so this error lowers the bound by at most 16 u s.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +34,7 @@
 
 namespace tauguard::rigid {
 
-// A lower bound of the depth, off by at most 39 u of the size. If it is 0 or less, nothing is
-// known.
+// The bound L, with an error of at most 39 u times the size. L <= 0 says nothing.
 template <class Polytope>
 double least_depth(const Polytope& polytope) {
   double least = INFINITY;

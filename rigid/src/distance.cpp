@@ -21,7 +21,7 @@ std::size_t extreme(const PointList& points, const Vec3& n) {
   return best;
 }
 
-// Ends the descent when no difference is nearer by more than rounding errors.
+// Ends the descent when no point of b - a is nearer to the origin by more than rounding errors.
 struct ToRounding {
   void visit(const Simplex<Rows>&) {}
   bool enough(const Vec3& v, const Vec3& next) const {
@@ -39,8 +39,8 @@ Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch
   return descend(Corner<Rows>{b[0] - a[0], {0, 0}, 1.0}, support, watch, 0.0);
 }
 
-// Close to contact, cancellation destroys the nearest point. So the normals of the last simplex's
-// triangles are tried as well, and the best one is used.
+// Keeps the direction of the largest separation. Close to contact, cancellation makes the nearest
+// point useless as a direction, so the normals of the simplex's triangles are tried, too.
 struct Separating : ToRounding {
   const PointList &a, &b;
   Vec3* n;
@@ -144,13 +144,13 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& g
   first.weight = 1;
   Bounded watch{out, needed};
   watch.attempt(start, first.w);
-  // A shorter v is rounding: 64 covers the dozen operations behind each of its coordinates.
+  // A nearest point closer to the origin is zero up to rounding: each coordinate comes from about a
+  // dozen operations, whose errors 64 u covers.
   const double rounding = 64 * unit_roundoff * (a.magnitude() + b.magnitude());
   const Simplex<SourcePoints> s = descend(first, support, watch, rounding * rounding);
   const double square = dot(s.nearest(), s.nearest());
   out.overlap = s.size() == 4 || square <= rounding * rounding;
-  // Close to contact, cancellation destroys the nearest point. The face of the last simplex has a
-  // better normal.
+  // As in Separating: close to contact, the normal of the last triangle is the better direction.
   if (!out.overlap && s.size() == 3) {
     Vec3 n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));
     if (dot(n, s.w(0)) < 0) n = -1.0 * n;

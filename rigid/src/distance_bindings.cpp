@@ -1,5 +1,5 @@
-// Bindings of tauguard.rigid._rigid_mesh: distance, overlap and first contact of convex bodies,
-// with or without radii, with each other and with meshes. Arguments are checked in Python.
+// Bindings of tauguard.rigid._rigid_mesh: distance, overlap and first contact of convex bodies with
+// convex bodies or meshes. Arguments are checked in Python.
 #include "bodies_binding.hpp"
 #include "mesh_body.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"

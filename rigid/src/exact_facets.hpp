@@ -1,5 +1,5 @@
-// The depth of two touching or overlapping bodies in exact arithmetic, over the few facets of their
-// difference that doubles leave in question.
+// The penetration depth of two touching or overlapping bodies in exact arithmetic. It visits only
+// the facets of their difference that double precision leaves undecided.
 #pragma once
 
 #include <vector>
@@ -8,18 +8,20 @@
 
 namespace tauguard::rigid {
 
-// Every facet of the difference of a solid and another body has the normal of a face of one of them
-// or of a pair of edges, and both bodies are apart exactly where they are so along one of these
-// (Gottschalk, Lin and Manocha 1996). The depth is the least height of the difference over them.
-// Doubles give each height to 128 u / s of the size (facet_depth.hpp), so only facets whose lower
-// bound is below the least upper bound can be the nearest one, or can keep the bodies apart.
+// Let one of the bodies have full dimension. Every facet of their difference has the normal of a
+// face of a body, or of a pair of edges. The bodies are apart if and only if one of these normals
+// separates them (Gottschalk, Lin and Manocha 1996). Otherwise the depth is the least height of the
+// difference along a normal. Doubles give each height with an error of at most 128 u / s times the
+// size (facet_depth.hpp). Only facets whose lower bound is at most the least upper bound can be the
+// nearest one or can separate the bodies, so only these are visited.
 class ExactFacets {
  public:
   enum class Answer { together, apart, unknown };
-  Vector3<Dyadic> normal;  // together: b moved along it by `height` / |normal|^2 only touches
+  Vector3<Dyadic>
+      normal;  // if `together`: b touches a after moving by `height` / |normal|^2 normal
   Dyadic height;
 
-  // x, y: the exact vertices; a, b: the same in doubles, off by 4 u of `size`.
+  // x, y: the exact vertices; a, b: the vertices in doubles, with errors of at most 4 u `size`.
   Answer solve(const BodyEdges& ea, const BodyEdges& eb, const Points<Dyadic>& x,
                const Points<Dyadic>& y, const Points<double>& a, const Points<double>& b,
                double size) {
@@ -54,8 +56,8 @@ class ExactFacets {
     int first, second;
   };
   struct Facet : Pair {
-    bool back;   // the opposite normal
-    double low;  // bound of the height from below
+    bool back;   // the normal is reversed
+    double low;  // lower bound of the height
   };
 
   static bool solid(const BodyEdges& e) {
@@ -71,7 +73,7 @@ class ExactFacets {
     for (const bool back : {false, true}) {
       const Vec3 n = ((back ? -1 : 1) / length) * c;
       const double height = top(a, n) + top(b, -n);
-      const bool known = height - slack > -HUGE_VAL;  // not for edges that are parallel to rounding
+      const bool known = height - slack > -HUGE_VAL;  // false for edges that are parallel
       facets_.push_back({pair, back, known ? height - slack : -HUGE_VAL});
       if (known) least_ = std::min(least_, height + slack);
     }

@@ -1,13 +1,13 @@
-// The nearest points of two hulls of points, decided by signs of polynomials alone. With Dyadic the
-// answer is exact.
+// The nearest points of two hulls of points. Every decision is the sign of a polynomial, so the
+// result is exact with Dyadic.
 #pragma once
 
 #include "expanding_polytope.hpp"
 
 namespace tauguard::rigid {
 
-// Nearest point of the hull of differences to the origin (Wolfe 1976; Gilbert, Johnson and Keerthi
-// 1988): it is sum weight_k y_k / denominator, given as numerator / denominator.
+// The point of the hull of differences nearest to the origin (Wolfe 1976; Gilbert, Johnson and
+// Keerthi 1988). It is numerator / denominator, with numerator = sum weights_k y_k over `pairs`.
 template <class Number>
 class ExactNearest {
  public:
@@ -37,9 +37,9 @@ class ExactNearest {
  private:
   void take(const Pair& p) { pairs.push_back(p), points_.push_back(y_.at(p)); }
 
-  // The face of the simplex that holds its point nearest to the origin: all its weights are above
-  // zero and no other corner is before it. It has the corners of `with`, and is most often the
-  // whole simplex.
+  // Reduces the simplex to the face that contains its point nearest to the origin: all weights are
+  // positive, and no other corner is nearer along the direction to this point. The bits of `with`
+  // are corners that the face must have.
   void keep(unsigned with) {
     const int m = static_cast<int>(points_.size());
     for (unsigned mask = (1u << m) - 1; mask > 0; --mask) {
@@ -63,7 +63,7 @@ class ExactNearest {
     return true;
   }
 
-  // Weights of the point of the face's affine hull nearest to the origin, by Cramer's rule.
+  // The weights of the point nearest to the origin in the affine hull of a face, by Cramer's rule.
   bool weigh(const std::vector<int>& face) {
     const Vector3<Number>& y0 = points_[face[0]];
     Vector3<Number> e[3];

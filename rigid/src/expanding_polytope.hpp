@@ -1,8 +1,8 @@
 // The facet of a convex set of differences b - a that is nearest to the origin, by the expanding
-// polytope of van den Bergen 2001. It needs no simplex around the origin to start from. If the
-// origin is inside, this facet gives the shortest translation that separates the bodies. Only signs
-// of polynomials decide. With Dyadic every answer is right. With double the answer is a proposal
-// that least_depth (depth_bound.hpp) certifies, or a rounded one for support shapes.
+// polytope of van den Bergen (2001). The first simplex need not contain the origin. If the origin
+// is inside the set, the facet gives the shortest translation that separates the bodies. Every
+// decision is the sign of a polynomial, so the result is exact with Dyadic. With double,
+// depth_bound.hpp certifies the result for vertex lists, not for support shapes.
 #pragma once
 
 #include <algorithm>
@@ -31,9 +31,9 @@ bool is_zero(const Vector3<Number>& x) {
 inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
-// Whether rounding alone may have put the centre on the inner side of a face. `spread` is the
-// difference of the face's corners along its normal; depth_bound.hpp derives the fraction. True
-// also if a square leaves the range of doubles.
+// Whether the sign of `side` may be wrong because of rounding (step 1 of depth_bound.hpp). `spread`
+// is the largest difference of the face's corners along its normal. True if a square leaves the
+// range of doubles.
 inline bool side_is_rounding(double side, double spread, double square, double size) {
   const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
   return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);
@@ -45,7 +45,7 @@ class PointDifferences {
  public:
   using Source = std::array<std::size_t, 2>;  // rows of a and of b
 
-  // `size`: the largest coordinate, which bounds the rounding of doubles.
+  // `size`: the largest coordinate, to which rounding errors of doubles are relative.
   PointDifferences(const Points<Number>& a, const Points<Number>& b, double size = 0)
       : a_(a), b_(b), size_(size) {}
 
@@ -65,8 +65,9 @@ class PointDifferences {
   }
 
   // Finds four differences that span space: a first one, the farthest from it, the farthest from
-  // the line of both, and the farthest from the plane of the three. False if there are none;
-  // `normal` is then a normal of the set that they span, zero for a point.
+  // the line through both, and the farthest from the plane through the three. False if the set is
+  // flat; `normal` is then a normal of the set (zero for a point). `thin`: whether the tetrahedron
+  // is flat up to rounding.
   bool span(std::array<Vector3<Number>, 4>* y, std::array<Source, 4>* from, Vector3<Number>* normal,
             bool* thin) const {
     const Vector3<Number> y0 = at({0, 0});
@@ -102,13 +103,13 @@ class PointDifferences {
     return true;
   }
 
-  // Whether a facet belongs to the whole hull; the farthest point is `excess` beyond it. The facet
-  // is also final if that point was taken before: then the excess is a rounding error.
+  // Whether a facet of the polytope is also a facet of the set. `excess` tells how far the set's
+  // farthest point is beyond the facet. If this point was taken before, it is a rounding error.
   bool is_final(const Number& excess, const Number&, const Source& farthest) {
     return !positive(excess) || !taken_.insert(farthest).second;
   }
   bool sees(const Number& excess, const Number&) const { return positive(excess); }
-  // Whether `side`, four times a height above a triangle, may be rounding alone.
+  // Whether the sign of `side`, four times a height above a triangle, may be wrong.
   bool unsure(const Number& side, const Vector3<Number>& normal, const Number& square,
               const std::array<const Vector3<Number>*, 3>& y) const {
     if constexpr (std::is_same_v<Number, double>) {
@@ -138,9 +139,9 @@ class ExpandingPolytope {
   enum class Answer { facet, flat, gave_up };
   struct Face {
     std::array<int, 3> corner;
-    Vector3<Number>
-        normal;  // outward; if `flat`, a normal of the set that they span, zero for a point
-    Number offset, square;  // normal . y <= offset for every difference; normal . normal
+    Vector3<Number> normal;  // outward; if `flat`, a normal of the set (zero for a point)
+    Number offset;           // normal . y for the corners y
+    Number square;           // normal . normal
   };
 
   explicit ExpandingPolytope(Differences differences) : differences_(std::move(differences)) {}
@@ -191,7 +192,7 @@ class ExpandingPolytope {
     faces_.push_back(f);
   }
 
-  // offset / |normal|, negative where the origin is outside.
+  // Whether offset / |normal| is smaller for f than for g. It is negative if the origin is outside.
   static bool nearer(const Face& f, const Face& g) {
     const bool f_out = f.offset < Number(), g_out = g.offset < Number();
     if (f_out != g_out) return f_out;
@@ -199,7 +200,8 @@ class ExpandingPolytope {
     return f_out ? y < x : x < y;
   }
 
-  // Replaces the faces that see w by the cone from w over their rim.
+  // Replaces the faces that are visible from w by the cone from w over their rim. False if rounding
+  // makes the rim something else than one or more closed curves.
   bool grow(const Vector3<Number>& w, std::size_t seen) {
     std::vector<std::pair<int, int>> edges;
     std::vector<Face> rest;

@@ -1,5 +1,5 @@
-// The shortest translation that separates two overlapping bodies. It is found over all facets of
-// their difference: the normals of both bodies' faces and of every pair of edges.
+// The shortest translation that separates two overlapping bodies, by a search over all facets of
+// their difference. Facets have the normals of both bodies' faces and of all pairs of edges.
 #pragma once
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 
 namespace tauguard::rigid {
 
-// Edge directions of a parallelepiped or of a hull of at most four points, and the pairs of edges
-// that span its faces. A direction is off by at most 4 roundings of itself.
+// Edges of a parallelepiped or of a hull of at most four points, and the pairs of edges that span
+// its faces. The relative error of an edge is at most 4 u.
 struct BodyEdges {
   Vec3 edge[6];
-  int ends[6][2];  // the vertices between which it runs
+  int ends[6][2];  // the vertices at the ends of each edge
   int edges = 0, faces = 0;
   int face[4][2];
   bool parallel = false;  // opposite faces are parallel
@@ -45,22 +45,25 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
   return true;
 }
 
-// Take any unit vector n. A facet's distance from the origin is at least the least height n . y of
-// its vertices y. The top, the largest height of all differences, is the length of a separating
-// translation along n. A normal is computed to an angle of 16 u / s, where s is the sine between
-// its edges. So the facet's vertices are among those within 128 u / s of the size below the top.
-// The depth lies between the least of the lower bounds and the least top. The lower bound requires
-// that the origin is inside: the point nearest to the origin in the nearest facet's plane is then
-// in the facet. The origin is inside if every facet's true plane is above it, for which a top of
-// more than 128 u / s of the size is enough: the top changes by at most the angle times the largest
-// difference, 2 sqrt(3) of the size.
+// Bounds on the depth. Let n be a unit vector, and call n . y the height of a difference y. The
+// largest height of all differences is the top.
+// 1. Upper bound: the top is the length of a translation along n that separates the bodies.
+// 2. Lower bound: the distance of a facet from the origin is at least the least height of its
+//    vertices, for any n. The computed normal of a facet has an angle of at most 16 u / s to the
+//    true one, where s is the sine of the angle between its edges. So the vertices of the facet are
+//    among the differences whose height is at most 128 u / s times the size below the top.
+// 3. If the origin is inside the difference, the point nearest to it in the plane of the nearest
+//    facet is in this facet. The depth is then between the least lower bound and the least top.
+// 4. The origin is inside if it is below the true plane of every facet. A top of more than 128 u /
+//    s times the size is enough for this: turning n to the true normal changes the top by at most
+//    the angle times the largest difference, which is 2 sqrt(3) times the size.
 class FacetDepth {
  public:
   FacetDepth(const Points<double>& a, const Points<double>& b, double size)
       : a_(a), b_(b), size_(size) {}
 
-  // False if rounding leaves the sign uncertain, or the depth by more than `slack`. Sets `apart` if
-  // the bodies are certainly apart.
+  // False if the sign is uncertain or the bounds of the depth differ by more than `slack`. Sets
+  // `apart` if the bodies are certainly apart.
   bool solve(const BodyEdges& ea, const BodyEdges& eb, double slack) {
     for (const BodyEdges* e : {&ea, &eb})
       for (int f = 0; f < e->faces; ++f)
@@ -72,12 +75,13 @@ class FacetDepth {
   }
 
   double way = INFINITY;
-  Vec3 normal{};  // unit, from a to b: b moved by `way` along it only touches
+  Vec3 normal{};  // unit, from a to b; if b moves by `way` along it, the bodies just touch
   bool apart = false;
 
  private:
-  // Edges of two parallelepipeds that are parallel to 2^-49 span no facet after a change of that
-  // share of an edge; the edges of one body add up to 3 of the size.
+  // If two edges of parallelepipeds enclose a sine of at most 2^-49, changing one edge by this
+  // fraction of its length makes them parallel, so that they span no facet. The edges of one body
+  // add up to at most 3 times the size.
   bool consider(const Vec3& x, const Vec3& y, bool may_skip) {
     const Vec3 c = cross(x, y);
     const double length = norm(c), both = norm(x) * norm(y);
@@ -111,7 +115,7 @@ class FacetDepth {
     return true;
   }
 
-  // The height below the top of the vertices that are within `slack` of it.
+  // How far below the top the lowest of the vertices within `slack` of the top is.
   static double spread(const Points<double>& points, const Vec3& n, double slack) {
     const double top = range(points, n).high;
     double most = 0;

@@ -1,8 +1,9 @@
-// First contact of bodies given by vertices. The direction is the best separating axis at time t,
-// and r is its rate of turning. Then all vertices of the touching features have one tangent, and
-// the steps converge quadratically, as Newton's do, but from below. (With r = 0 a turning face
-// tilts away from n and convergence is linear.) For bodies grown by balls, the direction is that of
-// the nearest points of the hulls, and r is the rate at which the features of these points turn.
+// First contact of bodies given by vertices, by conservative advancement (advancement.hpp). The
+// direction n is the best separating axis at time t, and r is the rate at which it turns with the
+// bodies. Then all vertices of the touching features have the same tangent, and the steps converge
+// quadratically from below. (With r = 0 a turning face tilts away from n, and convergence is
+// linear.) For bodies grown by balls, n points along the segment between the nearest points of the
+// hulls, and r is the rate at which this segment turns with the features of its ends.
 #include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
@@ -14,10 +15,11 @@
 namespace tauguard::rigid {
 namespace {
 
-// A limit on the number of steps for a resting gap; the time is still never late. Bodies that pass
-// close by each other take a few steps per radian, so the rotation of both counts.
+// Limits of the number of steps; at the limit the time is still never late. The first one is for a
+// small gap that stays constant. The second one is added per radian of both rotations, because
+// bodies that pass close to each other take a few steps per radian.
 constexpr int most_steps = 20000, steps_a_radian = 64;
-// For rotations below this [rad] a whole turn is not considered.
+// spun_step is tried if the bodies rotate by more than this angle [rad] in all.
 constexpr double little_turn = 4;
 
 struct Axis {
@@ -39,12 +41,13 @@ double most(const std::vector<Vec3>& points, const Vec3& n) {
 
 double rounding(const MovingBody& a, const MovingBody& b) { return a.rounding + b.rounding; }
 
-// Of the surfaces along n, from a to b.
+// The separation of the surfaces along n, from a to b.
 double separation_along(const MovingBody& a, const MovingBody& b, const Vec3& n) {
   return least(b.now, n) - most(a.now, n) - rounding(a, b);
 }
 
-// Tries n and -n, n of length 1; true where one of them is the best so far.
+// Tries the unit vectors n and -n. True if one of them separates the bodies more than `best` and
+// replaces it.
 bool consider(const MovingBody& a, const MovingBody& b, const Vec3& n, Axis* best) {
   double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY;
   for (const Vec3& p : a.now) {
@@ -61,7 +64,8 @@ bool consider(const MovingBody& a, const MovingBody& b, const Vec3& n, Axis* bes
   return true;
 }
 
-// The rate at which the way v between the nearest points of both hulls turns with what they lie on.
+// The rate of change of v / |v|, where v is the vector between the nearest points of the hulls and
+// moves with the features that these points are on.
 Vec3 feature_rate(const MovingBody& a, const MovingBody& b, const Nearest& near, const Vec3& v) {
   Vec3 w[3], u[3];
   for (int i = 0; i < near.size; ++i) {
@@ -73,9 +77,9 @@ Vec3 feature_rate(const MovingBody& a, const MovingBody& b, const Nearest& near,
   const double length = std::sqrt(square);
   if (near.size == 1) return (1 / length) * across(u[0]);
   const Vec3 e = w[1] - w[0], f = u[1] - u[0];
-  if (near.size == 2) {  // v stays across the edge e
-    const double ee = dot(e, e), share = -dot(w[0], e) / ee;
-    const Vec3 moved = u[0] + share * f;
+  if (near.size == 2) {  // v stays perpendicular to the edge e
+    const double ee = dot(e, e), fraction = -dot(w[0], e) / ee;
+    const Vec3 moved = u[0] + fraction * f;
     return (1 / length) * across(moved - ((dot(moved, e) + dot(v, f)) / ee) * e);
   }
   const Vec3 g = w[2] - w[0], h = u[2] - u[0], c = cross(e, g);
@@ -133,7 +137,7 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
 
 double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis, double margin,
                       double left) {
-  // The tangent of the direction is useful only until it has turned by a radian.
+  // n + h r is a useful direction only up to a rotation of about a radian.
   const double rate = norm(axis.rate), horizon = rate * left > 1 ? 1 / rate : left;
   const Turning direction{axis.n, axis.rate, rate * (1 + 0x1p-40)};
   const SeparationBound<MovingBody> g(a, b, direction, horizon, margin + rounding(a, b),
@@ -141,9 +145,9 @@ double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis
   return safe_step(g, axis.separation - margin, horizon, 1e-6);
 }
 
-// The longest step during which one fixed direction separates the bodies, whatever their angles;
-// `axis` becomes that direction. Bodies that turn fast and pass by each other need only a few such
-// steps, while their true surfaces need a step for each radian.
+// The longest step during which one fixed direction separates the bodies, whatever their rotation;
+// `axis` becomes this direction. Bodies that rotate fast and pass each other need only a few such
+// steps, while certified_step needs at least one per radian.
 double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
   const Vec3 between = b.centre() - a.centre(), drift = b.linear() - a.linear();
   const auto across = [](const Vec3& v, const Vec3& n) { return v - dot(v, n) * n; };
@@ -172,10 +176,10 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
   return longest;
 }
 
-// The direction of contact: the last certain axis, turned by `h`, if it separates the bodies as
-// well as the best axis now; otherwise that axis. The turned axis is right to second order in h. It
-// is needed for flat bodies in one plane, because a normal of that plane separates them by zero,
-// too.
+// The direction of contact. It is the last certain axis, turned for the time h, if this separates
+// the bodies as well as the present best axis, and otherwise the best axis. The error of the turned
+// axis is of second order in h. It is needed for flat bodies in a common plane: the normal of this
+// plane separates them by zero, as their contact normal does.
 Vec3 contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
                     const Axis& now) {
   if (last.separation > -INFINITY) {
@@ -189,12 +193,12 @@ Vec3 contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, 
 }  // namespace
 
 Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
-  // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`, once for
-  // each body, and again in the tangents; 128 covers both.
+  // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`. Separations
+  // and tangents both contain projections of both bodies; 128 covers them.
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
   double t, before = start;
-  Axis axis, last;  // of time t; of time `before`, certainly separating: at contact itself rounding
-                    // may leave no direction
+  Axis axis;  // at time t
+  Axis last;  // at time `before`, where it certainly separates; at contact this is not certain
   const double turning = (a.angular_speed() + b.angular_speed()) * (end - start);
   const double limit = most_steps + steps_a_radian * std::min(turning, 1e6);
   const auto close = [&](double) {
@@ -204,7 +208,7 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
   };
   const auto certified = [&](double left) {
     double h = certified_step(a, b, axis, margin, left);
-    if (h < left && rounding(a, b) > 0) {  // the nearest features may be about to change
+    if (h < left && rounding(a, b) > 0) {  // a fixed axis is better if the features soon change
       Axis still = axis;
       still.rate = {};
       const double longer = certified_step(a, b, still, margin, left);

@@ -8,11 +8,11 @@
 namespace tauguard::rigid {
 namespace {
 
-// Radii below this fraction of the size give no direction between the cores. A contact is accurate
-// to 1e-9 of the size, so the direction would be off by 1e-3 or more.
+// If the radii are below this fraction of the size, the normal is not taken from the segment
+// between the cores: contacts are accurate to 1e-9 of the size, directions to 1e-3.
 constexpr double small_radii = 1e-6;
 
-// A common point of overlapping grown bodies: on the segment between their cores' nearest points.
+// A common point of overlapping grown bodies, on the segment between their cores.
 Vec3 common_point(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
   const Vec3 way = near.b - near.a;
@@ -36,7 +36,7 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
   const bool along = norm(impact.normal) > 0 && bottom - top - rounding >= -tolerance;
   Vec3 point;
   if (!along || (rounding > 0 && rounding < small_radii * (a.radius() + b.radius()))) {
-    point = common_point(a, b);  // the features that touch are not known
+    point = common_point(a, b);  // the touching features are not known
   } else {
     point = contact_point(a.now, b.now, impact.normal, tolerance);
     if (rounding > 0) point = point + 0.5 * (a.rounding - b.rounding) * impact.normal;
@@ -51,8 +51,8 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
                          double rounding_b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b) {
-  // Positions are relative to a's first vertex at the start, so that scenes far from the origin
-  // lose no accuracy.
+  // Positions are relative to the first vertex of a at the start, so that scenes far from the world
+  // origin lose no accuracy.
   const double* p = a.row(row);
   const Vec3 origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
   MovingBody x = moving_body(a, row, motion_a, origin), y = moving_body(b, row, motion_b, origin);

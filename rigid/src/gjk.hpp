@@ -1,6 +1,6 @@
-// Finds the point of a convex set of differences b - a that is nearest to the origin (Gilbert,
-// Johnson and Keerthi 1988). `Source` tells what a difference is made of: a row of each vertex
-// list, or a point of each shape.
+// The point of a convex set of differences b - a that is nearest to the origin (Gilbert, Johnson
+// and Keerthi 1988). `Source` identifies the two points of a difference: a row of each vertex list,
+// or a point of each shape.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@ struct Corner {
   double weight;
 };
 
-// The weights of the point nearest to the origin in the affine hull of *c[0..m). False if the
-// corners are dependent or the point lies outside their simplex.
+// The weights of the point nearest to the origin in the affine hull of the corners c[0], ...,
+// c[m - 1]. False if the corners are affinely dependent or the point is outside their simplex.
 template <class Source>
 bool weigh(const Corner<Source>* const* c, int m, double* l) {
   l[0] = 1;
@@ -58,8 +58,8 @@ class Simplex {
   bool holds(const Vec3& w) const {
     return std::any_of(c_, c_ + m_, [&](const Corner<Source>& c) { return c.w == w; });
   }
-  // Adds a corner and keeps the face nearest to the origin among those that contain the corner. If
-  // that face is no nearer than before, nothing changes and the result is false.
+  // Adds a corner and reduces the simplex to the face nearest to the origin among those with this
+  // corner. If that face is no nearer than the simplex, nothing changes; returns false.
   bool add(const Corner<Source>& next) {
     c_[m_] = next;
     double best = dot(nearest_, nearest_), weight[4] = {};
@@ -71,7 +71,7 @@ class Simplex {
       for (int i = 0; i <= m_; ++i)
         if (mask >> i & 1) face[size++] = &c_[i];
       if (!weigh(face, size, l)) continue;
-      Vec3 p = face[0]->w;  // a sum of offsets; a sum of weighted corners would cancel
+      Vec3 p = face[0]->w;  // sum of offsets: less cancellation than a sum of weighted corners
       for (int i = 1; i < size; ++i) p += l[i] * (face[i]->w - face[0]->w);
       if (dot(p, p) < best)
         best = dot(p, p), kept = mask, nearest_ = p, std::copy(l, l + size, weight);
@@ -90,10 +90,10 @@ class Simplex {
   Vec3 nearest_;
 };
 
-// Descends from a first corner until the nearest point is found or rounding stops it. `support(v)`
-// is the corner furthest along -v. `watch` is called before each step (visit), to end the descent
-// (enough), and if a corner brings nothing nearer (stuck). A simplex of four corners contains the
-// origin.
+// Descends from a first corner until the nearest point is found or rounding prevents progress.
+// support(v) is the corner furthest along -v. The descent calls watch.visit before each step,
+// watch.enough to decide whether to end, and watch.stuck if a new corner brings the simplex no
+// nearer. A simplex of four corners contains the origin.
 template <class Source, class Support, class Watch>
 Simplex<Source> descend(const Corner<Source>& first, const Support& support, Watch& watch,
                         double square_of_zero) {

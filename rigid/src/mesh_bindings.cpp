@@ -1,5 +1,4 @@
-// tauguard.rigid._rigid_mesh: meshes and their queries over batches of poses. Arguments are checked
-// in Python.
+// tauguard.rigid._rigid_mesh: queries of meshes for batches of poses. Python checks arguments.
 #include <nanobind/stl/string.h>
 
 #include "bodies_binding.hpp"
@@ -26,8 +25,8 @@ auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
   return nb::ndarray<nb::numpy, T>(held->data(), N, shape.data(), owner);
 }
 
-// All contacts of every pose. A contact is one row of each of two arrays: (pose, face of a, face of
-// b) and (point, normal, depth).
+// All contacts of every pose. A contact is a row (pose, face of a, face of b) of the first array
+// and a row (point, normal, depth) of the second.
 using Rows = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
                        nb::ndarray<nb::numpy, double, nb::shape<-1, 7>>>;
 Rows contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
@@ -106,7 +105,7 @@ NB_MODULE(_rigid_mesh, m) {
       .def("contacts", &contacts, "other"_a, "poses"_a, "limit"_a, "threads"_a)
       .def("time_of_impact", &impact_of_meshes, "other"_a, "pose_a"_a, "linear_a"_a, "angular_a"_a,
            "pose_b"_a, "linear_b"_a, "angular_b"_a, "out"_a, "faces"_a, "threads"_a);
-  // Row by row, for tests of the exact answer.
+  // Exact overlap of pairs of triangles, for tests.
   m.def(
       "triangles_overlap",
       [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,

@@ -10,8 +10,7 @@ Bodies row_of(const Bodies& b, std::size_t row, std::int64_t* offsets) {
   return {b.kind, b.row(row), offsets, 1};
 }
 
-// The unit vector across the unit u that is nearest to x; any unit vector across u if x is parallel
-// to u.
+// The unit vector perpendicular to the unit u that is nearest to x; any one if x is parallel to u.
 Vec3 across(const Vec3& x, const Vec3& u) {
   const Vec3 y = x - dot(x, u) * u;
   if (norm(y) > 1e-6 * norm(x)) return (1 / norm(y)) * y;
@@ -24,8 +23,10 @@ Vec3 across(const Vec3& x, const Vec3& u) {
 
 }  // namespace
 
-// Axes of a box around the body: the edges of a box; otherwise the direction to the farthest
-// vertex, and that to the vertex farthest from this line.
+// Axes of an oriented box around the body. The first axis points from the first vertex to the
+// farthest one; the second is perpendicular to it, towards the vertex farthest from this line. For
+// boxes and parallelepipeds only the ends of the first vertex's edges are considered, so the axes
+// of a box are those of its edges.
 std::array<Vec3, 3> RoundedBody::axes() const {
   const bool block = bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds;
   Vec3 far{}, wide{};
@@ -66,7 +67,7 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
   for (const Vec3& p : points) {
     for (const double x : p) extent.magnitude = std::max(extent.magnitude, std::fabs(x) + rounding);
     extent.radius = std::max(extent.radius, norm(p - extent.centre) + rounding);
-    // About the centre as computed, along axes that are orthonormal to the rounding of a float.
+    // The rounded centre and axes (rounded to float) are used, so that the box contains the body.
     for (int i = 0; i < 3; ++i) {
       const Vec3 n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
       half[i] = std::max(half[i], std::fabs(dot(n, p - extent.centre)));
@@ -82,9 +83,9 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
 
 namespace {
 
-// Depth first through the children whose boxes may come within the margin of the body's, the one
-// with the nearest centre first, until visit(triangle in leaf order) returns true. `margin` may
-// shrink on the way.
+// Calls visit(triangle in leaf order), until it returns true, for all triangles in leaves whose box
+// may be within `margin` of the body's box. The traversal is depth first, nearest centre first.
+// `visit` may reduce `margin`.
 template <class Visit>
 void each_near(const Mesh& mesh, const RoundedBody& body, const double& margin, Visit visit) {
   const Tree& tree = mesh.tree;
@@ -184,7 +185,7 @@ FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body) {
 
 namespace {
 
-// The mesh is at rest in its own frame, the body moves along the chord of each piece.
+// Seen from the mesh, the body moves along a chord in each piece of the step (mesh_pieces.hpp).
 class MeshBodyImpact {
  public:
   MeshBodyImpact(const Mesh& mesh, const RoundedBody& body, const RigidMotion& of_mesh,
@@ -213,7 +214,7 @@ class MeshBodyImpact {
     float enter;
   };
 
-  // Depth first, the child that may be touched first on top.
+  // Traverses depth first: the child with the earliest possible contact is on top of the stack.
   void traverse_piece() {
     const MovingObb box = moving(body_.box, pieces_.in_a());
     std::vector<Open> stack = {{0, 0.0f}};
@@ -241,7 +242,7 @@ class MeshBodyImpact {
     }
   }
 
-  // Both are certainly apart before `start`.
+  // Tests triangle i. It is certainly apart from the body before `start`.
   void touch(int i, double start) {
     const double end = std::min(until_, pieces_.end());
     if (start > end) return;

@@ -1,5 +1,5 @@
-// Overlap, distance and first contact of one mesh and one convex body, which may be grown by a
-// ball. The mesh is its surface, not the volume inside; the body is solid.
+// Overlap, distance and first contact of a mesh and a convex body, which may be grown by a ball.
+// The mesh is a surface without inside; the body is solid.
 #pragma once
 
 #include "first_touch.hpp"
@@ -8,8 +8,7 @@
 
 namespace tauguard::rigid {
 
-// A row of a batch in its own frame, and an oriented box around it, relative to the extent's
-// centre.
+// The body of one row of a batch, and an oriented box around it, relative to `extent.centre`.
 class RoundedBody {
  public:
   RoundedBody(const Bodies& bodies, std::size_t row, double rounding);
@@ -27,19 +26,18 @@ class RoundedBody {
   std::int64_t offsets_[2];
 };
 
-// A triangle (row of the faces) that shares a point with the body; touching counts. -1 if there is
-// none.
+// A triangle (row of the faces) that shares a point with the body, or -1. Touching counts.
 std::int32_t first_overlap(const Mesh& mesh, const RoundedBody& body);
 
-// The least signed distance of a triangle of the mesh (a) to the body (b), and the first triangle
-// with that distance. If mesh and body meet, this is the triangle deepest in the body.
+// The least signed distance of a triangle of the mesh (a) from the body (b), and the first triangle
+// with this distance. If mesh and body overlap, it is the triangle that is deepest in the body.
 struct FaceDistance {
   SignedDistance at;
   std::int32_t face;
 };
 FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body);
 
-// `face` receives the triangle that is touched first, or -1.
+// `face` receives the triangle that the body touches first, or -1.
 FirstTouch mesh_body_impact(const Mesh& mesh, const RoundedBody& body, const RigidMotion& of_mesh,
                             const RigidMotion& of_body, std::int32_t* face);
 

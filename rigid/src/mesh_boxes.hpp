@@ -1,20 +1,19 @@
-// Boxes of one tree against a box of the other, under a pose: the separating-axis test, eight boxes
-// at a time (Gottschalk, Lin and Manocha 1996). All boxes of a tree share one rotation. Boxes that
-// meet are never called clear.
+// Separating-axis test of eight boxes of one tree against a box of another, under a pose
+// (Gottschalk, Lin and Manocha 1996). All boxes of a tree have the same axes. Boxes that overlap
+// are never reported as apart.
 #pragma once
 
 #include "mesh_tree.hpp"
 
 namespace tauguard::rigid {
 
-// The pose of one tree's centred frame in another's, in float, with the pad that covers all
-// rounding.
+// The pose of one tree's centred frame in another's, in float, and a pad that covers rounding.
 struct Relative {
   float r[3][3], abs_r[3][3], t[3], pad;
 };
 
-// A pose as given: x -> R x + t, with products summed from left to right. This expression, in
-// doubles, defines the corner of a posed triangle; every exact answer is about these doubles.
+// A pose as given: x -> R x + t, with products summed from left to right. Its value in doubles is
+// by definition the corner of a posed triangle: exact answers hold for these corners.
 struct Pose {
   double r[3][3], t[3];
   explicit Pose(const double* m) {
@@ -39,14 +38,15 @@ struct Placement {
   Relative b_in_a, a_in_b;
   bool apart;  // the bounding balls do not meet
 
-  // The pad. With S the sum of both radii (every centred coordinate is at most 2 S once the balls
-  // meet), a float test of two boxes makes fewer than 60 roundings of values at most 6 S, counting
-  // those behind oriented boxes' axes (12 in an entry of the relative rotation, which multiplies
-  // lengths of at most 4 S): 2^-24 * 2^8 S covers them, and 2^-140 those below the normal range.
-  // The doubles behind them (centres, transformed corners) err by at most 16 * 2^-53 of the largest
-  // magnitude in play. R is within `skew` of orthonormal in every entry of R^T R - I, and R^T
-  // stands for its inverse: 6 * skew * S covers a vector of length 2 S whose three coordinates each
-  // meet three entries.
+  // The pad covers the errors of a test of two boxes. Let S be the sum of the radii of both trees'
+  // bounding balls. If the balls meet, centred coordinates are at most 2 S.
+  // * Float: a test has fewer than 60 roundings of values of at most 6 S. This includes 12 in an
+  //   entry of the relative rotation of oriented boxes, which multiplies lengths of at most 4 S.
+  //   2^-24 * 2^8 S covers them, and 2^-140 covers roundings of subnormal numbers.
+  // * Double: centres and transformed corners have errors of at most 16 * 2^-53 times the largest
+  //   magnitude that enters them.
+  // * Rotation: R^T is used as the inverse of R. If entries of R^T R - I are at most `skew`, the
+  //   error in a vector of length 2 S is at most 6 * skew * S.
   Placement(const Tree& a, const Tree& b, const Pose& pose, double margin = 0) {
     double t[3], skew = 0, square = 0, largest = a.magnitude;
     for (int i = 0; i < 3; ++i) {
@@ -80,7 +80,7 @@ struct Placement {
 };
 
 // Sets bit s if the box of child s of `node` may meet `box`. `rel` is the pose of the frame of
-// `box` in that of the node. `distance2` receives the squared distances of the centres.
+// `box` in the frame of `node`. `distance2` receives the squared distances of the centres.
 unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel, float* distance2);
 
 }  // namespace tauguard::rigid

@@ -1,6 +1,6 @@
-// Building a Tree: the range with the most triangles is split until a node has its eight children.
-// A split takes the cheapest of 15 planes across the longest axis of the centres by the
-// surface-area heuristic.
+// Builds a Tree. To get a node's eight children, the range with the most triangles is split
+// repeatedly. A split uses the best of 15 planes perpendicular to the longest axis of the
+// triangles' centres, by the surface-area heuristic.
 #include <algorithm>
 #include <cstring>
 
@@ -122,8 +122,8 @@ std::int32_t Tree::build(Range all) {
   return index;
 }
 
-// Reorders items [begin, end) around a plane and returns the first item behind it; both sides
-// non-empty.
+// Reorders items [begin, end) by the side of a plane that they are on. Returns the first item of
+// the second side; neither side is empty.
 std::int32_t Tree::split(Range r) {
   geometry::poll_interrupt();
   FloatBox middles;
@@ -142,7 +142,7 @@ std::int32_t Tree::split(Range r) {
   };
   const int bins = r.count() < 4 * most_bins ? most_bins / 2 : most_bins;
   const float scale = static_cast<float>(bins) * 0.9999f / (hi[axis] - lo[axis]), origin = lo[axis];
-  if (!std::isfinite(scale) || r.count() <= 4) {  // no extent, or too little for a quotient
+  if (!std::isfinite(scale) || r.count() <= 4) {  // all centres (nearly) equal, or few items
     std::nth_element(first + r.begin, first + half, first + r.end, less);
     return half;
   }

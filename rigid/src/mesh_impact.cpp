@@ -106,7 +106,7 @@ class MeshImpact {
     MovingBody x = triangle_a(i), y = triangle_b(j);
     const Impact impact = first_contact(x, y, start, end);
     if (!impact.hit) return;
-    // Ties are broken by index, so that the answer is unique.
+    // The pair of least indices is chosen among ties, so that the answer is unique.
     const bool tie = found_.a >= 0 && impact.t == found_.t;
     if (tie && (i > found_.a || (i == found_.a && j > found_.b))) return;
     found_ = {impact.t, i, j, impact.normal};

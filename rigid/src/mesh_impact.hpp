@@ -6,8 +6,7 @@
 
 namespace tauguard::rigid {
 
-// `faces` receives the triangles that touch first, or {-1, -1}. Meshes are their surfaces, not the
-// volumes inside.
+// `faces` receives the triangles that touch first, or {-1, -1}. Meshes are surfaces without inside.
 FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b, FacePair* faces);
 

@@ -1,12 +1,12 @@
-// Oriented boxes of a tree's children, eight side by side in float: one vector instruction works on
-// all eight, each with axes of its own (Gottschalk, Lin and Manocha 1996).
+// Oriented boxes of a node's eight children, in float (Gottschalk, Lin and Manocha 1996). They are
+// stored side by side, so that one vector instruction handles all eight. Each box has its own axes.
 #pragma once
 
 #include "mesh_traverse.hpp"
 
 namespace tauguard::rigid {
 
-// One child's box in its tree's centred frame; `axis` has the directions as rows.
+// One child's box in its tree's centred frame. The rows of `axis` are the directions of the box.
 struct FloatObb {
   float axis[3][3], centre[3], extent[3];
   float size() const { return extent[0] + extent[1] + extent[2]; }
@@ -21,7 +21,7 @@ struct alignas(32) ObbNode {
 };
 
 struct ObbTree {
-  std::vector<ObbNode> nodes;  // as the tree's
+  std::vector<ObbNode> nodes;  // one per node of the tree
   FloatObb root;               // the whole mesh
   FloatObb box(const Slot& s) const { return s.node < 0 ? root : nodes[s.node][s.slot]; }
   float size(const Slot& s) const {
@@ -31,8 +31,9 @@ struct ObbTree {
   }
 };
 
-// Axes are the principal ones of the surface's second moments, which are summed from the leaves up;
-// a leaf takes its normal and its longest edge. Extents are those of all corners along the axes.
+// The axes of a box are the principal axes of the second moments of its surface, which are summed
+// from the leaves up. For a leaf they come from its normal and longest edge. All corners are
+// inside.
 ObbTree fit_obbs(const Tree& tree);
 
 // Sets bit s if child s of `node` may meet `box`, which is in the node's frame.

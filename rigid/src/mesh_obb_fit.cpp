@@ -1,4 +1,4 @@
-// Fitting the oriented boxes of a whole tree in one backward pass over its nodes.
+// Fits the oriented boxes of a tree in one backward pass over its nodes.
 #include <algorithm>
 
 #include "mesh_obb.hpp"
@@ -10,9 +10,8 @@ namespace tauguard::rigid {
 using namespace geometry;  // lanes.hpp
 namespace {
 
-// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T with
-// constant factors. The factors are the same for every triangle, so sums of moments are those of
-// the union.
+// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T times
+// constant factors. The factors are the same for all triangles, so moments of a union are sums.
 struct Moments {
   double weight = 0, first[3] = {}, second[6] = {};  // second: xx, xy, xz, yy, yz, zz
   void add(const Moments& o) {
@@ -22,8 +21,7 @@ struct Moments {
   }
 };
 
-// The corners of all triangles in leaf order, relative to the tree's centre, in one array for each
-// coordinate.
+// The corners of all triangles in leaf order, relative to the tree's centre, by coordinate.
 struct Corners {
   std::vector<float> x[3];
   explicit Corners(const Tree& tree) {
@@ -50,7 +48,7 @@ TAUGUARD_CLONES Span span_wide(const float* x, const float* y, const float* z, s
   Float8 lo[3], hi[3];
   for (int i = 0; i < 3; ++i) lo[i] = (Float8){} + INFINITY, hi[i] = (Float8){} - INFINITY;
   for (std::size_t at = 0; at < count; at += 8) {
-    const std::size_t from = std::min(at, count - 8);  // the last eight overlap those before
+    const std::size_t from = std::min(at, count - 8);  // the last eight may repeat earlier corners
     Float8 p[3];
     std::memcpy(&p[0], x + from, sizeof p[0]);
     std::memcpy(&p[1], y + from, sizeof p[1]);
@@ -84,7 +82,7 @@ Span span(const Corners& c, const Run& run, const float axis[3][3]) {
   return out;
 }
 
-// Fills in centre and extents for the axes that `box` has.
+// Sets centre and extents of `box` for its axes.
 void bound(const Corners& corners, const Run& run, FloatObb* box) {
   const Span s = span(corners, run, box->axis);
   for (int k = 0; k < 3; ++k) {
@@ -103,7 +101,7 @@ void cross(const double* a, const double* b, double* out) {
   out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-// Axes from a normal and a direction across it; the coordinate axes if one of them is zero.
+// Sets the axes from a normal and a second direction. Coordinate axes are used if one is zero.
 void set_axes(const double* normal, const double* along, FloatObb* box) {
   const double nn = dot(normal, normal), part = dot(along, normal) / nn;
   const double flat[3] = {along[0] - part * normal[0], along[1] - part * normal[1],
@@ -121,7 +119,7 @@ void set_axes(const double* normal, const double* along, FloatObb* box) {
   }
 }
 
-// The moments of triangles [begin, end) and the axes of the box of a leaf that holds them.
+// The moments of the triangles of a leaf. Also sets the axes of its box.
 Moments leaf_moments(const Tree& tree, const Run& run, FloatObb* box) {
   Moments sum;
   double normal[3] = {}, longest[3] = {}, square = 0;
@@ -138,7 +136,8 @@ Moments leaf_moments(const Tree& tree, const Run& run, FloatObb* box) {
     const double sign = dot(n, normal) < 0 ? -1 : 1, weight = std::sqrt(dot(n, n));
     double q[3];
     for (int k = 0; k < 3; ++k) normal[k] += sign * n[k], q[k] = p[0][k] + p[1][k] + p[2][k];
-    // The integral of x x^T over a triangle: area / 12 (9 m m^T + sum p p^T), m its centroid q / 3.
+    // The integral of x x^T over a triangle is area / 12 (9 m m^T + sum p p^T), where p are its
+    // corners and m = q / 3 is its centroid.
     Moments m;
     m.weight = weight;
     for (int k = 0; k < 3; ++k) m.first[k] = weight / 3 * q[k];
@@ -153,7 +152,7 @@ Moments leaf_moments(const Tree& tree, const Run& run, FloatObb* box) {
   return sum;
 }
 
-// The principal axes of the surface with these moments.
+// Sets the axes of `box` to the principal axes of the surface with these moments.
 void principal_axes(const Moments& m, FloatObb* box) {
   double spread[3][3], axis[3][3];
   const double w = m.weight > 0 ? 1 / m.weight : 0;
@@ -174,7 +173,7 @@ ObbTree fit_obbs(const Tree& tree) {
   out.nodes.resize(tree.nodes.size());
   std::vector<Moments> moments(tree.nodes.size());
   std::vector<Run> run(tree.nodes.size());
-  // Children come after their parents, so a backward pass knows every child's moments and run.
+  // Children come after their parents, so a backward pass knows every child.
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     const Node& node = tree.nodes[n];
     run[n] = {std::numeric_limits<std::int32_t>::max(), 0};

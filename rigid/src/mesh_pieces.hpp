@@ -1,5 +1,5 @@
-// Divides the step of two moving bodies into pieces so short that they hardly turn. In each piece
-// one body moves along a chord in the frame of the other.
+// Divides the step of two moving bodies into pieces that are short enough for little rotation. In a
+// piece, the path of a point of one body in the frame of the other is approximated by its chord.
 #pragma once
 
 #include <algorithm>
@@ -30,40 +30,40 @@ class Pieces {
     const double skew = skewness(ma) + skewness(mb);
     const double largest =
         a.magnitude + b.magnitude + norm(ma.x0) + norm(mb.x0) + norm(ma.linear) + norm(mb.linear);
-    // The bounds of Placement (mesh_boxes.hpp), here for two rotations and the rounding of angles.
+    // The rounding bounds of Placement (mesh_boxes.hpp), for two rotations and rounded angles.
     coarse_ = 0x1p-16 + 12 * skew;
     fine_ = 0x1p-44 + 12 * skew;
     shift_ = 0x1p-44 * (largest + (ma.speed * arm_a + mb.speed * arm_b)) + 0x1p-140;
   }
 
-  // Calls open() for every piece in which the bodies may meet, in order, until a piece begins after
-  // `until`. open() may lower `until`, so the piece of the first hit is the last one opened.
+  // Calls open(), in order of time, for every piece in which the bodies may meet and that begins
+  // before `until`. open() may lower `until` to the time of the first hit.
   template <class Open>
   void each(const double& until, Open open) {
     piece(0, 1, until, open);
   }
 
-  // The start of the open piece.
+  // The open piece is the one for which open() is being called.
   double begin() const { return begin_; }
   double end() const { return begin_ + length_; }
   double length() const { return length_; }
   const Chord& in_a() const { return in_a_; }
   const Chord& in_b() const { return in_b_; }
-  // The fraction of the piece, rounded up, after which contacts do not matter.
+  // The fraction of the open piece at the time `until`, rounded up; at most 1.
   float left(double until) const {
     if (until >= end()) return 1.0f;
     return std::nextafter(static_cast<float>((until - begin_) / length_), 2.0f);
   }
 
-  // A point near both, from which positions are measured.
+  // A point near both bodies, to which positions are relative.
   const Vec3& origin() const { return origin_; }
   const RigidMotion& motion_a() const { return ma_; }
   const RigidMotion& motion_b() const { return mb_; }
 
  private:
   static constexpr double more = 1 + 0x1p-40;
-  // A piece turns by at most this angle [rad] and moves by at most this fraction of the bodies'
-  // size. Longer ones are split, unless the balls around the bodies stay apart.
+  // A piece is halved if the bodies rotate more than most_turn [rad] in all, or if points move more
+  // than most_move times the sum of the radii, unless the balls around the bodies stay apart.
   static constexpr double most_turn = 1.0 / 16, most_move = 0.5;
 
   static double skewness(const RigidMotion& m) {
@@ -74,7 +74,7 @@ class Pieces {
     return skew;
   }
 
-  // Distance of the centres.
+  // Distance of the centres of the balls.
   double apart(double t) const {
     const Place at_a = place_at(ma_, t), at_b = place_at(mb_, t);
     return norm(at_b(b_.centre) - at_a(a_.centre));
@@ -89,7 +89,7 @@ class Pieces {
     if (gap > (both + 0.5 * length * speed_ + slack) * more) return;
     const bool short_enough =
         (ma_.speed + mb_.speed) * length <= most_turn && speed_ * length <= most_move * both;
-    // The ends of a piece below 2^-50 of the step hardly differ in double precision.
+    // Pieces shorter than 2^-50 are not halved: their ends hardly differ in double precision.
     if (short_enough || length < 0x1p-50) {
       place(begin, length, both);
       open();
@@ -114,10 +114,11 @@ class Pieces {
          reach);
   }
 
-  // The motion of `moved` in the frame of `at`, both relative to their centres. Take a frame that
-  // turns at w, and in it a point at x that turns at v with radius `arm` about an origin of
-  // velocity `drift`. Its acceleration is at most v^2 arm + 2 w (drift + v arm) + w^2 |x|. Over a
-  // time h its path leaves the chord by at most an eighth of that, times h^2.
+  // The motion of `moved` in the frame of `at`, both relative to their centres. Let the frame
+  // rotate at the rate w, and let x be a point in it that rotates at the rate v, with radius `arm`,
+  // about an origin of velocity `drift`. The acceleration of the point in the frame is at most
+  //   v^2 arm + 2 w (drift + v arm) + w^2 |x|.
+  // During a time h, the distance of its path from the chord is at most h^2 / 8 times this bound.
   void fill(Chord& chord, const Place* at, const Place* moved, const Vec3& centre,
             const Vec3& moved_centre, double v, double w, double arm, double far, double reach) {
     Place* out[3] = {&chord.start, &chord.middle, &chord.end};
@@ -138,8 +139,10 @@ class Pieces {
   const Extent a_, b_;
   const RigidMotion &ma_, &mb_;
   const Vec3 origin_;
-  double drift_, speed_;  // bounds on the relative speed of the origins and of any two points
-  double coarse_, fine_, shift_;   // rounding: two fractions of a length, and a length
+  double drift_;                   // bound on the relative speed of the origins
+  double speed_;                   // bound on the relative speed of any two points
+  double coarse_, fine_;           // relative rounding errors in float and in double
+  double shift_;                   // absolute rounding error
   double begin_ = 0, length_ = 1;  // the piece that is open
   Chord in_a_, in_b_;
 };

@@ -27,8 +27,8 @@ void edge(const Triangle& t, int i, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = t.v[(i + 1) % 3][k] - t.v[i][k];
 }
 
-// Finds the shorter motion of b along +axis or -axis that separates the intervals, and keeps the
-// least depth over all axes.
+// Finds the shorter translation of b along +axis or -axis that separates the projections, and
+// keeps it in `c` if it is the shortest over all axes so far.
 void separate(const Triangle& a, const Triangle& b, const double* axis, double size, Contact& c) {
   const double length = std::sqrt(dot(axis, axis));
   if (!(length > size)) return;
@@ -49,9 +49,8 @@ void separate(const Triangle& a, const Triangle& b, const double* axis, double s
   for (int k = 0; k < 3; ++k) c.normal[k] = sign * axis[k] / length;
 }
 
-// The mean of the points where edges of one triangle pierce the other, which is the middle of the
-// common segment in general position. If no edge pierces (coplanar or degenerate triangles), the
-// corners nearest to the middle of both triangles are used.
+// The mean of the points where edges of one triangle pierce the other. In general position it is
+// the middle of the common segment.
 void common_point(const Triangle& a, const Triangle& b, double* point) {
   double sum[3] = {}, lo[3] = {}, n = 0;
   for (int side = 0; side < 2; ++side) {
@@ -73,7 +72,7 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
     for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
     return;
   }
-  // Coplanar triangles or triangles that touch at an edge: the middle of the overlap of both boxes.
+  // No edge pierces (coplanar triangles, touching edges): the middle of the overlap of the boxes.
   for (int k = 0; k < 3; ++k) {
     lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
                      std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));
@@ -91,15 +90,15 @@ Contact describe(const Triangle& a, const Triangle& b) {
     edge(a, i, ea[i]), edge(b, i, eb[i]);
     longest = std::max({longest, dot(ea[i], ea[i]), dot(eb[i], eb[i])});
   }
-  // Such a small cross product has no reliable direction: its rounding error is about 2^-52 of the
-  // edges' product.
+  // The direction of a smaller cross product is not reliable: its rounding error is about 2^-52
+  // times the product of the edges.
   const double size = 0x1p-40 * longest;
   cross(ea[0], ea[1], na), cross(eb[0], eb[1], nb);
   separate(a, b, na, size, c);
   separate(a, b, nb, size, c);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) cross(ea[i], eb[j], axis), separate(a, b, axis, size, c);
-  if (!(c.depth < INFINITY)) {  // two segments on a line, or points: no axis separates them better
+  if (!(c.depth < INFINITY)) {  // two segments on a line, or points: no axis was reliable
     c.depth = 0;
     c.normal[0] = c.normal[1] = 0, c.normal[2] = 1;
   }

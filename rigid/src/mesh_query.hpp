@@ -1,4 +1,4 @@
-// A mesh with its tree and bounding volumes, and the queries on two of them.
+// A mesh with its tree and bounding volumes, and queries on two meshes.
 #pragma once
 
 #include <atomic>
@@ -37,8 +37,8 @@ struct Mesh {
 // Scratch space of one thread.
 using Scratch = std::vector<SlotPair>;
 
-// Calls leaf(i, j, posed) for every pair of triangles that share a point, until it returns true:
-// triangles i of a and j of b in leaf order, and the posed triangle of b.
+// Calls leaf(i, j, posed), until it returns true, for every pair of triangles that share a point.
+// i and j are the triangles of a and b in leaf order, and `posed` is triangle j under the pose.
 template <class Visit>
 bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Visit visit) {
   const Placement at(a.tree, b.tree, pose);
@@ -73,21 +73,20 @@ struct FacePair {
 };
 FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch);
 
-// A contact of two overlapping triangles: a point on both, the unit normal from a to b, and the
-// distance by which b must move along the normal to leave a.
+// A contact of two overlapping triangles: a common point, the unit normal from a to b, and the
+// length of the translation of b along the normal that separates the triangles.
 struct Contact {
   std::int32_t a, b;  // rows of the faces
   double point[3], normal[3], depth;
 };
-// Limits the number of rows that all threads of a query list together. More rows throw
-// std::length_error.
+// Limits the contacts of a query, over all threads; throws std::length_error above the limit.
 class ContactBudget {
  public:
   explicit ContactBudget(std::size_t most) : most_(most) {}
   void take() {
     if (taken_.fetch_add(1, std::memory_order_relaxed) >= most_)
       throw std::length_error("limit: more than " + std::to_string(most_) +
-                              " pairs of faces meet; raise limit, or ask fewer poses at once");
+                              " pairs of faces meet; raise limit, or pass fewer poses per call");
   }
 
  private:

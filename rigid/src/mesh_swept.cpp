@@ -17,8 +17,8 @@ Place place_at(const RigidMotion& m, double t) {
   return out;
 }
 
-// The box of the middle of the piece, widened for a rotation about its centre by at most `turn` in
-// either direction.
+// The box with the rotation at the middle of the piece. The pad covers rotations by at most
+// `chord.turn` in either direction, and the sagitta.
 MovingObb moving(const FloatObb& box, const Chord& chord) {
   MovingObb out;
   const Vec3 c = {box.centre[0], box.centre[1], box.centre[2]};
@@ -39,9 +39,9 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
   return out;
 }
 
-// As overlap_mask in mesh_obb.cpp, with the time at which each axis stops separating. A motion of
-// less than the pad along an axis is set to the pad, so that quotients are bounded; a second pad
-// covers this change.
+// The test of overlap_mask (mesh_obb.cpp), with the fractions of the chord at which each axis stops
+// and starts separating. If the motion along an axis is smaller than the pad, the quotient is
+// formed with the pad, so that it stays bounded; a second pad covers this change.
 TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
                                     float* enter) {
   const FloatObb& box = m.box;
@@ -53,9 +53,9 @@ TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, flo
   Float8 d[3], v[3], r[3][3], s[3][3], first = (Float8){}, last = (Float8){} + leave;
   const auto axis = [&](const Float8& at, const Float8& speed,
                         const Float8& reach) __attribute__((always_inline)) {
-    const Float8 size = abs(speed), share = 1.0f / (size < pad ? pad : size);
+    const Float8 size = abs(speed), inverse = 1.0f / (size < pad ? pad : size);
     const Float8 toward = speed < 0.0f ? -at : at, bound = reach + 2.0f * pad;
-    const Float8 in = (-bound - toward) * share, out = (bound - toward) * share;
+    const Float8 in = (-bound - toward) * inverse, out = (bound - toward) * inverse;
     first = in > first ? in : first;
     last = out < last ? out : last;
   };
@@ -91,8 +91,8 @@ TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, flo
 
 namespace {
 
-// The fraction of the chord up to which the axis separates b's corners from a's. Every corner's
-// height above a is linear in the fraction, so the first contact is at one of the three roots.
+// The fraction of the chord up to which the axis n separates the corners of b from those of a. The
+// projection of every corner is linear in the fraction, so the first contact is one of three roots.
 double separated_until(const Vec3& n, const Vec3* a, const Vec3* b0, const Vec3* b1, double pad) {
   const double slack = pad * norm(n) * (1 + 0x1p-40);
   double lo = INFINITY, hi = -INFINITY, p[3], q[3], p_lo = INFINITY, p_hi = -INFINITY;

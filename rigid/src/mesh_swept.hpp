@@ -1,6 +1,6 @@
-// Tells how long boxes and triangles of two meshes are certainly apart during a piece of the step
-// so short that they hardly turn. Positions are relative to one of the meshes. A point of the other
-// moves on its chord, with an error of at most the sagitta of its path.
+// For how long boxes and triangles of two meshes are certainly apart in a piece of the step
+// (mesh_pieces.hpp). Positions are in the frame of one of the meshes. A point of the other mesh
+// moves along the chord of its path, with an error of at most the sagitta of the path.
 #pragma once
 
 #include "mesh_query.hpp"
@@ -21,10 +21,10 @@ Place place_at(const RigidMotion& m, double t);
 // One mesh in the other's frame at the start, the middle and the end of a piece of the step.
 struct Chord {
   Place start, middle, end;
-  double sagitta;   // of any point's path, m
+  double sagitta;   // bound on every path's distance from its chord, m
   double turn;      // half of the rotation angle, rad
-  double rounding;  // of positions in double, and of rotations that are only nearly orthonormal, m
-  float float_rounding;  // the same in float
+  double rounding;  // error of positions by rounding and by rotations that are not orthonormal, m
+  float float_rounding;  // the same error in float, m
 };
 
 // A box whose centre moves by `move`.
@@ -34,16 +34,15 @@ struct MovingObb {
 };
 MovingObb moving(const FloatObb& box, const Chord& chord);
 
-// Sets bit s if child s may meet the box before the fraction `leave` of the chord. `enter` receives
-// the fraction up to which they are certainly apart.
+// Sets bit s if child s may meet the box before the fraction `leave` of the chord. `enter`
+// receives, for each child, the fraction up to which it is certainly apart from the box.
 unsigned swept_mask(const ObbNode& node, const MovingObb& moving, float leave, float* enter);
 
-// The fraction of the chord up to which two triangles are certainly apart; inf for all of it. `b0`,
-// `b1`: the other triangle at the chord's ends, in the frame of `a`.
+// The fraction of the chord up to which two triangles are certainly apart; inf for the whole chord.
+// `b0`, `b1`: the second triangle at the ends of the chord, in the frame of `a`.
 double certainly_apart(const Vec3* a, const Vec3* b0, const Vec3* b1, double pad);
 
-// The children of a node as oriented boxes, for every kind of volume of the mesh. The answer may be
-// stored in `scratch`.
+// The children of a node as oriented boxes, for any volume; the result may refer to `scratch`.
 const ObbNode& oriented(const Mesh& mesh, std::int32_t node, ObbNode& scratch);
 FloatObb oriented_box(const Mesh& mesh, const Slot& slot);
 

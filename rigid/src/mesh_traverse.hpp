@@ -1,5 +1,5 @@
-// The one traversal that every mesh query shares: depth first, the larger box opened first, the
-// child whose centre is nearest visited first.
+// The traversal of two trees that all overlap queries use. It is depth first, opens the larger of
+// two boxes, and visits the child with the nearest centre first.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace tauguard::rigid {
 
-// A child of a tree, named by the place of its box. Node -1 means the whole tree.
+// A child of a tree, identified by node and slot. Node -1 means the whole tree.
 struct Slot {
   std::int32_t node, slot;
   Child child(const Tree& t) const { return node < 0 ? 0 : t.nodes[node].child[slot]; }
@@ -35,8 +35,8 @@ struct BoxBounds {
   }
 };
 
-// Calls leaf(child of a, child of b) for every pair of leaves whose bounds may meet, until it
-// returns true. Returns whether it did. `stack` is scratch space, kept between calls.
+// Calls leaf(child of a, child of b), until it returns true, for every pair of leaves whose bounds
+// may meet. Returns whether a call returned true. `stack` is scratch space, kept between calls.
 template <class Bounds, class Leaf>
 bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<SlotPair>& stack,
               Leaf leaf) {
@@ -60,7 +60,7 @@ bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<Sl
       const SlotPair next = open_a ? SlotPair{{ca, s}, pair.b} : SlotPair{pair.a, {cb, s}};
       stack.push_back(next);
     }
-    // Insertion sort: the farthest at the bottom.
+    // Insertion sort, with the nearest on top of the stack.
     const auto distance = [&](const SlotPair& p) { return key[open_a ? p.a.slot : p.b.slot]; };
     for (std::size_t i = base + 1; i < stack.size(); ++i)
       for (std::size_t j = i; j > base && distance(stack[j]) > distance(stack[j - 1]); --j)

@@ -1,6 +1,6 @@
-// A tree over the triangles of one rigid mesh. A node has eight children, whose boxes are stored
-// side by side in float so that one vector instruction tests all eight. Boxes are relative to the
-// tree's centre and rounded outward; a child is an inner node, a leaf of a few triangles, or empty.
+// A tree over the triangles of one rigid mesh. A node has eight children; each is an inner node, a
+// leaf of a few triangles, or empty. Their boxes are stored side by side in float, so that one
+// vector instruction tests all eight. Boxes are relative to the tree's centre and rounded outward.
 #pragma once
 
 #include <array>
@@ -17,10 +17,10 @@ namespace tauguard::rigid {
 
 inline constexpr int width = 8;       // children of a node: one AVX register of floats
 inline constexpr int leaf_size = 4;   // most triangles in a leaf
-inline constexpr int small_leaf = 2;  // at most so many are not split if their node has room
+inline constexpr int small_leaf = 2;  // a range of at most this many triangles is not split
 
-// A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first +
-// count).
+// A child: an inner node (>= 0), or ~(8 first + count) for a leaf with the triangles
+// [first, first + count).
 using Child = std::int32_t;
 inline constexpr Child no_child = std::numeric_limits<Child>::min();
 inline bool is_leaf(Child c) { return c < 0; }
@@ -44,7 +44,7 @@ inline Box box_of(const Node& n, int slot) {
           {n.extent[0][slot], n.extent[1][slot], n.extent[2][slot]}};
 }
 
-// The float box around [lo, hi]; every rounding is outward.
+// A float box around [lo, hi], rounded outward.
 inline Box outward(const double* lo, const double* hi) {
   Box b;
   for (int k = 0; k < 3; ++k) {
@@ -57,14 +57,14 @@ inline Box outward(const double* lo, const double* hi) {
 
 class Tree {
  public:
-  // vertices (n, 3), faces (m, 3), both checked by the caller; m >= 1.
+  // vertices: (n, 3); faces: (n_faces, 3), at least one. The caller has checked both.
   Tree(const double* vertices, const std::int32_t* faces, std::size_t n_faces);
 
   std::vector<Node> nodes;          // nodes[0] is the root
   std::vector<Triangle> triangles;  // in leaf order, as given (not relative to the centre)
   std::vector<std::int32_t> id;     // row of `faces` for each of `triangles`
   double centre[3];
-  double radius;     // of the ball about `centre` that holds the mesh, rounded up
+  double radius;     // of a ball about `centre` that contains the mesh, rounded up
   double magnitude;  // the largest |coordinate| of the mesh
   Box root;          // the whole mesh, relative to the centre
 

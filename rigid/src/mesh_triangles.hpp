@@ -1,9 +1,9 @@
 // Whether two closed triangles share a point. Exact for any finite doubles, also for degenerate
 // triangles (a collinear triangle is a segment, three equal corners are a point).
 //
-// General position is answered by the interval test of Guigue and Devillers ("Fast and robust
-// triangle-triangle overlap test using orientation predicates", 2003); if one orientation is zero,
-// the answer comes from tests of edges against triangles that hold for any position.
+// In general position the interval test of Guigue and Devillers decides ("Fast and robust
+// triangle-triangle overlap test using orientation predicates", 2003). If an orientation is zero,
+// tests of edges against triangles decide, which are valid in any position.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct Triangle {
 
 namespace exact {
 
-// The plane coordinates of p when axis k is dropped.
+// The two coordinates of a point that remain when axis k is dropped.
 struct Flat {
   double p[2];
   Flat(const double* x, int k) : p{x[(k + 1) % 3], x[(k + 2) % 3]} {}
@@ -40,8 +40,8 @@ inline int dropped_axis(const double* a, const double* b, const double* c) {
   return -1;
 }
 
-// Whether p is on the closed segment ab, for collinear a, b, p. On a line, lexicographic order is
-// the order of points.
+// Whether p is on the closed segment ab, for collinear a, b, p. On a line, points are ordered by
+// their coordinates in lexicographic order.
 inline bool between(const double* a, const double* b, const double* p) {
   const bool forward = std::lexicographical_compare(a, a + 3, b, b + 3);
   const double *lo = forward ? a : b, *hi = forward ? b : a;
@@ -64,7 +64,7 @@ inline bool segments_meet(const double* p, const double* q, const double* a, con
   return turn(p, q, a, k) * turn(p, q, b, k) < 0 && turn(a, b, p, k) * turn(a, b, q, k) < 0;
 }
 
-// Whether p is in the proper triangle t of the same plane, seen along axis k.
+// Whether p is in the non-degenerate triangle t, whose plane contains p, seen along axis k.
 inline bool inside_flat(const double* p, const Triangle& t, int k) {
   const int s = turn(t.v[0], t.v[1], t.v[2], k);
   for (int i = 0; i < 3; ++i)
@@ -97,7 +97,7 @@ inline bool segment_meets(const double* p, const double* q, const Triangle& t) {
   return lo == 0 || hi == 0;
 }
 
-// Two closed triangles meet exactly where an edge of one meets the other.
+// Two closed triangles meet if and only if an edge of one meets the other.
 inline bool triangles_meet(const Triangle& a, const Triangle& b) {
   for (int i = 0; i < 3; ++i)
     if (segment_meets(a.v[i], a.v[(i + 1) % 3], b) || segment_meets(b.v[i], b.v[(i + 1) % 3], a))
@@ -127,8 +127,8 @@ inline void plane_signs(const Triangle& p, const Triangle& q, int* sign) {
   }
 }
 
-// The corner that is alone on its side of the other triangle's plane. All signs are non-zero, and
-// not all are equal.
+// The corner that is alone on its side of the other triangle's plane. No sign is 0, not all are
+// equal.
 inline int lonely(const int* s) { return s[0] == s[1] ? 2 : (s[0] == s[2] ? 1 : 0); }
 
 // Whether the closed triangles a and b share a point, exactly. Needs RoundToNearest.
@@ -139,7 +139,7 @@ inline bool triangles_overlap(const Triangle& a, const Triangle& b) {
   plane_signs(b, a, sa);
   if (sa[0] == sa[1] && sa[1] == sa[2] && sa[0] != 0) return false;
   if (!(sa[0] && sa[1] && sa[2] && sb[0] && sb[1] && sb[2])) return exact::triangles_meet(a, b);
-  // p: the lonely corner, q and r: the others, ordered so that both lonely corners are above.
+  // p is the lonely corner, q and r are the others, ordered as if both p were on the positive side.
   const int i = lonely(sa), j = lonely(sb);
   const double *p1 = a.v[i], *q1 = a.v[(i + 1) % 3], *r1 = a.v[(i + 2) % 3];
   const double *p2 = b.v[j], *q2 = b.v[(j + 1) % 3], *r2 = b.v[(j + 2) % 3];

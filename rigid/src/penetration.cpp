@@ -4,11 +4,12 @@
 namespace tauguard::rigid {
 namespace {
 
-constexpr int most_faces = 396;  // those of a polytope of 200 corners
-// Depths are exact for polytopes; curved cores stop at this fraction of their size.
+constexpr int most_faces = 396;  // a convex polytope with 200 corners has at most this many
+// Largest error of the depth of curved cores, as a fraction of their size. Polytopes end at a
+// facet.
 constexpr double resolution = 1e-7;
 
-// The differences b - a of two shapes, by their support functions.
+// The set of differences b - a of two shapes, by their support functions.
 class ShapeDifferences {
  public:
   struct Source {
@@ -55,7 +56,7 @@ class ShapeDifferences {
   bool sees(double excess, double square) const {
     return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
   }
-  // Never: the answer is rounded anyway.
+  // Nothing is certified for support shapes, so wrong signs are accepted.
   bool unsure(double, const Vec3&, double, const std::array<const Vec3*, 3>&) const {
     return false;
   }
@@ -67,11 +68,11 @@ class ShapeDifferences {
 
 using Polytope = ExpandingPolytope<double, ShapeDifferences>;
 
-// A point in the plane of a face, by the weights of its corners.
+// A point in the plane of a face, by barycentric weights; `least` is the smallest weight.
 struct Barycentric {
   std::array<int, 3> corner;
   double weight[3], least;
-  // Moves the point to the face if it lies outside.
+  // Moves the point into the face if it is outside.
   void clamp() {
     weight[1] = std::clamp(weight[1], 0.0, 1.0);
     weight[2] = std::clamp(weight[2], 0.0, 1.0 - weight[1]);
@@ -101,13 +102,13 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
     d->lower = 0;
     return;
   }
-  // If the set b - a is moved against the outward normal by the face's distance, it no longer
-  // contains the origin.
+  // Moving b - a against the outward normal by the face's distance brings the origin to the
+  // boundary.
   d->n = (-1 / length) * normal;
   d->lower = -std::max(0.0, polytope.nearest.offset / length);
   const Vec3 foot = d->lower * d->n;
   Barycentric best = weights(polytope, polytope.nearest, foot);
-  // Triangles of one plane are equally near: the one that contains the foot gives the points.
+  // Triangles in one plane are equally near. The triangle that contains the foot gives the points.
   for (const auto& face : polytope.faces()) {
     if (best.least >= 0) break;
     if (!(dot(face.normal, normal) > (1 - 1e-12) * length * norm(face.normal))) continue;

@@ -12,18 +12,21 @@
 namespace tauguard::rigid {
 namespace {
 
-// An answer in double precision is accepted if the gap between the upper and the lower bound of the
-// distance is at most the fraction `certain` of the size. If the distance is below the fraction
-// `near`, exact arithmetic is used, so the sign is always certain.
-// The total error is below 2^-45 of the size, or 256 unit roundoffs. Its parts in unit roundoffs
-// are: gap between the bounds 128, rounding of the corners 18, rounding of the upper bound 21, and
-// rounding of the lower bound. The last part is 18 if the bodies are apart, 39 in least_depth, and
-// 21 + 48 in FacetDepth (48 for the facets that it leaves out).
-constexpr double certain = 0x1p-46, near = 1e-10;
-// Beyond these sizes products of four lengths leave the range of a double.
+// A result in double precision is accepted if its upper and lower bound of the distance differ by
+// at most this fraction of the size (the largest coordinate). Its error is then below 2^-45 of the
+// size, or 256 unit roundoffs, which have these parts:
+//   128    difference of the bounds,
+//   18     rounding of the vertices,
+//   21     rounding of the upper bound,
+//   69     rounding of the lower bound: at most 18 if the bodies are apart, 39 in least_depth, and
+//          21 + 48 in FacetDepth (48 for the facets that it leaves out).
+constexpr double certain = 0x1p-46;
+// Distances below this fraction of the size need exact arithmetic, for the sign.
+constexpr double near = 1e-10;
+// Inside this range products of four lengths neither overflow nor underflow.
 bool in_range(double size) { return size > 1e-40 && size < 1e40; }
 
-// Vertices relative to `origin`. Each difference is rounded once: its error is relative to itself.
+// Vertices relative to `origin`. Each subtraction is rounded once: a relative error of u.
 Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec3& origin) {
   const double* p = bodies.row(row);
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
@@ -64,7 +67,7 @@ SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
   return {distance, point_a, point_b, (1 / distance) * between};
 }
 
-// The answer for overlapping bodies: they touch after b is moved by `depth` along n.
+// The result for overlapping bodies, which touch after b is moved by `depth` along n.
 SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
                         double depth, double size) {
   Points<double> moved = b;
@@ -73,9 +76,9 @@ SignedDistance together(const Points<double>& a, const Points<double>& b, const 
   return {-depth, point, point - depth * n, n};
 }
 
-// The segment between close faces is short, and rounding turns it. The normal of the faces is a
-// better direction, and the nearest points follow from the foot of the origin on the triangle of
-// differences.
+// The distance of two bodies that are close at parallel features. The segment between the nearest
+// points is then so short that rounding changes its direction. The normal of the triangle of
+// differences is a better direction; the foot of the origin on it gives the points.
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
                    double size, SignedDistance* out) {
   Vec3 w[3], at_a{}, at_b{};
@@ -91,8 +94,8 @@ bool between_faces(const Points<double>& a, const Points<double>& b, const Neare
     all += weight;
     at_a = at_a + weight * a[ends.corner[i][0]], at_b = at_b + weight * b[ends.corner[i][1]];
   }
-  // Points must be inside the bodies, so that no upper bound is too low. In a thin triangle
-  // rounding may bring the sum far from one.
+  // The weights must have the sum 1: points outside the bodies would make the upper bound too low.
+  // In a thin triangle rounding can move the sum far from 1.
   if (!(all > 0.5)) return false;
   at_a = (1 / all) * at_a, at_b = (1 / all) * at_b;
   *out = {norm(at_b - at_a), at_a, at_b, n};
@@ -104,7 +107,7 @@ bool certified_apart(const Points<double>& a, const Points<double>& b, double si
   const Nearest ends = nearest(a, b);
   *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
-  const auto certified = [&] {  // between_faces may have found points that are nearer than `near`
+  const auto certified = [&] {  // repeats the test of `near` for the points of between_faces
     return out->distance > near * size &&
            out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
   };
@@ -126,7 +129,7 @@ bool certified_depth(const Points<double>& a, const Points<double>& b, const Bod
   Polytope polytope(PointDifferences<double>(a, b, size));
   if (polytope.solve(2000) != Polytope::Answer::facet) return false;
   *n = (-1 / norm(polytope.nearest.normal)) * polytope.nearest.normal;
-  *way = top(a, *n) - bottom(b, *n);  // certainly enough to come free
+  *way = top(a, *n) - bottom(b, *n);  // an upper bound of the depth
   const double depth = least_depth(polytope);
   return depth > near * size && *way - depth <= certain * size;
 }
@@ -166,7 +169,7 @@ ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<doub
           (dot(nearest.numerator, nearest.numerator) - reach * reach).sign()};
 }
 
-// The answer for bodies that only touch after b is moved along `facet` by `height` / |facet|^2.
+// The result for bodies that just touch after b is moved by height / |facet|^2 times `facet`.
 ExactDistance exact_depth(const Vector3<Dyadic>& facet, const Dyadic& height,
                           const Points<double>& a, const Points<double>& b, const Dyadic& radii,
                           double size) {
@@ -193,7 +196,7 @@ ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
   return {{0.0, point, point, (1 / norm(normal)) * normal}, radii.is_zero() ? 0 : -1};
 }
 
-// The exact nearest points. The search starts from the corners that doubles find.
+// The exact nearest points. The search starts from the vertices that doubles find.
 ExactNearest<Dyadic> exact_nearest(const Points<Dyadic>& x, const Points<Dyadic>& y,
                                    const Points<double>& a, const Points<double>& b) {
   const Nearest ends = nearest(a, b);
@@ -214,7 +217,7 @@ ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std
   return exact_together(x, y, a, b, radii, size);
 }
 
-// The answer for bodies grown by balls. `sign` is that of the distance, if it is known.
+// The result for bodies grown by balls. If `known`, `sign` is the exact sign of the distance.
 SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sign, bool known) {
   g.point_a = g.point_a + radius_a * g.normal;
   g.point_b = g.point_b - radius_b * g.normal;

@@ -6,15 +6,15 @@
 namespace tauguard::rigid {
 
 // distance = (point_b - point_a) . normal, with a unit normal from a to b. If the bodies are apart,
-// it is the length of the shortest segment between them. If they overlap, it is minus the length of
-// the shortest translation that separates them, which is along the normal.
+// the distance is the length of the shortest segment between them. If they overlap, it is minus the
+// length of the shortest translation that separates them, which is along the normal.
 struct SignedDistance {
   double distance;
   Vec3 point_a, point_b, normal;
 };
 
-// For row `row`, with each body grown by a ball of the given radius. The sign is exact for the
-// given numbers. The length is off by at most 2^-45 of the bodies' extent and distance.
+// The signed distance of row `row`, with each body grown by a ball of the given radius. The sign is
+// exact. The error is at most 2^-45 times the largest coordinate relative to a point of a.
 SignedDistance signed_distance(const Bodies& a, const Bodies& b, std::size_t row, double radius_a,
                                double radius_b);
 

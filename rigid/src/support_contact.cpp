@@ -9,7 +9,7 @@
 namespace tauguard::rigid {
 namespace {
 
-// Limits the number of tiny steps for a resting pair. The time reached is never late.
+// Limits the number of tiny steps for a pair at rest; at the limit the time is still never late.
 constexpr int most_steps = 500;
 
 double longest_step(const SupportShape& a, const SupportShape& b, const Distance& d, double offset,
@@ -59,9 +59,9 @@ Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double s
   double t, seen = -1;  // `d` is the distance at time `seen`
   Vec3 n{};
   Distance d;
-  // For curved cores the lower bound may be smaller than the true distance. Close to contact such a
-  // pair gets no certified step although it does not touch yet. It is then reported as a contact,
-  // too early by at most the difference between bound and distance.
+  // For curved cores the lower bound can be smaller than the true distance. A pair close to contact
+  // then gets no certified step and is reported as a contact. This is too early by at most the
+  // difference between bound and distance.
   const auto near = [&](double now) {
     seen = now;
     d = distance_of(a, b, n, close);

@@ -64,7 +64,7 @@ double Shape::extent() const {
 
 namespace {
 
-// Adds whole turns to a rotation vector so that it comes nearest to another one.
+// Adds full turns to the rotation vector `angular` so that it is as near as possible to `turn`.
 void add_turns(const double* turn, double* angular) {
   const Vec3 to = {turn[0], turn[1], turn[2]}, from = {angular[0], angular[1], angular[2]};
   const double angle = norm(from), far = norm(to);
@@ -91,7 +91,7 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
       for (int j = 0; j < 3; ++j)
         r[i][j] = xmat_t1[3 * i] * xmat_t0[3 * j] + xmat_t1[3 * i + 1] * xmat_t0[3 * j + 1] +
                   xmat_t1[3 * i + 2] * xmat_t0[3 * j + 2];
-    // The quaternion from its largest entry (Shepperd 1978): accurate for every angle.
+    // The quaternion is computed from its largest entry (Shepperd 1978), accurate for every angle.
     const double trace = r[0][0] + r[1][1] + r[2][2];
     double q[4];
     int k = -1;
@@ -155,7 +155,7 @@ void SupportShape::move_to(double t) {
     const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle),
                  half = std::sin(0.5 * angle);
     const Vec3& u = motion_->axis;
-    for (int j = 0; j < 3; ++j) {  // column by column: the rotated axes
+    for (int j = 0; j < 3; ++j) {  // column j is the rotated axis j
       const Vec3 w = {motion_->r0[0][j], motion_->r0[1][j], motion_->r0[2][j]};
       const Vec3 turned = c * w + s * cross(u, w) + (2 * half * half * dot(u, w)) * u;
       for (int i = 0; i < 3; ++i) body.row[i][j] = turned[i];
@@ -183,7 +183,7 @@ Vec3 SupportShape::support(const Vec3& d) const {
 double SupportShape::tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c,
                              const Vec3& drift, double* slope) const {
   if (!corners_) {
-    // x = centre + y and x' = linear + w x y, and n.(w x y) = y.(n x w).
+    // For x = centre + y: x' = linear + w x y, and n.(w x y) = y.(n x w).
     const Vec3 rate = r + cross(n, angular()), m = n + h * rate;
     const Vec3 y = support(m) - centre_, from = centre_ - c;
     const double straight = dot(r, from) + dot(n, motion_->linear - drift);

@@ -5,13 +5,13 @@
 
 namespace tauguard::rigid {
 
-// Writes them to the rows of `axis` by cyclic Jacobi rotations. `m` is diagonal afterwards, to
-// rounding.
+// Writes the eigenvectors of `m` to the rows of `axis`, by cyclic Jacobi rotations. Afterwards `m`
+// is diagonal up to the tolerance.
 inline void eigenvectors(double m[3][3], double axis[3][3]) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) axis[i][j] = i == j;
   for (int sweep = 0; sweep < 12; ++sweep) {
-    // Directions a millionth of a radian off widen no box that matters.
+    // An error of about 1e-6 rad in a direction does not widen a box noticeably.
     const double off = m[0][1] * m[0][1] + m[0][2] * m[0][2] + m[1][2] * m[1][2];
     const double trace = m[0][0] + m[1][1] + m[2][2];
     if (!(off > 1e-12 * trace * trace)) break;

@@ -259,7 +259,7 @@ def test_a_signal_handler_that_asks_the_same_mesh_is_refused():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-    assert seen == ["a call on this object from within a call on it"]
+    assert seen == ["this object is already in a call of the same thread"]
 
 
 def test_a_result_beyond_the_limit_is_refused_and_a_larger_limit_allows_it():

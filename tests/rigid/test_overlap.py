@@ -143,7 +143,7 @@ def test_polygons_in_the_plane():
     expected = np.array([polygon_truth(grid_a, grid_b, i) for i in range(300)])
     assert 0.1 < expected.mean() < 0.99
     np.testing.assert_array_equal(overlap(grid_a, grid_b, "abfme").hit, expected)
-    with pytest.raises(ValueError, match="polygons meet polygons only"):
+    with pytest.raises(ValueError, match="polygons are tested against polygons only"):
         overlap(a, Hulls(np.zeros((300, 3)), np.arange(301)))
 
 

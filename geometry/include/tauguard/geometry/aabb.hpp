@@ -1,4 +1,4 @@
-// Axis-aligned bounding box: minima and maxima of doubles, so that nothing is rounded.
+// Axis-aligned bounding box. Minima and maxima of doubles are exact, so `add` rounds nothing.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // A lock for an object that keeps state between calls and allows one call at a time.
 //
-// Ctrl-C ends the wait for the lock. Two cases would wait forever and raise an error instead: a
-// thread that already holds the lock calls again, for example in a signal handler; or a process was
-// forked during a call, so that no thread of the child can release the lock.
+// Ctrl-C ends the wait for the lock. Two cases would wait forever, so they raise an error:
+// * A thread that already holds the lock calls again, for example from a signal handler.
+// * The process was forked during a call, so no thread of the child can release the lock.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ class CallLock {
             "another thread was in a call on this object when the process was forked: make a new "
             "one in the child");
       if (thread_.load() == std::this_thread::get_id())
-        throw std::runtime_error("a call on this object from within a call on it");
+        throw std::runtime_error("this object is already in a call of the same thread");
       poll_interrupt();
       std::this_thread::sleep_for(pause);
       pause = std::min(2 * pause, std::chrono::microseconds(2000));

@@ -1,7 +1,7 @@
-// Exact arithmetic on dyadic rationals m * 2^e. Every finite double is one, and sums, differences
-// and products of dyadics are dyadics, so polynomial signs computed here are right for *any* finite
-// input: no overflow, no underflow, no dependence on the rounding mode. It is the last resort
-// behind a floating-point filter (a product costs tens of nanoseconds), never the common path.
+// Exact arithmetic on dyadic rationals m * 2^e. Every finite double is a dyadic rational, and so
+// are sums, differences and products of dyadic rationals. The sign of a polynomial is therefore
+// exact for any finite input, without overflow or underflow and in every rounding mode. A product
+// takes tens of nanoseconds, so kernels try a floating-point filter first.
 #pragma once
 
 #include <algorithm>
@@ -112,8 +112,7 @@ class Dyadic {
            __builtin_clzll(limbs_.back());
   }
 
-  // Truncation towards zero to about 53 bits; +-inf or 0 if the value is outside the range of
-  // double.
+  // The value truncated towards zero to 53 bits; +-inf or 0 outside the range of double.
   double to_double() const {
     if (is_zero()) return 0.0;
     const std::size_t n = limbs_.size();
@@ -142,8 +141,7 @@ class Dyadic {
     }
   }
 
-  // The digits of a number in units of 2^exponent, where `exponent` is at most the number's own;
-  // without a copy.
+  // A view of the limbs of `a` in units of 2^exponent, for exponent <= a.exponent_.
   class Shifted {
    public:
     Shifted(const Dyadic& a, std::int64_t exponent)

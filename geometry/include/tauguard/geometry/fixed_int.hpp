@@ -1,6 +1,6 @@
-// Signed integers of a width known to the compiler, in two's complement: exact signs without
-// allocations and without loops of unknown length. A product is as wide as both factors together,
-// so it always fits. The caller of an addition ensures that the sum fits.
+// Signed integers in two's complement, of a width that is known at compile time. They give exact
+// signs without allocations and without loops of unknown length. The width of a product is the sum
+// of the factors' widths, so a product always fits. The caller ensures that a sum fits.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace tauguard::geometry {
 
 template <int limbs>
 struct FixedInt {
-  std::array<std::uint64_t, limbs> limb{};  // the lowest first
+  std::array<std::uint64_t, limbs> limb{};  // least significant first
 
   FixedInt() = default;
   explicit FixedInt(std::int64_t x) {
@@ -58,7 +58,7 @@ struct FixedInt {
 
   FixedInt magnitude() const { return negative() ? -*this : *this; }
 
-  // Bits beyond the width of the type are lost, here and in the shift below.
+  // Bits beyond the width of the type are lost, in `times` and in `shifted`.
   FixedInt times(std::uint64_t k) const {
     FixedInt r;
     std::uint64_t carry = 0;
@@ -70,7 +70,7 @@ struct FixedInt {
     return r;
   }
 
-  // x 2^shift for 0 <= shift < 64 limbs.
+  // x * 2^shift, for 0 <= shift < 64 * limbs.
   FixedInt shifted(int shift) const {
     FixedInt r;
     const int whole = shift / 64, bits = shift % 64;
@@ -81,7 +81,7 @@ struct FixedInt {
     return r;
   }
 
-  // With a relative error of about 2^-52.
+  // The relative error is about 2^-52.
   double to_double() const {
     const FixedInt m = magnitude();
     double sum = 0;

@@ -1,5 +1,5 @@
-// Long calls that Ctrl-C ends: a call opens an `InterruptScope`, kernels call `poll_interrupt` in
-// their loops, and an interrupted call leaves by the exception `Interrupted`.
+// Ctrl-C ends long calls. A call opens an `InterruptScope`, kernels call `poll_interrupt` in their
+// loops, and an interrupted call throws `Interrupted`.
 #pragma once
 
 #include <atomic>
@@ -14,8 +14,7 @@ struct Interrupted {};
 
 class InterruptScope {
  public:
-  // Set by a binding: asks the interpreter whether a signal is pending. It is called without the
-  // interpreter's lock.
+  // Whether a signal is pending. Set by the binding; called without the interpreter's lock.
   static inline bool (*ask)() = nullptr;
 
   InterruptScope() : outer_(current_) { current_ = this; }
@@ -23,10 +22,10 @@ class InterruptScope {
   InterruptScope(const InterruptScope&) = delete;
   InterruptScope& operator=(const InterruptScope&) = delete;
 
-  // The scope that this thread works for, if any.
+  // The scope of the call that this thread works for; null if there is none.
   static InterruptScope* current() { return current_; }
 
-  // Lends the scope to a helper thread.
+  // Makes `scope` the current one of a helper thread while the object lives.
   class Loan {
    public:
     explicit Loan(InterruptScope* scope) : saved_(current_) { current_ = scope; }
@@ -63,7 +62,7 @@ inline void poll_interrupt() {
   if (InterruptScope* scope = InterruptScope::current()) scope->poll();
 }
 
-// Like ThreadPool::parallel_for on the shared pool, with the caller's scope in every thread.
+// ThreadPool::parallel_for on the shared pool, with the caller's scope in every thread.
 inline void interruptible_for(
     std::size_t n, int threads, std::size_t grain,
     const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {

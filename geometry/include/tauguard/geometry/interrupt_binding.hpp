@@ -1,4 +1,4 @@
-// Ctrl-C in the calls of a native module.
+// Lets Ctrl-C end the calls of a native module.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -7,7 +7,7 @@
 
 namespace tauguard::geometry {
 
-// Call this once in a module. An interrupted call raises the exception of the signal's handler.
+// Call this once per module. An interrupted call raises the exception of the signal handler.
 inline void bind_interrupts() {
   InterruptScope::ask = [] {
     const nanobind::gil_scoped_acquire hold;
@@ -22,7 +22,7 @@ inline void bind_interrupts() {
   });
 }
 
-// Use it around a kernel. It releases the interpreter's lock and lets Ctrl-C end the call.
+// While the object lives, the interpreter's lock is released and Ctrl-C can end the call.
 class LongCall {
   nanobind::gil_scoped_release release_;
   InterruptScope scope_;

@@ -1,13 +1,13 @@
-// The axes of discrete oriented polytopes (k-DOPs, Klosowski et al. 1998). A k-DOP is an interval
-// on each of k / 2 fixed axes.
+// The axes of discrete oriented polytopes (k-DOPs, Klosowski et al. 1998). A k-DOP bounds a set by
+// one interval along each of k / 2 fixed axes.
 #pragma once
 
 #include <cstdint>
 
 namespace tauguard::geometry {
 
-// Rows of {-1, 0, 1}, not normalised. Edge diagonals come before corner diagonals, so that the axes
-// of a 16-DOP are a prefix of those of an 18-DOP, and these of those of a 26-DOP.
+// Axes with components -1, 0 or 1, not normalised: coordinate axes, edge diagonals, then corner
+// diagonals. A 16-DOP has the first 8 of them, an 18-DOP the first 9, and a 26-DOP all 13.
 inline constexpr std::int8_t k_dop_axes[13][3] = {
     {1, 0, 0},  {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, 0, 1},  {0, 1, 1},  {1, -1, 0},
     {1, 0, -1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};

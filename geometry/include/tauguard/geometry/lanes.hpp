@@ -1,6 +1,6 @@
-// Several numbers side by side, by the compiler's vector types. One source is compiled for the
-// baseline and, by target attributes, for wider units; the program chooses at run time. There is no
-// contraction and no reassociation, so every variant gives the same bits.
+// Several numbers side by side, in the compiler's vector types. One source is compiled for the
+// baseline processor and, by target attributes, for wider vector units; the program chooses at run
+// time. Without fused multiply-adds and reassociation every variant gives the same bits.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 #define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 #endif
 
-// Compiles a function for the baseline and for AVX2; the loader chooses. It does nothing under
-// ThreadSanitizer: the loader would choose before ThreadSanitizer is initialised.
+// Compiles a function for the baseline and for AVX2; the loader chooses one. The macro is empty
+// under ThreadSanitizer, because the loader would choose before ThreadSanitizer is initialised.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
     !defined(__SANITIZE_THREAD__)
 #define TAUGUARD_CLONES __attribute__((target_clones("avx2", "default")))
@@ -24,7 +24,7 @@
 
 namespace tauguard::geometry {
 
-// Whether this processor runs functions of TAUGUARD_AVX2, and of TAUGUARD_AVX512.
+// Whether this processor can run functions with TAUGUARD_AVX2 or TAUGUARD_AVX512, respectively.
 inline bool has_avx2() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
@@ -73,7 +73,8 @@ TAUGUARD_INLINE unsigned bits(Mask4 c) {
   return unsigned(x[0] | x[1] | x[2] | x[3]);
 }
 
-// It has its own name because Clang treats vectors of one size as the same type.
+// One bit for each of eight lanes. It does not overload `bits`, because Clang treats vectors of
+// equal size as one type.
 TAUGUARD_INLINE unsigned bits8(Mask8 c) {
   const Mask8 x = c & Mask8{1, 2, 4, 8, 16, 32, 64, 128};
   std::uint64_t word[4];
@@ -82,8 +83,8 @@ TAUGUARD_INLINE unsigned bits8(Mask8 c) {
   return static_cast<unsigned>(any | any >> 32) & 0xff;
 }
 
-// The number of bits in a mask of 16. (The builtin is a function call if the processor's
-// instruction may be missing.)
+// The number of set bits among the low 16. (The compiler's builtin would be a function call,
+// because the baseline processor has no instruction for it.)
 TAUGUARD_INLINE unsigned count_of(unsigned x) {
   x -= x >> 1 & 0x5555;
   x = (x & 0x3333) + (x >> 2 & 0x3333);

@@ -79,7 +79,7 @@ class Limbs {
   }
 
  private:
-  static constexpr std::size_t near_capacity = 10;  // 640 bits: a product of three near coordinates
+  static constexpr std::size_t near_capacity = 10;  // 640 bits hold most products of three factors
 
   std::uint64_t near_[near_capacity];
   std::unique_ptr<std::uint64_t[]> far_;

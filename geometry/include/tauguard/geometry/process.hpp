@@ -1,4 +1,5 @@
-// Identifies the process: a fork copies memory and locks, but only the thread that forks.
+// Identifies the process, to detect a fork: the child gets all memory and locks of its parent, but
+// only one of the threads.
 #pragma once
 
 #if !defined(_WIN32)

@@ -1,5 +1,6 @@
-// The derived error bounds assume round-to-nearest. A caller, or a library that it loaded, may have
-// set another mode. The guard sets this mode and restores the caller's, also after an exception.
+// The derived error bounds assume round-to-nearest, but the caller or a library that it loaded may
+// have set another mode. `RoundToNearest` sets this mode and restores the caller's mode when it is
+// destroyed, also by an exception.
 #pragma once
 
 #include <cfenv>

@@ -1,5 +1,5 @@
-// Memory that a thread keeps between calls. A call inside another call of the same thread (from a
-// signal handler) gets separate memory.
+// Memory that a thread keeps between calls. A nested call of the same thread, from a signal
+// handler, gets separate memory.
 #pragma once
 
 #include <memory>

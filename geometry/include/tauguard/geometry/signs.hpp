@@ -10,15 +10,16 @@ namespace tauguard::geometry {
 
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Sign of det[b - a, c - a, d - a] (positive where d sees a, b, c counter-clockwise from the far
-// side: the triple product (b - a) x (c - a) . (d - a)). Exact for all finite doubles; needs
-// RoundToNearest.
+// Sign of det[b - a, c - a, d - a] = (b - a) x (c - a) . (d - a). It is positive where a, b, c turn
+// counter-clockwise as seen from d. Exact for all finite doubles; needs RoundToNearest.
 //
-// Bound: each difference carries a relative error u, each of the six triple products 3 differences
-// and 2 products, their sum of 6 terms at most 5 more roundings: (3 + 2 + 5) u of the permanent,
-// and the permanent is itself computed with the same relative error, so 16 u of the computed one
-// covers both. Underflow in a product adds at most 2^-1074 per operation, scaled by the other
-// factor; the filter is not used if the permanent is below 1e-250 or not finite.
+// Error bound of the filter, with u the unit roundoff and P the permanent (the determinant with the
+// absolute value of every term):
+// * Each of the six terms contains 3 differences and 2 products: at most 5 u P in all.
+// * Their sum has at most 5 roundings: at most 5 u P.
+// * P is computed with the same relative error, so 16 u times the computed P exceeds 10 u P.
+// * An underflow adds at most 2^-1074 times the other factor. For P > 1e-250 the difference between
+//   16 and 10 covers this.
 inline int orient3d(const double* a, const double* b, const double* c, const double* d) {
   const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
   const double vx = c[0] - a[0], vy = c[1] - a[1], vz = c[2] - a[2];

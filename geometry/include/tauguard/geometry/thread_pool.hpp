@@ -1,9 +1,9 @@
-// A small persistent thread pool. Work is cut into chunks whose bounds depend on the problem alone,
-// never on the number of threads: a kernel that writes into slots indexed by item or by chunk gives
-// the same bits for any thread count.
+// A small persistent thread pool. Work is divided into chunks that do not depend on the number of
+// threads. A kernel that writes its results to places indexed by item or by chunk therefore gives
+// the same bits for any number of threads.
 //
-// Threads do not survive a fork. The child gets its own pool at its first call and never waits for
-// the parent's threads, also not at its exit.
+// Threads do not survive a fork. The child gets its own pool at its first call. It never waits for
+// the parent's threads, not even at its exit.
 #pragma once
 
 #include <algorithm>
@@ -26,9 +26,8 @@ namespace tauguard::geometry {
 
 class ThreadPool {
  public:
-  // One pool per native module and process, grown to the largest number of threads asked for. It is
-  // never destroyed: at exit its threads may be inside a call or, after a fork, belong to the
-  // parent.
+  // One pool per native module and process, with the largest number of threads requested so far. It
+  // is never destroyed: at exit its threads may be in a call or, after a fork, the parent's.
   static ThreadPool& shared() {
     static std::atomic<ThreadPool*> kept{nullptr};
     ThreadPool* pool = kept.load();
@@ -41,9 +40,9 @@ class ThreadPool {
   // The default for `threads=0`: the number of processors.
   static int hardware() { return std::max(1u, std::thread::hardware_concurrency()); }
 
-  // Calls body(begin, end, chunk) for consecutive chunks of `grain` items covering [0, n), on up to
-  // `threads` threads (the caller is one of them; 0 means all processors). Rounding is to nearest
-  // in every thread. The first exception thrown is rethrown here after all chunks have stopped.
+  // Calls body(begin, end, chunk) for consecutive chunks of `grain` items that cover [0, n), on up
+  // to `threads` threads (including the caller's; 0 means all processors). Every thread rounds to
+  // nearest. The first exception of a chunk is rethrown here after all chunks have stopped.
   void parallel_for(std::size_t n, int threads, std::size_t grain,
                     const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {
     if (n == 0) return;
@@ -90,7 +89,7 @@ class ThreadPool {
   }
 
  private:
-  // A thread that waits does not sleep at once: waking it takes some 50 us.
+  // A waiting thread spins for this time before it sleeps, because a wake-up takes some 50 us.
   static constexpr std::chrono::microseconds awake{200};
 
   static inline thread_local bool inside_ = false;
@@ -107,7 +106,8 @@ class ThreadPool {
     std::mutex error_mutex;
   };
 
-  // Jobs that follow one another closely, as steps of environments do, need not wake anybody.
+  // Spins until `met` or until the time `awake` is over. A job that follows within this time, as
+  // the next step of an environment does, needs no wake-up.
   template <class Condition>
   static void wait_awake(const Condition& met) {
     const auto end = std::chrono::steady_clock::now() + awake;
@@ -118,7 +118,7 @@ class ThreadPool {
     try {
       while (workers_.size() < helpers)
         workers_.emplace_back([this, i = workers_.size()] { serve(i); });
-    } catch (const std::system_error&) {  // the system gives no more threads: fewer do the work
+    } catch (const std::system_error&) {  // no more threads available: use fewer
     }
   }
 

@@ -1,5 +1,5 @@
-// 3-vectors of any number: doubles (Vec3), exact numbers, several doubles side by side (lanes.hpp).
-// Every product is written out, so that a vector gives the same bits in every kernel.
+// 3-vectors over any number type: doubles (Vec3), exact numbers, or several doubles side by side
+// (lanes.hpp). Products are written out, so the order of operations is the same in every kernel.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace tauguard::geometry {
 
-// A function of a kernel must be inlined into the one that carries a target attribute.
+// Functions that a kernel calls must be inlined into the function that has the target attribute.
 #define TAUGUARD_INLINE inline __attribute__((always_inline))
 
 template <class T>
@@ -44,7 +44,7 @@ struct Vector3 {
   friend TAUGUARD_INLINE Vector3 cross(const Vector3& a, const Vector3& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   }
-  // From a (t = 0) to b (t = 1).
+  // Linear interpolation from a (t = 0) to b (t = 1).
   friend TAUGUARD_INLINE Vector3 mix(const Vector3& a, const Vector3& b, const T& t) {
     return a + t * (b - a);
   }
@@ -55,11 +55,11 @@ static_assert(sizeof(Vec3) == 3 * sizeof(double));
 
 inline Vec3 load(const double* p) { return {p[0], p[1], p[2]}; }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-// The largest magnitude of its components.
+// The largest magnitude of a component.
 inline double largest(const Vec3& a) {
   return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)});
 }
-// The index of the smallest magnitude.
+// The index of the component of smallest magnitude.
 inline int smallest_axis(const Vec3& a) {
   const double x = std::fabs(a.x), y = std::fabs(a.y), z = std::fabs(a.z);
   return x < y ? (x < z ? 0 : 2) : (y < z ? 1 : 2);

@@ -1,4 +1,4 @@
-// Batches of convex bodies as the kernels read them, and their exact vertices.
+// Batches of convex bodies in the form that the kernels read, and their exact vertices.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,12 @@ using geometry::Vector3;
 
 enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3, polygons = 4 };
 
-// Bodies of any number of vertices.
+// Whether bodies of this kind have any number of vertices each.
 inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
-// One body per row. Tetrahedra have 12 doubles (vertices), boxes 15 (centre, half extents, rotation
-// by rows), parallelepipeds 12 (origin, edges). The vertices of all hulls or polygons are in one
-// array, divided by offsets.
+// A tetrahedron is a row of 12 doubles (vertices), a box of 15 (centre, half extents, rotation by
+// rows), a parallelepiped of 12 (origin, edges). Hulls and polygons have one array of vertices for
+// all bodies; body i has the vertices offsets[i] to offsets[i + 1] - 1.
 struct Bodies {
   Kind kind;
   const double* data;
@@ -47,7 +47,7 @@ struct Bodies {
 template <class Number>
 using Points = std::vector<Vector3<Number>>;
 
-// The vertices of the body in `Number` arithmetic: exact with Dyadic, rounded with double.
+// The vertices of the body of row r in `Number` arithmetic: exact with Dyadic, rounded with double.
 template <class Number>
 Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   const double* p = bodies.row(r);
@@ -83,10 +83,9 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   return out;
 }
 
-// A centrally symmetric body as the kernels use it. The centre is stored relative to the origin, so
-// that a far origin costs no accuracy. The centre is origin + shift; the body is the set of centre
-// + sum u_k g_k with |u_k| <= 1. Relative errors: g and each entry of shift at most 3 u of the
-// edges they come from.
+// A box or parallelepiped: all points origin + shift + sum_k u_k g_k with |u_k| <= 1. The centre is
+// kept as origin + shift, so that a large origin costs no accuracy. Errors of g and of each entry
+// of shift: at most 3 u times the edges that they are computed from.
 struct Zonotope {
   double origin[3], shift[3], g[3][3];
 };

@@ -1,4 +1,4 @@
-// First contact of two moving convex bodies; the time is never late.
+// First contact of two moving convex bodies. The time is conservative: never late.
 #pragma once
 
 #include "tauguard/rigid/distance.hpp"
@@ -8,11 +8,10 @@ namespace tauguard::rigid {
 struct Impact {
   double t;     // the bodies are certainly apart on [start, t)
   bool hit;     // false: apart on all of [start, end]
-  Vec3 normal;  // unit, from a to b; zero if the bodies meet at `start` and no axis is known
+  Vec3 normal;  // unit, from a to b; zero if the bodies overlap at `start` and no axis is known
 };
 
-// Advances from `start` while the distance of the bodies exceeds rounding errors. It stops at the
-// time of impact, never later.
+// Advances from `start` to `end` while the distance of the bodies exceeds rounding errors.
 Impact first_contact(MovingBody& a, MovingBody& b, double start, double end);
 
 // Bodies at most this far apart are described as touching.
@@ -23,14 +22,14 @@ inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {
 // Where and when two support shapes touch.
 struct Touch {
   bool hit = false;
-  double t = INFINITY;     // the shapes are further apart than the threshold on [start, t)
-  double distance = NAN;   // signed, between both surfaces at t: negative is penetration
+  double t = INFINITY;     // the surfaces are further apart than `threshold` on [start, t)
+  double distance = NAN;   // signed distance of the surfaces at t; negative is penetration
   Vec3 point{}, normal{};  // relative to the shapes' origin; the normal from a to b
 };
 
-// Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Shapes
-// that are closer than the fraction `touching` of their size count as touching. A smaller fraction
-// needs more steps; a larger one makes the time earlier.
+// Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Surfaces
+// closer than `touching` times the size of the shapes count as touching. A smaller value needs more
+// steps; a larger one gives an earlier time.
 Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double start,
                     double touching = 1e-10);
 

@@ -1,7 +1,6 @@
-// A convex body under constant linear and angular velocity, in closed form, so that nothing is
-// integrated and nothing drifts. A vertex is
-//   x(t) = fixed + t linear + cos(speed t) swing + sin(speed t) side.
-// `fixed` is its part along the rotation axis; `swing` and `side` are across the axis.
+// A convex body under constant linear and angular velocity, in closed form. A vertex is
+//   x(t) = centre(0) + t linear + along + cos(speed t) swing + sin(speed t) side,
+// where `along` is parallel to the rotation axis, and `swing` and `side` are perpendicular to it.
 #pragma once
 
 #include <array>
@@ -17,7 +16,7 @@ struct RigidMotion {
   Vec3 x0, linear, axis;
   double speed;  // rad over the step
 
-  // pose: 16 doubles, homogeneous, by rows.
+  // `pose`: homogeneous matrix, 16 doubles by rows.
   RigidMotion(const double* pose, const double* lin, const double* angular) {
     for (int i = 0; i < 3; ++i) {
       r0[i] = {pose[4 * i], pose[4 * i + 1], pose[4 * i + 2]};
@@ -32,7 +31,7 @@ struct RigidMotion {
   Vec3 turn(const Vec3& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
 };
 
-// A vector that turns with a body.
+// A vector that rotates with a body, divided as in the formula above.
 struct Swing {
   Vec3 along, swing, side;
   Swing(const RigidMotion& m, const Vec3& w)
@@ -70,15 +69,14 @@ class MovingBody {
     for (const Swing& e : edges_) edge.push_back(e.at(c, s));
   }
 
-  // A bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit
-  // vector.
+  // A bound on |m . x''| over all vertices and times, and over all m with |m - n| <= drift.
   double acceleration(const Vec3& n, double drift) const {
     const Vec3 across = n - dot(n, motion_.axis) * motion_.axis;
     return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) *
            (1 + 0x1p-40);
   }
-  // The least and largest projection of a vertex on the unit n, relative to the centre, over a full
-  // turn of the body.
+  // The range of the vertices' projections on the unit vector n, relative to the centre, over a
+  // full rotation of the body.
   std::array<double, 2> spun(const Vec3& n) const {
     const double across = norm(n - dot(n, motion_.axis) * motion_.axis) + 0x1p-40;
     double low = INFINITY, high = -INFINITY;
@@ -88,28 +86,29 @@ class MovingBody {
     }
     return {low, high};
   }
-  // A bound on the speed of any vertex relative to the centre.
+  // A bound on every vertex's speed relative to the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
-  // A bound on the speed of any vertex relative to a point of velocity `drift`.
+  // A bound on every vertex's speed relative to a point that moves with velocity `drift`.
   double speed_about(const Vec3& drift) const {
     return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
   }
   Vec3 angular() const { return motion_.speed * motion_.axis; }
   const Vec3& axis() const { return motion_.axis; }  // unit, zero without rotation
   double angular_speed() const { return motion_.speed; }
-  // Largest magnitude that enters a position. The angle is part of it, because its rounding rotates
-  // the body.
+  // A bound on the magnitudes that enter a position, to which rounding errors are relative. It
+  // includes the angle, whose rounding error rotates the body.
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }
-  const Vec3& centre() const { return centre_; }  // of the rotation
+  const Vec3& centre() const { return centre_; }  // a point of the rotation axis
   double radius() const { return radius_; }
   const Vec3& linear() const { return motion_.linear; }
 
   std::vector<Vec3> now, velocity, normal, edge;
   double rounding = 0;  // the body is the hull of its vertices grown by a ball of this radius
-  bool complete =
-      true;  // the normals and edge products contain a separating axis of any disjoint pair
+  // Whether normals and edges are complete: for two such bodies that are apart, some normal or some
+  // cross product of edges is a separating axis.
+  bool complete = true;
 
  private:
   void add_direction(std::vector<Swing>& list, const Vec3& d) {
@@ -124,7 +123,7 @@ class MovingBody {
   double radius_ = 0, sweep_ = 0;
 };
 
-// Row `r` of a batch, placed by `motion`.
+// The body of row `r` with `motion`.
 MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion,
                        const Vec3& origin);
 MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec3& origin);

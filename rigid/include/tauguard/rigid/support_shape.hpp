@@ -1,4 +1,4 @@
-// Convex shapes by their support functions, and how they move in a step.
+// Convex shapes given by support functions, and their motion in a step.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,17 @@ using geometry::unit_roundoff;
 
 enum class Core : std::uint8_t { half_space, point, segment, ellipsoid, disc_prism, box, hull };
 
-// A convex core and a radius around it, in the geom's own frame (MuJoCo's: axes along z, sizes are
-// half lengths). A plane is the half space z <= 0.
+// A convex core grown by `radius`, in the frame of a MuJoCo geom: axes of symmetry along z, sizes
+// are half lengths. A plane is the half-space z <= 0.
 struct Shape {
   Core core;
   double size[3];
   double radius;
   std::vector<double> x, y, z;       // the vertices of a hull, by coordinate
-  std::vector<Vec3> normals, edges;  // of a polytope with few of them
+  std::vector<Vec3> normals, edges;  // of a polytope that has few of them
 
   Vec3 support(const Vec3& d) const;  // the point of the core that is furthest along d
-  double extent() const;              // no point of the core is further from the frame's origin
+  double extent() const;              // bound on the distance of the core's points from the origin
   bool polytope() const { return core == Core::box || core == Core::hull; }
 };
 
@@ -38,13 +38,14 @@ struct LocalFrame {
   Vec3 back(const Vec3& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
 };
 
-// The motion of a body between two poses. Its origin moves linearly. Its frame turns at a constant
-// rate, by the shortest rotation vector or, if `turn` is given, by the one nearest to `turn`.
+// The motion of a body between two poses. The origin moves linearly, and the frame rotates at a
+// constant rate by the shortest rotation vector. If `turn` is given, it rotates by the rotation
+// vector nearest to `turn`, which may include full turns.
 RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
                            const double* xmat_t1, const double* turn = nullptr);
 
-// A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an
-// origin near both partners.
+// A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to
+// `origin`, which the caller chooses near both shapes of a pair.
 class SupportShape {
  public:
   SupportShape(const Shape& shape, const LocalFrame& in_body, const RigidMotion& motion,
@@ -54,14 +55,13 @@ class SupportShape {
 
   void move_to(double t);
   Vec3 support(const Vec3& d) const;
-  // The maximum over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)), which is the tangent
-  // of the projection on n + h r, and its slope.
+  // The maximum over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)), and its slope in h.
+  // For each point x this is the tangent, at h = 0, of its projection on n + h r.
   double tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c, const Vec3& drift,
                  double* slope) const;
-  double speed_about(
-      const Vec3& drift) const;  // bound on the speed of its points relative to `drift`
-  double acceleration(const Vec3& n,
-                      double drift) const;  // bound on |n.x''| for n within drift of the given one
+  // The bounds of MovingBody.
+  double speed_about(const Vec3& drift) const;
+  double acceleration(const Vec3& n, double drift) const;
   Vec3 angular() const { return corners_ ? Vec3{} : motion_->speed * motion_->axis; }
   Vec3 linear() const { return corners_ ? corners_->velocity[0] : motion_->linear; }
   Vec3 centre() const { return corners_ ? corners_->now[0] : centre_; }
@@ -80,7 +80,7 @@ class SupportShape {
     int count;
     Vec3 start[4], velocity[4], now[4];
   };
-  std::optional<Corners> corners_;  // of a simplex; nothing for a shape, which turns
+  std::optional<Corners> corners_;  // only of a simplex
   Vec3 shift_, centre_;
   double radius_ = 0, reach_ = 0, magnitude_ = 0;
 };
