@@ -1,4 +1,4 @@
-"""The contacts that contact checkers reported during a run; part of a trace."""
+"""Contacts reported by contact checkers during a run, as a part of a trace."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from tauguard.arrays import Array
 class CheckedContacts:
     """The contacts that one checker reported, one per row, in order of time.
 
-    They describe geometry only; the forces on the arm are in :class:`tauguard.traces.Truth`.
+    They are geometry without forces; the forces on the arm are in :class:`tauguard.traces.Truth`.
     """
 
     checker: str  #: the checker's name
     partners: tuple[str, ...]  #: names of bodies and flexes
     t: Array  #: times, not decreasing [s], shape (K,)
     pair: NDArray[np.int64]  #: both partners, rows of ``partners``, shape (K, 2)
-    point: Array  #: world frame [m], NaN where it is not known, shape (K, 3)
+    point: Array  #: contact point, world frame [m], NaN if unknown, shape (K, 3)
     normal: Array  #: unit vector from the first partner to the second, shape (K, 3)
     distance: Array  #: signed distance of the surfaces, negative in penetration [m], shape (K,)
 
     def __post_init__(self) -> None:
-        """Check shapes, order and indices: ``ValueError`` names the field that does not fit."""
+        """Check shapes, order and indices; a ``ValueError`` names the field with the error."""
         rows = len(self.t)
         for name, tail in (("t", ()), ("pair", (2,)), ("point", (3,)), ("normal", (3,))):
             shape = getattr(self, name).shape

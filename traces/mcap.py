@@ -1,11 +1,11 @@
-"""Write a trace as an MCAP file of ROS 2 messages, and read it back, equal bit by bit.
+"""Write a trace as an MCAP file of ROS 2 messages, and read it back with equal bits.
 
 Topics: ``/joint_states`` (``sensor_msgs/msg/JointState``), ``/motor_currents``, ``/joint_command``,
 ``/truth/contact``, ``/truth/obstacles``, ``/truth/collisions``, ``/detection``,
-``/detection/alarms`` and ``/contacts/CHECKER`` (package ``tauguard_msgs``). Log times are the
-trace's own times. Nothing in the file depends on when or where it was written, so equal traces
-give equal bytes. The metadata record ``tauguard.meta`` holds :attr:`Trace.meta`, the attachments
-:attr:`Trace.attachments`.
+``/detection/alarms`` and ``/contacts/CHECKER`` (package ``tauguard_msgs``). The metadata record
+``tauguard.meta`` contains :attr:`Trace.meta`; :attr:`Trace.attachments` are MCAP attachments. Log
+times are the times of the trace. Equal traces give equal bytes: the file does not depend on when or
+where it was written.
 """
 
 import json
@@ -33,13 +33,12 @@ MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "applic
 def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = None) -> None:
     """Write a trace, and a detector's output for it, as one MCAP file.
 
-    The default of ``detection`` is that of the trace.
-
-    The file is replaced atomically: it is written beside ``path`` and renamed.
+    ``detection`` defaults to ``trace.detection``. An existing file is replaced atomically: the new
+    one is written in the same folder and renamed.
 
     Raises:
-        ValueError: a field of the wrong shape, a time below 0 or beyond what nanoseconds in 64
-            bits hold, a detection whose rows are not the trace's samples.
+        ValueError: a field of the wrong shape, a time below 0 or after the year 2262, or a
+            detection whose times are not those of the trace.
         OSError: the folder is missing or cannot be written.
     """
     path = Path(path)
@@ -63,15 +62,14 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
 
 
 def read_mcap(path: str | Path) -> Trace:
-    """Read what :func:`write_mcap` wrote; every array is equal bit by bit.
+    """Read a file of :func:`write_mcap`; all arrays have the bits that were written.
 
-    The detector's output is in ``Trace.detection``.
-
-    (An obstacle array without obstacles comes back in its default form, shape (0, 0, 4, 4).)
+    The detector's output is in ``Trace.detection``. Without obstacles, ``obstacle_poses`` has its
+    default shape (0, 0, 4, 4).
 
     Raises:
-        ValueError: not such a file, cut off, damaged, or with messages missing; one line that says
-            what, where, and what would work.
+        ValueError: not a file of :func:`write_mcap`, or truncated, damaged, or with messages
+            missing. The message is one line: what is wrong, where, and what would work.
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
@@ -84,7 +82,7 @@ def read_mcap(path: str | Path) -> Trace:
 
 
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
-    """The layout that the reader needs before it reads the messages."""
+    """Metadata from which the reader derives the layouts of the messages."""
     form: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trace.joint_names,
@@ -104,7 +102,7 @@ COMMANDED = ("q_des", "qd_des", "qdd_des")
 
 
 def layouts(form: Mapping[str, Any]) -> list[Topic]:
-    """Topics with one message per sample, without values, in the order of writing."""
+    """The topics with one message per sample, in the order of writing; ``values`` are empty."""
     names, joints = form["joint_names"], len(form["joint_names"])
     state = Layout().header().strings(names)
     state.sequence("q", joints).sequence("qd", joints).sequence("effort", 0)
@@ -158,7 +156,7 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
             )
     if detection is not None:
         if not np.array_equal(detection.t, trace.t):
-            raise ValueError("detection.t: differs from trace.t: its rows must be the samples")
+            raise ValueError("detection.t: differs from trace.t; expected one row per sample")
         values |= {name: getattr(detection, name) for name in ("residual", "score", "alarm")}
         values["threshold"] = np.full(len(trace.t), detection.threshold)
     form = {name: json.loads(text) for name, text in describe(trace, detection).items()}
@@ -191,7 +189,7 @@ def collision_layout() -> Layout:
 
 
 def collision_group(collisions: tuple[Collision, ...]) -> Group:
-    """Labels, logged at their onsets.
+    """The labelled collisions, logged at their onsets.
 
     Raises:
         ValueError: an unknown kind.
@@ -283,7 +281,7 @@ def _detection(form: Mapping[str, Any], values: Mapping[str, Any], alarms: Any) 
 
 
 def decode_truth(form: Mapping[str, Any], values: Mapping[str, Any], table: Any) -> Truth:
-    """The truth from its messages; collisions from ``table``."""
+    """The truth, from the field arrays of its messages and the ``table`` of collisions."""
     collisions = tuple(
         Collision(
             kind=KINDS[table["kind"][i]],
@@ -310,10 +308,10 @@ def decode_truth(form: Mapping[str, Any], values: Mapping[str, Any], table: Any)
 
 
 def collect(contents: Contents, known: Mapping[str, Layout]) -> dict[str, dict[str, Anything]]:
-    """Field arrays of every known topic, in the order of their sequence numbers.
+    """Field arrays of every known topic, sorted by sequence number.
 
     Raises:
-        ValueError: a message of another length or with other strings than its topic's layout.
+        ValueError: a message whose length or strings differ from the layout of its topic.
     """
     runs: dict[str, list[dict[str, Anything]]] = {name: [] for name in known}
     for channel, sequence, payload in contents.messages():

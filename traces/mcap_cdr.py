@@ -1,10 +1,11 @@
-"""CDR layouts of fixed-size ROS 2 messages, as NumPy structured types: packing without a loop.
+"""CDR layouts of fixed-size ROS 2 messages as NumPy structured types, to pack all messages at once.
 
 ROS 2 serialises a message as CDR (OMG DDS-XTypes, "plain CDR version 1"): a 4-byte encapsulation
-header, then the fields in order, each primitive aligned to its own size counted from behind that
-header; a string is a ``uint32`` length with its NUL, a sequence a ``uint32`` count and its elements
-(an empty one adds no padding for them). Every message of a topic of a trace has the same strings
-and lengths, so one template serves all of them: only the numbers differ.
+header, then the fields in order. A primitive is aligned to its own size, counted from the end of
+this header. A string is a ``uint32`` length (with the NUL) and its bytes. A sequence is a
+``uint32`` count and its elements; an empty sequence has no padding for elements. In a trace all
+messages of a topic have the same strings and lengths and differ only in numbers, so one template
+serves them all.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class Layout:
 
     def __init__(self) -> None:
         """Start with an empty message."""
-        self.size = len(ENCAPSULATION)  #: bytes so far, the encapsulation header included
+        self.size = len(ENCAPSULATION)  #: bytes so far, including the encapsulation header
         self._fields: dict[str, tuple[np.dtype[np.generic], int]] = {}
         self._constants: list[tuple[int, bytes]] = [(0, ENCAPSULATION)]
 
@@ -82,7 +83,7 @@ class Layout:
         )
 
     def template(self) -> Bytes:
-        """The constant bytes in place, zero where fields and padding are, shape (size,)."""
+        """A message with its constant bytes, and zeros in fields and padding. Shape (size,)."""
         out = np.zeros(self.size, np.uint8)
         for offset, data in self._constants:
             out[offset : offset + len(data)] = np.frombuffer(data, np.uint8)
@@ -108,7 +109,7 @@ class Layout:
         """Field arrays of messages ``data``, shape (rows, size): copies, in native byte order.
 
         Raises:
-            ValueError: the constant bytes (strings and lengths) differ from this layout's.
+            ValueError: the constant bytes (strings and lengths) differ from those of this layout.
         """
         for offset, expected in self._constants:
             found = data[:, offset : offset + len(expected)]

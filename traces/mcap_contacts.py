@@ -1,4 +1,4 @@
-"""Checked contacts as MCAP messages; each checker has its topic ``/contacts/NAME``."""
+"""Reported contacts as MCAP messages; each checker has a topic ``/contacts/NAME``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,7 +19,7 @@ def topic_name(checker: str) -> str:
 
 
 def describe(contacts: Sequence[CheckedContacts]) -> list[dict[str, Any]]:
-    """The layout that the reader needs before it reads the messages.
+    """Metadata from which the reader derives the layouts of the messages.
 
     Raises:
         ValueError: a checker has two entries.
@@ -45,7 +45,7 @@ def layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
 
 
 def group(contacts: CheckedContacts) -> Group:
-    """One checker's contacts, logged at their times."""
+    """The contacts of one checker, logged at their times."""
     values: dict[str, Anything] = stamp(contacts.t) | {"time": contacts.t, "pair": contacts.pair}
     values |= {name: getattr(contacts, name) for name in COLUMNS}
     topic = Topic(

@@ -1,9 +1,8 @@
-"""MCAP files whose topics are tables: a chunk of messages is packed and unpacked at once.
+"""MCAP files whose topics are tables: all messages of a chunk are packed or unpacked at once.
 
-The format is the public one (mcap.dev/spec), and the records are those of the ``mcap`` package.
-That package handles one message at a time. Therefore the content of a chunk and its message index
-are laid out here, as arrays. Topics of one group share their times and are interleaved row by
-row, in the order of time.
+The format is the public one (mcap.dev/spec). Records are those of the ``mcap`` package, which
+handles one message at a time; here the content of a chunk and its message index are arrays. The
+topics of a group share their times and are interleaved row by row, in the order of time.
 """
 
 import io
@@ -33,7 +32,7 @@ class Topic:
     """A table of messages, one per row."""
 
     name: str
-    schema: str  #: ROS 2 type name, "sensor_msgs/msg/JointState"
+    schema: str  #: ROS 2 type name, such as "sensor_msgs/msg/JointState"
     layout: Layout
     values: Mapping[str, Anything] = field(default_factory=dict)
 
@@ -50,7 +49,7 @@ class Contents:
     """The records of an MCAP file in memory; chunks are decompressed one at a time.
 
     Raises:
-        ValueError: not an MCAP file, or cut off, or damaged.
+        ValueError: not an MCAP file, or truncated or damaged.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -93,10 +92,10 @@ class Contents:
         """
         offset, end = self._end
         if end.data_section_crc not in (0, zlib.crc32(memoryview(self._data)[:offset])):
-            raise ValueError(f"its first {offset} bytes do not fit their checksum: damaged")
+            raise ValueError(f"damaged: the first {offset} bytes do not match their checksum")
 
     def messages(self) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
-        """Runs of equally long messages: channel, sequence numbers, payloads (rows, size)."""
+        """Blocks of equally long messages: channel, sequence numbers, payloads (rows, size)."""
         check_chunks(self._chunks, self._size)
         for offset, body in self._chunks:
             try:
@@ -110,17 +109,17 @@ class Contents:
 
 CHUNK = int(Opcode.CHUNK)
 
-#: Limits of a recording: bytes of a chunk, bytes of a whole unpacked file, and its ratio to the
-#: size of the packed file. The last two must both be exceeded. A message takes some 2 kB of memory
-#: and 20 us, however well it is compressed: 64 MiB of messages take 5 s.
-MOST_CHUNK, MOST_UNPACKED, MOST_RATIO = 1 << 27, 1 << 26, 64
+MOST_CHUNK = 1 << 27  #: largest unpacked size of a chunk [bytes]
+#: A file is refused if its unpacked size exceeds both MOST_UNPACKED [bytes] and MOST_RATIO times
+#: its packed size. A message takes some 2 kB of memory and 20 us, so 64 MiB of messages take 5 s.
+MOST_UNPACKED, MOST_RATIO = 1 << 26, 64
 
 
 def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
-    """Refuse chunks that decompress to more than a recording of ``size`` bytes can hold.
+    """Check the unpacked size of chunks in a file of ``size`` bytes.
 
     Raises:
-        ValueError: a chunk is too large; the message gives its position and size.
+        ValueError: a limit is exceeded; the message gives position and size of the chunk.
     """
     total = 0
     for offset, body in chunks:
@@ -135,7 +134,7 @@ def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
 
 
 def unpacked_size(chunk: records.Chunk) -> int:
-    """Count the bytes that decompression would give, up to the limit of a chunk."""
+    """The number of bytes that decompression would give, counted up to the limit of a chunk."""
     if chunk.compression == "zstd":
         import zstandard
 
@@ -184,7 +183,7 @@ def walk(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
 
 
 def rows_of(data: bytes) -> list[tuple[int, NDArray[np.uint32], Bytes]]:
-    """The messages of a chunk that repeats one row of records; empty if it does not."""
+    """The messages of a chunk in which one sequence of records repeats; empty for other chunks."""
     row: list[tuple[int, int, int]] = []  # start, channel, record length
     at = 0
     while at + PREFIX.itemsize <= len(data):

@@ -1,4 +1,4 @@
-"""The ROS 2 message types of a trace as ``ros2msg`` schemas, which any MCAP reader can use."""
+"""The ROS 2 message types of a trace as ``ros2msg`` schemas, for any MCAP reader."""
 
 SEPARATOR = "=" * 80
 
@@ -85,7 +85,7 @@ float64 distance               # between the surfaces, negative in penetration [
 
 
 def complete(text: str, *parts: str) -> str:
-    """A message definition, followed by those of the types that it contains."""
+    """A message definition, followed by the definitions of the types that it contains."""
     sections = [text, *(f"MSG: {name}\n{PARTS[name]}" for name in parts)]
     return f"{SEPARATOR}\n".join(sections)
 

@@ -1,4 +1,4 @@
-"""The writer of MCAP files whose topics are tables: a chunk of messages is packed at once."""
+"""The writer of MCAP files whose topics are tables: the messages of a chunk are packed at once."""
 
 import struct
 import zlib
@@ -16,14 +16,14 @@ from tauguard.traces.mcap_cdr import Bytes
 from tauguard.traces.mcap_container import MAGIC, PREFIX, Group, Topic
 
 CHUNK_BYTES = 4 << 20  # uncompressed: large enough for zstd, small enough to seek
-ZSTD_LEVEL = 1  # measured numbers hardly compress: level 3 saves nothing, and is slower
+ZSTD_LEVEL = 1  # measured signals hardly compress: level 3 is slower and files are no smaller
 
 
 class Writer:
     """Writes one MCAP file of tables to a binary stream."""
 
     def __init__(self, stream: IO[bytes], library: str, schemas: Mapping[str, str]) -> None:
-        """Write the header; ``schemas`` are the message definitions by type name."""
+        """Write the file header; ``schemas`` are the message definitions by type name."""
         self._stream, self._schema_texts = stream, schemas
         self._offset = self._crc = 0
         self._schemas: dict[str, records.Schema] = {}
@@ -36,7 +36,7 @@ class Writer:
         self._record(records.Header(profile="ros2", library=library))
 
     def _put(self, data: bytes) -> int:
-        """Write, update the checksum of the data section, and return the offset."""
+        """Write ``data``, update the checksum of the data section, and return the offset."""
         start = self._offset
         self._stream.write(data)
         self._offset += len(data)
@@ -48,7 +48,7 @@ class Writer:
         return self._put(data), len(data)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add a metadata record, its keys sorted."""
+        """Add a metadata record with sorted keys."""
         record = records.Metadata(name=name, metadata=dict(sorted(values.items())))
         offset, length = self._record(record)
         self._metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
@@ -113,7 +113,7 @@ class Writer:
             self._chunk(block, times, dict(zip(channels, starts, strict=True)))
 
     def _chunk(self, block: Bytes, times: NDArray[np.uint64], starts: Mapping[int, int]) -> None:
-        """Compress one block of rows, write it with the message index of every channel."""
+        """Compress and write a block of rows, then the message index of every channel."""
         data = block.tobytes()
         chunk = records.Chunk(
             compression="zstd",
@@ -200,7 +200,7 @@ def encode(record: records.McapRecord) -> bytes:
 
 
 def row_template(channels: Sequence[int], topics: Sequence[Topic]) -> tuple[Bytes, list[int]]:
-    """One row of a group: message records with empty times, and the offset of each record."""
+    """The message records of one time of a group, with zero times, and each record's offset."""
     row, starts = b"", []
     for channel, topic in zip(channels, topics, strict=True):
         length = PREFIX.itemsize - 9 + topic.layout.size

@@ -1,4 +1,4 @@
-"""A trace at a lower sample rate, as a slower controller would have logged it."""
+"""A trace at a lower sample rate, as a controller of that rate would have logged it."""
 
 from dataclasses import replace
 
@@ -9,27 +9,29 @@ from tauguard.traces.trace import Trace, Truth
 
 
 def resampled(trace: Trace, hz: float) -> Trace:
-    """The trace every 1 / ``hz`` seconds.
+    """The trace with a sample every 1 / ``hz`` seconds.
 
-    A robot samples its sensors at an instant, so positions, velocities, currents and commands
-    are interpolated. True torques are averaged over the interval that ends at a sample, so that no
-    impulse is lost or counted twice; contact force, link and point are those of the interval's
-    largest force. Collisions keep their times; checked contacts are omitted.
+    A robot samples its sensors at an instant, so positions, velocities, currents and commands are
+    interpolated. True torques are averaged over the interval that ends at a sample, so no impulse
+    is lost or counted twice. Contact force, link and point are those of the largest force in this
+    interval. Collisions keep their times; reported contacts are omitted.
 
     Args:
-        trace: two samples or more.
-        hz: the new rate, at most the trace's own [Hz].
+        trace: Two samples or more.
+        hz: The new rate, at most the rate of the trace [Hz].
 
     Raises:
-        ValueError: a rate that is not above 0 or exceeds the trace's own, or a trace that is
-            over before the second sample.
+        ValueError: a rate that is not above 0 or exceeds the rate of the trace, or a trace that
+            ends before the second sample.
     """
     if not (hz > 0 and len(trace.t) > 1 and hz * trace.dt < 1.01):
-        own = f"one of {1 / trace.dt:g} Hz" if len(trace.t) > 1 else f"{len(trace.t)} samples"
-        raise ValueError(f"hz {hz:g} of {own}: expected above 0 and no more than the trace's own")
+        own = f"at {1 / trace.dt:g} Hz" if len(trace.t) > 1 else f"of {len(trace.t)} samples"
+        raise ValueError(
+            f"hz {hz:g} for a trace {own}: expected above 0 and at most the rate of the trace"
+        )
     t = np.arange(trace.t[0], trace.t[-1] + 1e-9, 1 / hz)
     if len(t) < 2:
-        raise ValueError(f"hz {hz:g}: the trace is over before the second sample")
+        raise ValueError(f"hz {hz:g}: the trace ends before the second sample")
 
     def at(values: Array) -> Array:
         return np.column_stack([np.interp(t, trace.t, column) for column in values.T])
@@ -49,21 +51,21 @@ def resampled(trace: Trace, hz: float) -> Trace:
 
 
 def averaged(trace: Trace, hz: float) -> Trace:
-    """The trace at ``hz``, where each sample is the mean over the interval that ends at it.
+    """The trace at ``hz``; each sample is the mean over the interval that ends at it.
 
-    The mean limits aliasing, and no sample depends on later ones.
-    All signals are half an interval late.
+    Averaging limits aliasing and delays all signals by half an interval. No sample depends on later
+    ones.
 
     Args:
-        trace: without truth.
-        hz: the new rate, at most the trace's own [Hz].
+        trace: A trace without truth.
+        hz: The new rate, at most the rate of the trace [Hz].
 
     Raises:
         ValueError: as :func:`resampled`, or a trace with truth.
     """
     if trace.truth is not None:
         raise ValueError(
-            "the trace has labels: resampled signals are averages and would lag behind them"
+            "trace: it has truth, expected none; averaged signals would lag behind the labels"
         )
     thin = resampled(trace, hz)
     names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
@@ -76,7 +78,7 @@ def averaged(trace: Trace, hz: float) -> Trace:
 
 
 def _truth(truth: Truth, t: Array, new: Array) -> Truth:
-    """The truth with averaged torques, and contacts from each interval's row of largest force."""
+    """The truth with averaged torques, and with the contact of the largest force per interval."""
     ends = np.searchsorted(t, new + 1e-9)
     begins = np.minimum(np.concatenate(([0], ends[:-1])), ends - 1)
     force = truth.contact_force
@@ -95,7 +97,7 @@ def _truth(truth: Truth, t: Array, new: Array) -> Truth:
 
 
 def _averaged(values: Array, t: Array, new: Array) -> Array:
-    """Means over the intervals that end at ``new``; the first row is as it was."""
+    """Means over the intervals that end at ``new``; the first row is kept."""
     pieces = (values[1:] + values[:-1]) / 2 * np.diff(t)[:, None]
     area = np.concatenate([np.zeros_like(values[:1]), pieces.cumsum(axis=0)])
     upto = np.column_stack([np.interp(new, t, column) for column in area.T])

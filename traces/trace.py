@@ -12,8 +12,8 @@ from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
-#: Attachment of an environment's recording: JSON rows with a time [s] and each tool's target from
-#: then on [m].
+#: Attachment of an environment's recording: JSON rows of a time [s] and the target of each tool
+#: from this time on [m].
 TARGETS = "targets.json"
 
 
@@ -26,29 +26,31 @@ class Collision:
     kind: str  #: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse)
     onset: float  #: time of the first sample with a contact force above 0 N [s]
     end: float  #: time of the last such sample [s]
-    link: int  #: the link that was hit, 1-based: link i moves with joint i
+    link: int  #: the link in contact, 1-based: link i moves with joint i
     point: Array  #: contact point at the sample of peak force, world frame [m], shape (3,)
     force: Array  #: peak contact force on the arm, world frame [N], shape (3,)
-    peak_tau: float  #: largest ``|tau_ext|`` over joints 1-4 [N m]: the severity axis
+    peak_tau: float  #: severity: largest ``|tau_ext|`` over joints 1-4 [N m]
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The truth, which no real robot measures; rows are samples, as in :class:`Trace`."""
+    """True values that only a simulation knows; rows are the samples of :class:`Trace`."""
 
     tau_ext: Array  #: torque of contacts and applied wrenches at the joints [N m], shape (T, n)
     contact_force: Array  #: norm of the net external contact force on the arm [N], shape (T,)
     collisions: tuple[Collision, ...]
     payload: Array  #: mass carried at the flange, unknown to the observer [kg], shape (T,)
     contact_link: NDArray[np.int64]  #: link of the largest contact force, 0 for none, shape (T,)
-    contact_point: Array  #: its point, world frame [m], NaN where there is none, shape (T, 3)
-    contact_vector: Array  #: its force on the arm, world frame [N], 0 for none, shape (T, 3)
+    contact_point: Array  #: point of this contact, world frame [m], NaN for none, shape (T, 3)
+    contact_vector: (
+        Array  #: force of this contact on the arm, world frame [N], else 0, shape (T, 3)
+    )
     obstacle_names: tuple[str, ...] = ()  #: obstacles and moving objects of the scene
     obstacle_poses: Array = field(default_factory=lambda: np.empty((0, 0, 4, 4)))
     """World poses of the obstacles, homogeneous, shape (T, len(obstacle_names), 4, 4)."""
 
     def __repr__(self) -> str:
-        """In a line."""
+        """One line."""
         peak = float(np.max(self.contact_force, initial=0.0))
         return (
             f"Truth({len(self.contact_force)} samples, {len(self.collisions)} collisions, "
@@ -58,10 +60,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class Trace:
-    """One recording of an arm: measured signals in rows of samples, and the truth if it is known.
+    """One recording of an arm: measured signals, one row per sample, and the truth if it is known.
 
-    The current is signed and belongs to the same instant as ``q``; ``tau = gain * current`` is what
-    the drive applies at the joint, before joint friction.
+    The current is signed and measured at the same time as ``q``. ``gain * current`` is the torque
+    that the drive applies at the joint, without joint friction.
     """
 
     joint_names: tuple[str, ...]
@@ -75,16 +77,16 @@ class Trace:
     truth: Truth | None = None
     contacts: tuple[CheckedContacts, ...] = ()  #: reported contacts, one entry per checker
     meta: Mapping[str, str] = field(default_factory=dict)
-    """Seed, versions, configuration hash, model hash and whatever else describes the run."""
+    """Properties of the run: seed, versions, hashes of configuration and model, and others."""
     attachments: Mapping[str, str] = field(default_factory=dict)
-    """Text files that belong to the run, by name: the MJCF of the scene, the configuration."""
+    """Text files of the run by name, such as the MJCF of the scene and the configuration."""
     detection: Detection | None = None  #: a detector's output for this trace
 
     def __post_init__(self) -> None:
         """Check shapes and values.
 
         Raises:
-            ValueError: a shape that does not fit, a value that is not finite, time not increasing;
+            ValueError: a wrong shape, a value that is not finite, or time that is not increasing;
                 the message names the field and the first bad row.
         """
         rows, joints = len(self.t), len(self.joint_names)
@@ -111,7 +113,7 @@ class Trace:
             raise ValueError(f"t: not increasing at row {back[0] + 1}")
 
     def __repr__(self) -> str:
-        """In a line: arm, samples, duration, and the number of collisions if it is known."""
+        """One line: arm, samples, duration, and the number of collisions if it is known."""
         arm = self.meta.get("arm", "") or self.meta.get("environment", "")
         known = "no truth" if self.truth is None else f"{len(self.truth.collisions)} collisions"
         long = self.t[-1] - self.t[0] if len(self.t) else 0.0
@@ -129,7 +131,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Alarm:
-    """A period of alarm after filtering; alarms closer than the merge gap are joined."""
+    """A period of alarm after the output filter, which joins alarms closer than its merge gap."""
 
     start: float  #: [s]
     end: float  #: [s]
@@ -145,11 +147,11 @@ class Detection:
     """The observer's estimate of ``tau_ext`` [N m], shape (T, n). ``srq-svr`` and the
     free-motion detector subtract the payload, offsets and friction errors that they track; other
     detectors subtract nothing."""
-    score: Array  #: the detector's output; above ``threshold`` is a raw alarm, shape (T,)
+    score: Array  #: the detector's output; a score above ``threshold`` is a raw alarm, shape (T,)
     threshold: float
-    alarm: Bools  #: after the output filter, shape (T,)
+    alarm: Bools  #: alarm after the output filter, shape (T,)
     alarms: tuple[Alarm, ...]
 
     def __repr__(self) -> str:
-        """In a line."""
+        """One line."""
         return f"Detection({self.detector}, {len(self.t)} samples, {len(self.alarms)} alarms)"

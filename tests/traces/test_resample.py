@@ -44,10 +44,10 @@ def test_signals_are_those_of_the_instants_and_no_impulse_is_lost(trace, hz):
 
 @pytest.mark.parametrize("hz", [0.0, -1.0, 2000.0, np.nan])
 def test_rates_that_cannot_be_are_refused(trace, hz):
-    with pytest.raises(ValueError, match="expected above 0 and no more than the trace's own"):
+    with pytest.raises(ValueError, match="expected above 0 and at most the rate of the trace"):
         resampled(trace, hz)
 
 
 def test_a_trace_that_is_too_short_is_named(trace):
-    with pytest.raises(ValueError, match="over before the second sample"):
+    with pytest.raises(ValueError, match="ends before the second sample"):
         resampled(trace, 0.5)
