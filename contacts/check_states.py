@@ -1,4 +1,4 @@
-"""Run checkers on a recorded sequence of states, step by step."""
+"""Run checkers on a sequence of states."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -18,9 +18,9 @@ def check_states(
 
     Args:
         model: MjModel.
-        states: in order of time. ``None`` marks a jump: there is no motion between the states
-            around it.
-        checkers: names of registered checkers, or checkers.
+        states: In order of time. ``None`` marks a jump: the states before and after it are not the
+            ends of a step.
+        checkers: Names of registered checkers, or checkers.
 
     Raises:
         ValueError: an unknown checker.
@@ -43,7 +43,7 @@ def check_states(
 
 
 def _checked(model: Any, name: str, contacts: Contacts, times: Array) -> CheckedContacts:
-    """Sort contacts by their times [s], and name their partners: bodies and flexes."""
+    """The contacts of one checker sorted by time, with named partners: bodies and flexes."""
     order = np.argsort(times, kind="stable")
     contacts, times = contacts.where(order), times[order]
     body = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)

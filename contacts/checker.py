@@ -1,4 +1,4 @@
-"""The interface of contact checkers: a state before and a state after give contacts."""
+"""The interface of contact checkers, which find the contacts between two states."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tauguard.contacts._contacts import all_finite, carried
 
 Index = NDArray[np.int32]
 
-#: Names of what may touch: MuJoCo's geom types and its flexes.
+#: Kinds of partners of a contact: MuJoCo's geom types, and flexes.
 KINDS = (
     "plane",
     "hfield",
@@ -46,20 +46,20 @@ _NO_VERTICES = np.zeros((0, 3))
 class State:
     """Positions and velocities of the scene at one instant.
 
-    Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1].
-    Here dx is the difference of both xpos, and w the shortest rotation vector from one xmat to the
-    other, as in ``mj_integratePos`` with a free joint. A flex vertex moves linearly. Checkers and
-    the ground truth report contacts on this path.
+    Two states define a path. A point y of a body moves as ``xpos + t dx + exp(t [w]x) xmat y``, t
+    in [0, 1], where dx is the difference of both xpos and w is the shortest rotation vector from
+    one xmat to the other (as in ``mj_integratePos`` with a free joint). Flex vertices move
+    linearly. Checkers and the ground truth report contacts on this path.
 
     Attributes:
         time: [s].
         qpos: Shape (nq,), m and rad.
         qvel: Shape (nv,), m/s and rad/s.
         xpos: Origins of the bodies. Shape (nbody, 3), m.
-        xmat: Their rotations, by rows. Shape (nbody, 9).
+        xmat: Rotations of the bodies, by rows. Shape (nbody, 9).
         geom_xpos: Centres of the geoms. Shape (ngeom, 3), m.
-        geom_xmat: Their rotations, by rows. Shape (ngeom, 9).
-        flexvert_xpos: Shape (nflexvert, 3), m.
+        geom_xmat: Rotations of the geoms, by rows. Shape (ngeom, 9).
+        flexvert_xpos: Vertices of the flexes. Shape (nflexvert, 3), m.
     """
 
     time: float
@@ -73,15 +73,16 @@ class State:
 
     @classmethod
     def of(cls, model: Any, data: Any, scratch: Any = None) -> State:
-        """The state of ``data`` at its own ``qpos``; ``data`` is not changed.
+        """The state of ``data`` at ``data.qpos``; ``data`` is not changed.
 
-        After ``mj_step`` the positions in ``data`` are still those from the start of the step. So
+        After ``mj_step``, ``data.xpos`` and the like are still those of the start of the step. So
         the kinematics are computed again, in ``scratch``.
 
         Args:
             model: MjModel.
             data: MjData.
-            scratch: Another MjData of the model, overwritten; ``None`` makes one (slow in a loop).
+            scratch: Another MjData of the model, which is overwritten. ``None`` makes one, which is
+                slow in a loop.
         """
         scratch = mujoco.MjData(model) if scratch is None else scratch
         mujoco.mj_copyState(model, data, scratch, _POSE)
@@ -110,7 +111,8 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
     """Check that the poses of ``state`` are finite and of the model's size, and return it.
 
     Raises:
-        ValueError: another shape, or an entry that is not finite (the field and first bad row).
+        ValueError: another shape, or an entry that is not finite; the message names the field and
+            the first bad row.
     """
     xpos, xmat, x = state.xpos, state.xmat, state.flexvert_xpos
     if (
@@ -138,14 +140,13 @@ class Contacts:
     """Contacts of one step, one per row.
 
     Attributes:
-        time: Fraction of the step in [0, 1]; 0 for contacts that exist at the start.
-            (K,).
+        time: Fraction of the step in [0, 1]; 0 for contacts that exist at the start. Shape (K,).
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
-        feature: Vertex, edge or element of each partner, in the checker's own numbering (of
-            MuJoCo: ``contact.vert`` or ``contact.elem``); -1 if it names none. Shape (K, 2).
-        point: World frame. Shape (K, 3), m; NaN where it is not known.
-        normal: Unit vector from the first partner to the second. Shape (K, 3); NaN where unknown.
+        feature: Vertex, edge or element of each partner, numbered by the checker (in MuJoCo:
+            ``contact.vert`` or ``contact.elem``); -1 if not given. Shape (K, 2).
+        point: Contact point, world frame; NaN if unknown. Shape (K, 3), m.
+        normal: Unit vector from the first partner to the second; NaN if unknown. Shape (K, 3).
         distance: Signed distance of the surfaces at ``time``, negative in penetration. Shape (K,),
             m.
     """
@@ -159,7 +160,7 @@ class Contacts:
     distance: Array
 
     def __post_init__(self) -> None:
-        """Check the shapes: ``ValueError`` names the field that does not fit."""
+        """Check the shapes; a ``ValueError`` names the field with the error."""
         count = np.shape(self.time)[0] if np.ndim(self.time) == 1 else -1
         for name, dtype, tail in _COLUMNS:
             given = getattr(self, name)
@@ -189,7 +190,7 @@ class Contacts:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def where(self, rows: NDArray[Any]) -> Contacts:
-        """The chosen rows: a mask or indices."""
+        """The contacts of ``rows``, a mask or indices."""
         return Contacts(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
@@ -207,7 +208,7 @@ _EMPTY = Contacts(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COL
 
 @runtime_checkable
 class Checker(Protocol):
-    """Reports the contacts of a step. A factory ``(model, **options)`` makes a checker.
+    """Finds the contacts of a step. A factory ``factory(model, **options)`` makes a checker.
 
     Attributes:
         name: The registered name.
@@ -218,7 +219,7 @@ class Checker(Protocol):
     covers: frozenset[tuple[str, str]]
 
     def check(self, before: State, after: State) -> Contacts:
-        """The contacts on the path between both states; :class:`State` defines the path."""
+        """The contacts on the path between both states, which :class:`State` defines."""
         ...
 
 
@@ -230,7 +231,7 @@ def asked(one: Checker, before: State, after: State) -> Contacts:
     """The contacts that the checker ``one`` reports for the step.
 
     Raises:
-        TypeError: its ``check`` returned something else than :class:`Contacts`.
+        TypeError: ``one.check`` did not return :class:`Contacts`.
     """
     found: object = one.check(before, after)
     if not isinstance(found, Contacts):
@@ -245,13 +246,12 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
     """Register a checker under ``name``.
 
     Args:
-        name: Not empty.
+        name: Name of the checker.
         factory: ``factory(model, **options)`` returns a :class:`Checker`.
-        replace: Whether to replace an existing factory of that name.
+        replace: Whether to replace an existing factory of this name.
 
     Raises:
-        ValueError: an empty name, a name that another factory has, or a factory that cannot be
-            called.
+        ValueError: an empty name, a name of another factory, or a factory that is not callable.
     """
     if not name:
         raise ValueError("name: empty, expected the name of a checker")
@@ -259,8 +259,7 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
         raise ValueError(f"factory: {factory!r} cannot be called; expected factory(model, ...)")
     if not replace and _FACTORIES.get(name, factory) is not factory:
         raise ValueError(
-            f"checker {name!r}: there is one of that name already; choose another name, or say "
-            "replace=True"
+            f"checker {name!r}: already registered; choose another name, or pass replace=True"
         )
     _FACTORIES[name] = factory
 
@@ -274,9 +273,9 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
     """The checker ``name`` for ``model``.
 
     Raises:
-        ValueError: no such checker or option (the message lists those there are), or a geom in the
-            model that this checker cannot handle. Also a checker that lacks ``name``, ``covers`` or
-            ``check``, or whose ``covers`` has something else than pairs of kinds.
+        ValueError: an unknown checker or option (the message lists the known ones), a geom that
+            this checker cannot handle, a checker without ``name``, ``covers`` or ``check``, or a
+            ``covers`` with anything but pairs of kinds.
     """
     if name not in _FACTORIES:
         raise ValueError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")
@@ -302,10 +301,10 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
 
 
 def pair_kind(a: str, b: str) -> tuple[str, str]:
-    """Two of :data:`KINDS` in their order there.
+    """Two kinds in the order of :data:`KINDS`.
 
     Raises:
-        ValueError: no such kind.
+        ValueError: an unknown kind.
     """
     for kind in (a, b):
         if kind not in KINDS:

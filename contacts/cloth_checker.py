@@ -17,11 +17,12 @@ from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs
 class ClothChecker:
     """Times of impact of cloth with linearly moving vertices.
 
-    A flex is the union of its triangles, thickened by its radius, as in MuJoCo. Triangles against
-    geoms: conservative advancement on support functions. Cloth against cloth, and against itself:
-    candidates by :class:`tauguard.cloth.MeshCCD` at the distance of both radii, then the triangles
-    themselves. Times are never late; they are early by at most 1e-10 of the shapes' size in
-    distance.
+    A flex is the union of its triangles, thickened by its radius, as in MuJoCo. Triangles are
+    tested against geoms by conservative advancement on support functions. Cloth against cloth, and
+    against
+    itself: :class:`tauguard.cloth.MeshCCD` finds candidates at the distance of both radii, and then
+    pairs of triangles are tested. Times are never late. At a time of impact the surfaces are at
+    most 1e-10 of the shapes' size apart.
 
     Args:
         model: MjModel.
@@ -30,8 +31,8 @@ class ClothChecker:
         self_collision: Whether to test cloth against cloth (the pairs that MuJoCo would test).
 
     Raises:
-        ValueError: a flex that can collide and is not two-dimensional, or a geom that may
-            touch one and is of a kind that cannot be handled (both named); an unknown threshold.
+        ValueError: a flex that can collide and is not two-dimensional, a geom that may touch a flex
+            and is of a kind that cannot be handled (both named), or an unknown threshold.
     """
 
     name = "cloth"
@@ -72,7 +73,7 @@ class ClothChecker:
         self._last: tuple[State, State, Contacts] | None = None
 
     def check(self, before: State, after: State) -> Contacts:
-        """The contacts on the path: at most one for a triangle and a geom or triangle.
+        """The contacts on the path, at most one per pair of a triangle with a geom or triangle.
 
         Raises:
             ValueError: a state of another model, or that is not finite.
@@ -117,8 +118,8 @@ class ClothChecker:
 class _Flex:
     """The triangles of one flex.
 
-    ``elements`` index the vertices of all flexes, shape (E, 3); ``bodies`` are those that carry
-    the corners, shape (E, 3).
+    ``elements`` are the corners as indices into the vertices of all flexes, shape (E, 3);
+    ``bodies`` are the bodies to which the corners are attached, shape (E, 3).
     """
 
     def __init__(self, model: Any, number: int) -> None:
@@ -137,12 +138,12 @@ class _Flex:
         self.bodies = model.flex_vertbodyid[self.elements]
 
     def hangs_on(self, body: int) -> NDArray[np.bool_]:
-        """Triangles with a corner on ``body`` itself, which MuJoCo does not test."""
+        """Mask of triangles with a corner on ``body``, which MuJoCo does not test with it."""
         return np.asarray((self.bodies == body).any(axis=1), dtype=bool)
 
 
 class _Cloths:
-    """Cloth against cloth: candidate features of the mesh, then pairs of triangles."""
+    """Cloth against cloth: finds candidate features, then tests pairs of triangles."""
 
     def __init__(
         self, model: Any, flexes: dict[int, _Flex], pairs: Pairs, reach: NDArray[np.float64]
@@ -191,7 +192,7 @@ class _Cloths:
         return out
 
     def _triangle_pairs(self, vf: Index, ee: Index) -> Index:
-        """Pairs of triangles with these features and without a common body, first flex first."""
+        """Pairs of triangles that contain these features and have no body in common."""
         of_vertex, faces = _expand(self._of_vertex, vf[:, 0], vf[:, 1])
         one, rest = _expand(self._of_edge, ee[:, 0], ee[:, 1])
         other, one = _expand(self._of_edge, rest, one)
@@ -203,7 +204,7 @@ class _Cloths:
 
 
 def _incidence(keys: NDArray[Any], values: NDArray[Any], repeat: int) -> tuple[Any, Any]:
-    """Values by key: ``values[start[k]:start[k + 1]]`` are those of key k."""
+    """``start`` and sorted values: those of key k are ``values[start[k]:start[k + 1]]``."""
     order = np.argsort(keys, kind="stable")
     counts = np.bincount(keys)
     start = np.concatenate([[0], np.cumsum(counts)])
@@ -211,7 +212,7 @@ def _incidence(keys: NDArray[Any], values: NDArray[Any], repeat: int) -> tuple[A
 
 
 def _expand(table: tuple[Any, Any], keys: NDArray[Any], beside: NDArray[Any]) -> tuple[Any, Any]:
-    """Every value of every key, each with the key's companion."""
+    """All values of all keys, and for each value the entry of ``beside`` of its key."""
     start, values = table
     counts = start[keys + 1] - start[keys]
     offset = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -1,4 +1,4 @@
-"""Compare checkers on one run of a scene with MuJoCo's contacts and the ground truth."""
+"""Compare checkers, in one run of a scene, with MuJoCo's contacts and the ground truth."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
 from tauguard.contacts.scoring import judge, score
 
-#: By how much the length of a checker's normal may differ from 1.
+#: Largest allowed difference of a normal's length from 1.
 UNIT = 1e-6
 
 
@@ -38,36 +38,36 @@ def compare(
     fine: int | None = None,
     keep: bool = False,
 ) -> Report:
-    """Run a scene in MuJoCo and ask every checker about every step.
+    """Run a scene in MuJoCo and call every checker for every step.
 
-    The checkers do not influence the run. All of them, and the ground truth, get the same path: see
-    :class:`tauguard.contacts.State`.
+    Checkers do not influence the run. All checkers and the ground truth get the same path, which
+    :class:`tauguard.contacts.State` defines.
 
     Args:
         scene: A :class:`ContactScene`, a model (which starts at rest in ``qpos0``), or the name of
             one of ``SCENES``.
         checkers: Names of registered checkers.
-        timestep: MuJoCo's time step [s]; ``None``: the scene's.
-        seconds: Duration [s]; ``None``: the scene's own.
+        timestep: MuJoCo's time step [s]; ``None``: the time step of the scene.
+        seconds: Duration [s]; ``None``: the duration of the scene.
         options: Keyword arguments of the factory, by checker.
-        ground_truth: Whether to compute true contacts (slow); without them there is no precision
-            or recall.
-        fine: A second reference: the scene is also run with steps this many times shorter, up to
-            its first contact (after it the two runs differ). ``None``: it is not.
+        ground_truth: Whether to compute true contacts, which is slow. Without them there is no
+            precision or recall.
+        fine: If given, the scene is also run with steps this many times shorter, up to its first
+            contact, as a second reference. (After the first contact the two runs differ.)
         keep: Whether the report keeps the states for a recording.
 
     Raises:
         ValueError: an unknown scene or checker; a geom that a checker or the ground truth cannot
-            handle; a contact outside the model or the step, without a finite distance or a unit
-            normal; options of another checker; a timestep or duration that is not above 0; a
-            ``fine`` below 1.
+            handle; a reported contact with an unknown geom or flex, a time outside the step, a
+            distance that is not finite or a normal without unit length; options for a checker that
+            is not used; a timestep or duration that is not above 0; a ``fine`` below 1.
     """
     scene = _scene(scene)
     duration = scene.seconds if seconds is None else seconds
     if not 0 < duration < np.inf:
         raise ValueError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
-        raise ValueError(f"fine {fine}: expected 1 or more fine steps in a step")
+        raise ValueError(f"fine {fine}: expected 1 or more fine steps per step")
     if isinstance(checkers, str | mujoco.MjData):
         raise ValueError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
     for name in options or {}:
@@ -79,7 +79,7 @@ def compare(
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
     }
-    # MuJoCo's own contacts are always needed: leads and depths refer to them.
+    # MuJoCo's own contacts are always needed, as the reference of leads and depths.
     yardstick = chosen.get("mujoco") or MujocoChecker(model)
     truth = GroundTruth(model) if ground_truth else None
     judged = truth.covers if truth is not None else None
@@ -92,7 +92,7 @@ def compare(
 
 
 def _scene(scene: ContactScene | mujoco.MjModel | str) -> ContactScene:
-    """The scene that a name or a model stands for."""
+    """The scene for a name or a model."""
     if isinstance(scene, str):
         if scene not in SCENES:
             raise ValueError(f"scene {scene!r}: expected one of {', '.join(SCENES)}")
@@ -156,7 +156,7 @@ def _simulate(
 
 
 def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
-    """Check that a report fits this model and this step, and return it.
+    """Return the contacts ``found`` by checker ``name`` if they are valid for the model.
 
     Raises:
         ValueError: a geom or flex that does not exist, a time outside the step, a distance that is
@@ -176,11 +176,11 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
     if bad.any():
         raise ValueError(
             f"checker {name!r}: normal {found.normal[bad][0].tolist()}, expected length 1, or NaN "
-            "in all entries where it is not known"
+            "in all entries if it is unknown"
         )
     if ((found.geom < 0) == (found.flex < 0)).any():
         raise ValueError(
-            f"checker {name!r}: a partner is either a geom or a flex; the other id must be -1"
+            f"checker {name!r}: a partner with a geom and a flex, or neither; expected one id of -1"
         )
     return found
 
@@ -188,10 +188,7 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
 def _first_contact(
     scene: ContactScene, timestep: float, seconds: float
 ) -> tuple[float, set[tuple[str, str]]] | None:
-    """Time and kinds of MuJoCo's first touching contact at steps of ``timestep`` [s].
-
-    The kinds are those of :func:`pair_kind`.
-    """
+    """Time [s] and :func:`pair_kind` of MuJoCo's first touching contacts with ``timestep`` [s]."""
     model, data = scene.start(timestep)
     kinds = geom_kinds(model)
     for _ in range(max(1, round(seconds / timestep))):

@@ -1,4 +1,4 @@
-"""Convert MuJoCo's geoms to the convex shapes of the native kernel."""
+"""Convert MuJoCo's geoms to convex shapes of the native kernel."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,7 +10,7 @@ from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import Index, geom_kinds
 
-#: Native numbers of shapes: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
+#: Native numbers of shapes, by kind of geom.
 _CORES = {
     "plane": 0,
     "sphere": 1,
@@ -26,12 +26,12 @@ _NONE = np.zeros((0, 3))
 
 
 def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool = False) -> Scene:
-    """Make a native scene of these geoms, numbered as in the list.
+    """Make a native scene of some geoms, which are numbered as in the list.
 
     Args:
         model: MjModel.
-        geoms: Their ids.
-        checker: Name for messages.
+        geoms: Ids of the geoms.
+        checker: Name of the checker, for error messages.
         surfaces: Whether to use the surface of a mesh instead of its convex hull.
 
     Raises:
@@ -53,7 +53,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
 
 
 def geom_name(model: Any, geom: int) -> str:
-    """The geom's name, or its number and body if it has no name."""
+    """The geom's name in quotes, or its number and body if it has no name."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return repr(name)
@@ -64,8 +64,8 @@ def geom_name(model: Any, geom: int) -> str:
 def hull_vertices(model: Any, geom: int) -> Array:
     """Vertices of a mesh geom's convex hull, in the geom's frame. Shape (V, 3), m.
 
-    MuJoCo stores the hull's graph with the mesh (:class:`mjModel.mesh_graph`); a mesh without one
-    gives all its vertices, which have the same hull.
+    MuJoCo stores the graph of the hull in ``mjModel.mesh_graph``. For a mesh without a graph all
+    vertices are returned; they have the same hull.
     """
     mesh = int(model.geom_dataid[geom])
     start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])

@@ -11,8 +11,8 @@ from tauguard.contacts.checker import KINDS, Contacts, State, pair_kind
 class MujocoChecker:
     """The contacts that MuJoCo's collision detection lists at the end of the step (``time`` 1).
 
-    The next ``mj_step`` would start with them. Distances are MuJoCo's; with speculative
-    contacts they are predictions, not geometry.
+    The next ``mj_step`` would start with these contacts. Distances are those that MuJoCo lists;
+    with speculative contacts they are predictions.
 
     Args:
         model: MjModel.
@@ -21,7 +21,7 @@ class MujocoChecker:
     name = "mujoco"
 
     def __init__(self, model: Any) -> None:
-        """Make an MjData for the computation."""
+        """Allocate an MjData."""
         self._model = model
         self._data = mujoco.MjData(model)
         self._mocap = np.flatnonzero(model.body_mocapid >= 0)

@@ -1,8 +1,9 @@
-"""The pairs of geoms and flexes that may touch: MuJoCo's rules, applied to a compiled model.
+"""The pairs of geoms and flexes that MuJoCo tests in a compiled model.
 
-The rules are those of the manual's chapter "Collision detection: selection". Explicit pairs always
-count. Other pairs need masks that agree, and two bodies that are not welded together, not excluded
-and not both immovable. Parent and child do not count, unless the parent is the world.
+The rules are those of the chapter "Collision detection: selection" of MuJoCo's manual. Explicit
+pairs are always tested. Other pairs are tested if their masks agree and their two bodies are not
+welded together, not excluded, not both immovable, and not parent and child (unless the parent is
+the world).
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ class Pairs:
     Attributes:
         first: Ids of geoms (or of flexes, between flexes). Shape (P,).
         second: Ids of geoms or flexes. Shape (P,).
-        margin: A force acts if the surfaces are closer than this. Shape (P,), m.
-        gap: MuJoCo lists contacts up to margin + gap. Shape (P,), m.
+        margin: Distance below which a force acts. Shape (P,), m.
+        gap: MuJoCo lists contacts at distances up to margin + gap. Shape (P,), m.
     """
 
     first: Index
@@ -41,11 +42,11 @@ class Pairs:
         return len(self.first)
 
     def where(self, rows: NDArray[Any]) -> Pairs:
-        """The chosen rows: a mask or indices."""
+        """The pairs of ``rows``, a mask or indices."""
         return Pairs(self.first[rows], self.second[rows], self.margin[rows], self.gap[rows])
 
     def reach(self, threshold: str) -> Array:
-        """The largest distance of a contact: 0, the margin, or margin + gap; never below 0."""
+        """Largest distance of a contact by ``threshold`` (see ``RigidChecker``) [m], at least 0."""
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:
@@ -54,7 +55,7 @@ class Pairs:
 
 
 def geom_pairs(model: Any) -> Pairs:
-    """Geoms that may touch, lower type first as in MuJoCo's contacts, then lower id."""
+    """Pairs of geoms; the geom of lower type, then of lower id, is first, as in MuJoCo."""
     if _disabled(model):
         return _pairs(model, [])
     kinds = geom_kinds(model)
@@ -74,7 +75,7 @@ def geom_pairs(model: Any) -> Pairs:
 
 
 def geom_flex_pairs(model: Any) -> Pairs:
-    """Geoms (``first``) that may touch flexes (``second``)."""
+    """Pairs of a geom (``first``) and a flex (``second``)."""
     rows = []
     for f in range(0 if _disabled(model) else model.nflex):
         for g in range(model.ngeom):
@@ -85,7 +86,7 @@ def geom_flex_pairs(model: Any) -> Pairs:
 
 
 def flex_pairs(model: Any) -> Pairs:
-    """Flexes that may touch each other, or themselves (then without margin)."""
+    """Pairs of flexes, including flexes with themselves; these have margin 0."""
     rows = []
     for f in range(0 if _disabled(model) else model.nflex):
         own = int(model.flex_contype[f]) & int(model.flex_conaffinity[f])

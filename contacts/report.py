@@ -1,4 +1,4 @@
-"""The result of a comparison: a score for every checker, events and disagreements."""
+"""The result of a comparison of checkers."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -43,26 +43,27 @@ class Score:
 
     Attributes:
         checker: Name of the checker.
-        events: Contacts of two partners, from touch to parting, over the pairs it covers.
-        recalled: How many of these events it reported, at most one step outside them.
-        reports: Steps and partners that it reported.
-        correct: Number of these reports that are true, or no deeper than the tolerance.
-        steps: Steps and partners that touch beyond the tolerance.
-        steps_found: Number of these that it reported in the same step.
-        delay_ms: From an event's onset to its first report, median [ms].
-        first: Time of its first report of any pair [s].
-        first_error_ms: How much later that is than the first contact of a finely stepped run of
-            MuJoCo [ms]; ``None`` without such a run, or where it does not cover that pair.
-        lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
-        depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
-        normal_deg: Angle between its normal and MuJoCo's, median [deg].
+        events: Number of true contacts, each from touch to separation, of pairs that the checker
+            covers.
+        recalled: Number of events reported during the event or within a step of it.
+        reports: Number of reports; a report is a step and a pair that touches in it.
+        correct: Number of reports that are true, or no deeper than the tolerance.
+        steps: Number of steps and pairs that touch, deeper than the tolerance.
+        steps_found: Number of ``steps`` that were reported in the same step.
+        delay_ms: Median time from the onset of an event to its first report [ms].
+        first: Time of the first report of any pair [s].
+        first_error_ms: ``first`` minus the time of the first contact in a run of MuJoCo with fine
+            steps [ms]; ``None`` without such a run, or if the checker does not cover this pair.
+        lead_ms: Median time by which a pair's first report is earlier than MuJoCo's [ms].
+        depth_mm: Median difference from MuJoCo's depth at the same state [mm].
+        normal_deg: Median angle to MuJoCo's normal [deg].
         normals: Number of compared normals.
-        opposite: Number of these that are more than 90 degrees from MuJoCo's.
-        us_per_step: Processor time of a call, median [us].
-        us_low: 10 % quantile of that time [us].
-        us_high: 90 % quantile of that time [us].
-        over_mj_step: Processor time of a call over that of ``mj_step``.
-        not_covered: Contacts that it reported of pairs it does not cover; they are not counted.
+        opposite: Number of normals at more than 90 degrees to MuJoCo's.
+        us_per_step: Median processor time of a call [us].
+        us_low: 10 % quantile of the processor time [us].
+        us_high: 90 % quantile of the processor time [us].
+        over_mj_step: Median processor time of a call divided by that of ``mj_step``.
+        not_covered: Number of reported contacts of pairs outside ``covers``, which are not counted.
         disagreements: Differences from the ground truth, in order of time.
     """
 
@@ -95,7 +96,7 @@ class Score:
 
     @property
     def precision(self) -> float | None:
-        """Fraction of the reports that are right."""
+        """Fraction of the reports that are correct."""
         return self.correct / self.reports if self.reports and self.correct is not None else None
 
 
@@ -103,11 +104,7 @@ class Score:
 class Report:
     """The comparison of several checkers on one run of a scene.
 
-    It prints as a table with a line for each checker. precision: fraction of its reports that are
-    true. recall: fraction of the true contacts that it reported within a step. events: contacts of
-    the pairs that it covers. delay_ms: from the touch to its first report; lead_ms: how much
-    earlier than MuJoCo. depth_mm, normal_deg: difference from MuJoCo's. us_per_step: of one check;
-    over_mj_step: the same over ``mj_step``'s.
+    It prints as a table with a line per checker; :class:`Score` explains the columns.
 
     Attributes:
         scene: Name of the scene.
@@ -118,8 +115,7 @@ class Report:
         disagreements: Differences of all checkers from the ground truth.
         first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
         step_us: Median processor time of ``mj_step`` [us].
-        state_us: Median processor time of copying a state with its kinematics, which all checkers
-            share [us].
+        state_us: Median processor time of :meth:`State.of`, once per step for all checkers [us].
         run: States and contacts, if they were kept.
     """
 
@@ -198,7 +194,7 @@ class Report:
 
 
 def _by_partners(disagreements: Sequence[Disagreement]) -> list[str]:
-    """A line for each checker, kind and pair: time of the first, and number of further ones."""
+    """One line per checker, kind and pair: the first disagreement, and the number of others."""
     found: dict[tuple[Any, ...], list[Disagreement]] = defaultdict(list)
     for one in disagreements:
         found[one.checker, one.kind, one.partners].append(one)
@@ -210,7 +206,7 @@ def _by_partners(disagreements: Sequence[Disagreement]) -> list[str]:
 
 
 def pair_names(model: Any, pair: Pair) -> tuple[str, str]:
-    """Names of the partners: ``body forearm``, ``flex sheet``."""
+    """Names of the partners, such as ``body forearm`` and ``flex sheet``."""
     types = {"body": mujoco.mjtObj.mjOBJ_BODY, "flex": mujoco.mjtObj.mjOBJ_FLEX}
     first, second = (
         f"{kind} {mujoco.mj_id2name(model, types[kind], number) or number}" for kind, number in pair

@@ -19,7 +19,7 @@ class Work:
 
     Attributes:
         moved: Bodies whose motion changed since the previous call.
-        reused: Pairs answered from the previous call, because neither body has moved since.
+        reused: Pairs whose result was copied from the previous call, as neither body has moved.
         candidates: Pairs whose swept boxes overlap.
     """
 
@@ -31,23 +31,24 @@ class Work:
 class RigidChecker:
     """Times of impact of geoms on rigidly moving bodies (linear and angular motion).
 
-    Boxes and meshes (their convex hulls) go through the kernel of :mod:`tauguard.rigid`; planes,
-    spheres, capsules, cylinders and ellipsoids through conservative advancement on their support
-    functions. Times are never late; they are early by at most 1e-10 of the shapes' size in
-    distance.
+    Boxes and meshes (their convex hulls) are tested by the kernel of :mod:`tauguard.rigid`; planes,
+    spheres, capsules, cylinders and ellipsoids by conservative advancement on support functions.
+    Times are never late. At a time of impact the surfaces are at most 1e-10 of the shapes' size
+    apart.
 
     Args:
         model: MjModel.
-        threshold: ``"surface"``: a contact is two surfaces that touch. ``"margin"``: or that come
-            within MuJoCo's margin, where a force acts. ``"gap"``: or within margin + gap, as MuJoCo
-            lists them. A row whose surfaces do not touch has a positive distance.
+        threshold: Which distance of two surfaces counts as a contact. ``"surface"``: 0 (they
+            touch). ``"margin"``: MuJoCo's margin, below which a force acts. ``"gap"``: margin +
+            gap, below which MuJoCo lists contacts. If the surfaces do not touch, ``distance`` is
+            positive.
         skip: Kinds of geoms to leave out.
-        mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo; ``"surface"``: its triangles,
-            without an interior. Against meshes and boxes surfaces then have no margin and no depth.
+        mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo. ``"surface"``: a mesh is its
+            triangles, without inside; contacts with meshes and boxes then have no margin or depth.
 
     Raises:
-        ValueError: a geom that may touch something and is of a kind that cannot be handled
-            (named), an unknown threshold or meaning of a mesh.
+        ValueError: a geom that may touch another and is of a kind that cannot be handled (named),
+            or an unknown ``threshold`` or ``mesh``.
     """
 
     name = "rigid"

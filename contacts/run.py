@@ -1,4 +1,4 @@
-"""A run of a scene that several checkers observe."""
+"""The record of a run of a scene with several checkers."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,8 +9,8 @@ from tauguard.arrays import Array
 from tauguard.contacts.checker import Contacts, State
 from tauguard.contacts.ground_truth import Touches
 
-#: Surfaces closer than this touch [m]: swept checkers stop within 1e-10 of the shapes' size, and
-#: the ground truth's tolerance is a thousand times larger.
+#: Surfaces closer than this count as touching [m]. Swept checkers stop within 1e-10 of the shapes'
+#: size, and the tolerance of the ground truth is a thousand times larger.
 TOUCHING = 1e-8
 
 
@@ -26,7 +26,7 @@ class Run:
         seconds: Processor time of each call [s], by checker.
         step_seconds: Processor time of each ``mj_step`` [s].
         state_seconds: Processor time of copying each state [s].
-        states: All states if they were kept, otherwise the first.
+        states: All states if they were kept, otherwise only the first.
     """
 
     model: Any

@@ -21,10 +21,11 @@ _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run) -> Score:
     """Precision, recall, lead, differences and cost of one checker.
 
-    Recall counts events: contacts of two partners from the first touch to separation, except
-    those that stay within the tolerance. Precision counts reports: a step and two partners whose
-    surfaces touch; margins are not scored. Both count only kinds of pairs that the checker and
-    the ground truth cover; all other metrics count the kinds that the checker covers.
+    Recall counts events. An event is a contact of two partners from the first touch to separation;
+    events that stay within the tolerance are not counted. Precision counts reports. A report is a
+    step and two partners whose surfaces touch in it; contacts within a margin are not counted. Both
+    count only kinds of pairs that the checker and the ground truth cover. All other metrics count
+    the kinds that the checker covers.
     """
     kinds = geom_kinds(model)
     given = run.contacts[name]
@@ -81,8 +82,8 @@ def judge(
 ) -> tuple[Outcome, ...]:
     """Whether MuJoCo listed each event, and whether the contact held.
 
-    A contact held if MuJoCo listed it and it was never deeper than the thinner partner's inner
-    radius (planes and cloth have none). Also, no normal may reverse from one step to the next.
+    A contact held if MuJoCo listed it, it was never deeper than the inner radius of the thinner
+    partner (planes and cloth have none), and no normal reversed from one step to the next.
     """
     if not touches:
         return ()
@@ -111,7 +112,7 @@ def _touching(contacts: Contacts) -> Contacts:
 def _reports(
     model: Any, times: Sequence[float], steps: Sequence[Contacts]
 ) -> dict[Pair, list[float]]:
-    """Times of all reports by pair, rising [s]."""
+    """Times of all reports of each pair, in rising order [s]."""
     out: dict[Pair, list[float]] = defaultdict(list)
     for k, contacts in enumerate(steps):
         first: dict[Pair, float] = {}
@@ -151,7 +152,7 @@ def _precision(
     mine: Sequence[Contacts],
     touches: Sequence[Touches],
 ) -> tuple[int, int, list[tuple[float, Pair, float]]]:
-    """Reports that are true or within the tolerance, all reports, and the false ones."""
+    """Numbers of correct and of all reports, and the false ones as (time, pair, depth)."""
     right = total = 0
     false = []
     for k, (contacts, touch) in enumerate(zip(mine, touches, strict=True)):
@@ -171,7 +172,7 @@ def _precision(
 
 
 def _steps(model: Any, mine: Sequence[Contacts], touches: Sequence[Touches]) -> tuple[int, int]:
-    """Steps and pairs that touch beyond the tolerance, and those reported in that very step."""
+    """Number of steps and pairs that touch beyond the tolerance, and of those reported in it."""
     positive = found = 0
     for contacts, touch in zip(mine, touches, strict=True):
         true = {
@@ -189,7 +190,7 @@ def _steps(model: Any, mine: Sequence[Contacts], touches: Sequence[Touches]) -> 
 
 
 def _delay(truth: Sequence[Event], reports: dict[Pair, list[float]], step: float) -> float | None:
-    """Median time from onset to first report of the events seen [ms]."""
+    """Median time from the onset of an event to its first report [ms]."""
     delays = []
     for event in truth:
         times = [
@@ -211,8 +212,9 @@ def _differences(
 ) -> tuple[list[float], list[float]]:
     """Differences of depth [m] from MuJoCo, and angles between both normals [rad].
 
-    At the same state, of each pair (and element) the deepest row that MuJoCo listed at the end of a
-    step: beside it the rows at the end of that step, and those at the start of the next one.
+    For each pair (and element) the deepest contact that MuJoCo lists at the end of a step is
+    compared with the checker's deepest contact at the same state: at the end of this step or at the
+    start of the next one.
     """
     depth, angle = [], []
     for k, there in enumerate(theirs):
@@ -228,7 +230,7 @@ def _differences(
 
 
 def _deepest(contacts: Contacts) -> dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]]:
-    """Distance and normal of the deepest row of each two partners, the lower number first."""
+    """Distance and normal of the deepest row of each pair, with the lower number first."""
     out: dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]] = {}
     element = np.where(contacts.flex >= 0, contacts.feature, -1)
     partners = np.stack([contacts.geom, contacts.flex, element], axis=2).tolist()
@@ -250,7 +252,7 @@ def _passed(before: _Rows, rows: _Rows) -> bool:
 def _tracks(
     model: Any, times: Sequence[float], steps: Sequence[Contacts]
 ) -> dict[Pair, list[tuple[float, _Rows]]]:
-    """By pair: the time of each step in which it touches, and its rows, by what touches."""
+    """For each pair, the end time of each step in which it touches, and the rows of this step."""
     inner = _inner_radius(model)
     out: dict[Pair, list[tuple[float, _Rows]]] = defaultdict(list)
     for k, contacts in enumerate(steps):

@@ -27,7 +27,7 @@ class SurfacePairs:
     """
 
     def __init__(self, model: Any, pairs: Sequence[tuple[int, int]]) -> None:
-        """Build one tree per geom, in its body's frame."""
+        """Build one tree per geom, in the frame of its body."""
         self._pairs = list(pairs)
         self._body = model.geom_bodyid
         kinds = geom_kinds(model)
@@ -46,7 +46,7 @@ class SurfacePairs:
         }
 
     def check(self, before: State, after: State) -> Contacts:
-        """The first contact of each pair; surfaces that intersect at the start have depth 0."""
+        """The first contact of each pair; the depth is 0 if surfaces intersect at the start."""
         motions: dict[int, Motion] = {}
         rows = []
         for a, b in self._pairs:
@@ -79,7 +79,7 @@ class SurfacePairs:
         return Motion(pose, after.xpos[body] - before.xpos[body], turn)
 
     def _apart(self, a: int, b: int, one: Motion, other: Motion) -> bool:
-        """Whether balls around both bodies' origins stay apart on the whole path."""
+        """Whether balls around the origins of both bodies stay apart on the whole path."""
         start: Array = other.pose_t0[0, :3, 3] - one.pose_t0[0, :3, 3]
         drift: Array = other.linear[0] - one.linear[0]
         along = float(np.clip(-(start @ drift) / max(float(drift @ drift), 1e-300), 0, 1))

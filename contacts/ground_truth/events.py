@@ -1,4 +1,4 @@
-"""Join contacts of single steps to events, and find the events that a checker reported."""
+"""Join the contacts of single steps to events."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
 
-#: Longest pause within one event [s]; pauses of up to two steps never end an event.
+#: Longest interruption within one event [s]. Interruptions of up to two steps never end an event.
 GAP = 5e-3
 
 #: Two partners, sorted: ("body", id) or ("flex", id).
@@ -24,7 +24,7 @@ class Event:
     counts: bool  #: False: never deeper than the tolerance, so not scored
 
     def seen(self, times: Sequence[float], timestep: float) -> bool:
-        """Whether one of a checker's ``times`` [s] is in the event or within a step of it."""
+        """Whether one of the ``times`` [s] is in the event or within a step of it."""
         return any(self.onset - timestep <= t <= self.end + timestep for t in times)
 
 
@@ -42,12 +42,12 @@ def events(model: Any, times: Sequence[float], touches: Sequence[Touches]) -> li
     """The events of a run, by onset.
 
     Args:
-        model: the scene's.
-        times: times of the states, one more than ``touches`` [s].
-        touches: of the steps between them.
+        model: MjModel.
+        times: Times of the states [s], one more than ``touches``.
+        touches: Contacts of the steps between the states.
 
     Raises:
-        ValueError: numbers that do not fit.
+        ValueError: lengths that do not match.
     """
     if len(times) != len(touches) + 1:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""The positions of geoms and flex vertices within a step: the path that checkers get."""
+"""The positions of geoms and flex vertices within a step, on the path of the checkers."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from tauguard.contacts.checker import State
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a whole scene, geom by geom.
+    """One step of a scene, by geoms.
 
-    A body's point y moves as ``xpos + s dx + exp(s [w]x) xmat y``, s in [0, 1]; flex vertices move
-    linearly.
+    A point y of a body moves as ``xpos + s dx + exp(s [w]x) xmat y``, s in [0, 1]. Flex vertices
+    move linearly.
     """
 
-    origin: Array  #: the body's origin at s = 0, for each geom, shape (ngeom, 3) [m]
+    origin: Array  #: origin of each geom's body at s = 0, shape (ngeom, 3) [m]
     shift: Array  #: dx, shape (ngeom, 3) [m]
     turn: Array  #: w in the world frame, shape (ngeom, 3) [rad]
     arm: Array  #: vector from the body's origin to the geom's centre at s = 0, shape (ngeom, 3) [m]
@@ -58,6 +58,6 @@ class Step:
         return center, turn.as_matrix() @ self.xmat[geoms]
 
     def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
-        """Upper bound of how far rotation moves points within ``radius`` (K,) of the centre [m]."""
+        """Bound on how far rotation moves points within ``radius`` (K,) of a geom's centre [m]."""
         spin = np.linalg.norm(self.turn[geoms], axis=1)
         return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))

@@ -1,4 +1,4 @@
-"""The pairs that may touch by MuJoCo's rules: a second, independent implementation."""
+"""The pairs that may touch by MuJoCo's rules, implemented independently of contacts/pairs.py."""
 
 from typing import Any
 

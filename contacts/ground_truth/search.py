@@ -1,10 +1,9 @@
-"""Find first contact and depth along a path, given a distance and a bound on its change.
+"""Find first contact and depth along a path, from a distance and a bound on its change.
 
-A signed distance d(s) between two things whose points move by at most L relative to one another
-over the step obeys |d(s) - d(t)| <= L |s - t|. Hence d has no zero in [a, b] while
-d(a) + d(b) > L (b - a): intervals are halved until each is cleared, known to be deep, or shorter
-than the resolution (Piyavskii 1972; conservative advancement uses the same bound). Samples
-alone would prove nothing about the times between them.
+Let d(s) be the signed distance of two objects whose points move by at most L relative to each other
+in the step. Then |d(s) - d(t)| <= L |s - t|, so d has no zero in [a, b] if d(a) + d(b) > L (b - a).
+Intervals are halved until this holds, or a penetration is found, or the interval is shorter than
+the resolution (Piyavskii 1972; conservative advancement uses the same bound).
 """
 
 from collections.abc import Callable
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 
-#: Signed distance [m] of the pairs ``rows`` at ``s``: both shape (K,), result (K,).
+#: Function (rows, s), both of shape (K,), that returns signed distances of pairs [m], shape (K,).
 Distance = Callable[[NDArray[Any], Array], Array]
 
 
@@ -24,21 +23,21 @@ Distance = Callable[[NDArray[Any], Array], Array]
 class Found:
     """The result of a search for each pair; every field has shape (N,)."""
 
-    time: Array  #: first touch, fraction of the step, late by less than resolution / L; or inf
+    time: Array  #: fraction of the step at first touch, late by less than resolution / L; or inf
     depth: Array  #: largest depth found [m]; 0 without penetration
-    near: NDArray[np.bool_]  #: closer to contact than the resolution, and not known to be deep
+    near: NDArray[np.bool_]  #: within the resolution of contact, and no depth above the tolerance
 
 
 def search(
     distance: Distance, bound: Array, tolerance: float = 1e-5, resolution: float = 2e-6
 ) -> Found:
-    """Find the first touch of each pair and whether any is deeper than ``tolerance``.
+    """Find the first touch of each pair, and whether it becomes deeper than ``tolerance``.
 
     Args:
-        distance: function that gives the distances of pairs at given times.
-        bound: bound L of each pair [m], shape (N,).
-        tolerance: depth above which a pair counts [m]; the search stops looking for more.
-        resolution: smaller distances may count as touching [m].
+        distance: Distances of pairs at given times.
+        bound: Bound L of each pair [m], shape (N,).
+        tolerance: Depth at which the search for greater depths ends [m].
+        resolution: Smaller distances may count as touching [m].
     """
     n = len(bound)
     rows = np.arange(n)
@@ -65,7 +64,7 @@ def search(
         np.minimum.at(first, rows[short], b[short])
         keep = open_ & ~short
         rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
-        # Both ends are free of contact over d / L: split the remaining interval in the middle.
+        # There is no contact within d / L of either end. Split the rest in the middle.
         low = a + np.maximum(da, 0) / bound[rows]
         high = np.maximum(b - np.maximum(db, 0) / bound[rows], low)
         middle = np.clip((low + high) / 2, a + 0.05 * (b - a), b - 0.05 * (b - a))

@@ -1,4 +1,4 @@
-"""Find the pairs that touch on the checkers' path, and the times."""
+"""Find the pairs that touch on the path between two states, and when."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from tauguard.contacts.ground_truth.search import Found, search
 
 #: A pair that never penetrates deeper than this is not scored [m].
 TOLERANCE = 1e-5
-#: Kinds of geoms that a flex may meet here.
+#: Kinds of geoms that the ground truth can test against a flex.
 FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
 
@@ -29,8 +29,8 @@ class Touches:
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
         time: Time of the first touch, as a fraction of the step. Shape (K,).
-        depth: Largest depth found; the search for depth ends above the tolerance. Shape (K,), m.
-        counts: False: not scored, because the depth never exceeds :data:`TOLERANCE`. Shape (K,).
+        depth: Largest depth found; the search ends above the tolerance. Shape (K,), m.
+        counts: Whether the depth exceeds :data:`TOLERANCE`; otherwise not scored. Shape (K,).
     """
 
     geom: Index
@@ -44,15 +44,15 @@ class Touches:
 
 
 class GroundTruth:
-    """True contacts of every pair of a scene: rigid geoms against one another and against flexes.
+    """True contacts of geoms with each other and with flexes.
 
-    Rigid pairs by ``mj_geomDistance`` at poses in between, flex elements (triangles of thickness
-    2 ``flex_radius``) in closed form against spheres, capsules and planes, by coal's GJK against
-    other convex geoms. Margins are ignored: a pair touches if its surfaces do. This code is slow
-    and shares no code with the checkers.
+    The distance of two geoms is that of ``mj_geomDistance``. The distance of flex elements
+    (triangles of thickness 2 ``flex_radius``) is computed in closed form from spheres, capsules and
+    planes, and by coal's GJK from other convex geoms. Margins are ignored. The code is slow and
+    independent of the checkers.
 
     Args:
-        model: the scene's.
+        model: MjModel.
 
     Raises:
         ValueError: a flex that is not two-dimensional, or that may meet a geom of another kind than
@@ -74,7 +74,7 @@ class GroundTruth:
                 if model.flex_dim[flex] != 2 or kinds[geom] not in FLEX_MEETS:
                     raise ValueError(
                         f"flex {name!r} (dim {model.flex_dim[flex]}) and geom "
-                        f"{geom} ({kinds[geom]}): the ground truth knows flexes of dim 2 against "
+                        f"{geom} ({kinds[geom]}): the ground truth handles flexes of dim 2 with "
                         f"{', '.join(FLEX_MEETS)}"
                     )
                 self._meets.append((flex, geom, kinds[geom]))
@@ -142,7 +142,7 @@ class GroundTruth:
         return out
 
     def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
-        """The row of a flex and a geom: first touch of any element, and largest depth."""
+        """The row of a flex and a geom: first touch and largest depth over all elements."""
         model = self.model
         begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
         elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)
@@ -176,7 +176,7 @@ class GroundTruth:
         return [((geom, -1), (-1, flex), float(found.time[first]), deepest, deepest > TOLERANCE)]
 
     def _soft_distance(self, geom: int, kind: str) -> Callable[[Array, Array, Array], Array]:
-        """Distance of a flex element's middle surface to ``geom``: (center, xmat, corners)."""
+        """Function (center, xmat, corners): distance of triangles from a posed geom [m]."""
         size = self.model.geom_size[geom]
         if kind == "plane":
             return lambda center, xmat, corners: np.asarray(

@@ -10,7 +10,7 @@ from tauguard.arrays import Array
 
 
 def point_triangle(point: Array, corners: Array) -> Array:
-    """Distance of points (K, 3) to triangles (K, 3, 3) [m]: the minimum over face and edges."""
+    """Distance of points (K, 3) from triangles (K, 3, 3) [m]."""
     edges = np.roll(corners, -1, axis=1) - corners
     best = np.full(len(point), np.inf)
     for k in range(3):
@@ -30,7 +30,7 @@ def point_triangle(point: Array, corners: Array) -> Array:
 
 
 def segment_triangle(start: Array, stop: Array, corners: Array) -> Array:
-    """Distance of segments, both ends (K, 3), to triangles (K, 3, 3) [m]; 0 where they cross."""
+    """Distance of segments with ends (K, 3) from triangles (K, 3, 3) [m]; 0 if they cross."""
     best = np.minimum(point_triangle(start, corners), point_triangle(stop, corners))
     for k in range(3):
         other = segment_segment(start, stop, corners[:, k], corners[:, (k + 1) % 3])
@@ -45,14 +45,14 @@ def segment_triangle(start: Array, stop: Array, corners: Array) -> Array:
 
 
 def segment_segment(p0: Array, p1: Array, q0: Array, q1: Array) -> Array:
-    """Distance of two segments, all end points (K, 3) [m]."""
+    """Distance of two segments with ends (K, 3) [m]."""
     u, v, w = p1 - p0, q1 - q0, p0 - q0
     uu, uv, vv, uw, vw = _dot(u, u), _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
     det = uu * vv - uv * uv
     skew = det > 1e-14 * uu * vv
     s = np.where(skew, np.clip((uv * vw - vv * uw) / np.where(skew, det, 1.0), 0, 1), 0.0)
     best = np.full(len(p0), np.inf)
-    # The nearest points are interior to both, or one of them is an end point.
+    # Either both nearest points are inside the segments, or one is an end.
     for s_try in (s, np.zeros_like(s), np.ones_like(s)):
         t = np.clip((vw + s_try * uv) / np.maximum(vv, 1e-300), 0, 1)
         s_best = np.clip((t * uv - uw) / np.maximum(uu, 1e-300), 0, 1)
@@ -93,7 +93,7 @@ class HullDistance:
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
     def __call__(self, center: Array, xmat: Array, corners: Array) -> Array:
-        """Distances [m] at poses (K, 3), (K, 3, 3) to triangles (K, 3, 3); 0 for an overlap."""
+        """Distances [m] at poses (K, 3), (K, 3, 3) from triangles (K, 3, 3); 0 for overlap."""
         out = np.empty(len(center))
         for k in range(len(center)):
             self._result.clear()

@@ -1,4 +1,4 @@
-"""The pairs that a guard covers, and the eroded shapes by which it judges them."""
+"""The pairs that a guard covers, and their eroded shapes."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,14 +14,14 @@ from tauguard.contacts.guard.report import Pair, Partner
 from tauguard.contacts.guard.tunnelling import elements
 from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
 
-#: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes
-#: of the last level never meet, the pair cannot have passed through itself anywhere.
+#: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes of
+#: the last level never meet, no part of one partner has passed through the other.
 LEVELS = (0.0, 0.5, 0.75, 0.95)
-#: Geoms against flexes have one more level, no deeper than this many radii of the flex:
-#: MuJoCo pushes a cloth's triangles out of a geom each by its own shortest way.
+#: Geoms have one more level against flexes, with a layer of at most half this many radii of the
+#: flex: MuJoCo pushes each triangle of a cloth out of a geom in its own direction.
 NEAR_FLEX = 4.0
 
-#: Native numbers of the carriers of contact parameters.
+#: Native numbers of the objects that have contact parameters.
 _PLACES = {"pair": 0, "geom": 1, "flex": 2}
 
 
@@ -29,19 +29,19 @@ class Covered:
     """Chooses the pairs and shapes of a native guard.
 
     Attributes:
-        pairs: Covered pairs, by their numbers; flexes against flexes come last.
-        sheets: Covered pairs of flexes, by their ids.
+        pairs: Covered pairs in the order of their native numbers; pairs of flexes are last.
+        sheets: Covered pairs of flexes, by ids.
         uncovered: Pairs that may touch and are not covered.
 
     Args:
         model: MjModel.
         guard: The native guard.
         rigid: Whether geoms against geoms are covered.
-        cloth: Whether flexes are covered, against geoms, one another and themselves.
+        cloth: Whether flexes are covered, against geoms, each other and themselves.
     """
 
     def __init__(self, model: Any, guard: Guard, rigid: bool, cloth: bool) -> None:
-        """Choose the pairs and copy the shapes, at every level."""
+        """Choose the pairs, and add the shapes of every level to the guard."""
         self._model, self._guard = model, guard
         kinds = geom_kinds(model)
         self._eroded = ErodedShapes(model, kinds, guard)
@@ -126,5 +126,5 @@ def names(covers: Sequence[str]) -> tuple[bool, bool]:
     """
     for one in covers:
         if one not in ("rigid", "cloth"):
-            raise ValueError(f"checker {one!r}: expected rigid or cloth, which a guard covers")
+            raise ValueError(f"checker {one!r}: expected rigid or cloth")
     return "rigid" in covers, "cloth" in covers

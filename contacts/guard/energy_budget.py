@@ -15,25 +15,25 @@ class EnergyBalance:
     """Energy and momentum of all moving bodies before and after a step."""
 
     energy: Array
-    """Before and after (rows): of position as MuJoCo counts it (gravity, springs), kinetic, and of
-    the stretch of elastic flexes, which MuJoCo leaves out. Shape (2, 3), J."""
-    momentum: Array  #: linear, before and after, shape (2, 3) [N s]
+    """Rows: before and after. Columns: potential energy of MuJoCo (gravity, springs), kinetic
+    energy, and the stretch energy of elastic flexes, which MuJoCo leaves out. Shape (2, 3) [J]."""
+    momentum: Array  #: linear momentum before and after, shape (2, 3) [N s]
 
 
 class EnergyMeter:
     """Computes :class:`EnergyBalance` with its own MjData.
 
     Args:
-        model: the scene's.
+        model: MjModel.
     """
 
     def __init__(self, model: Any) -> None:
-        """Make an MjData to work in, and the sheets' stiffness."""
+        """Allocate an MjData, and copy the stiffness of elastic flexes."""
         self._model, self._data = model, mujoco.MjData(model)
         self._sheets = sheets_of(model)
 
     def between(self, first: Array, last: Array) -> EnergyBalance:
-        """The balance between two states (``mjSTATE_INTEGRATION``)."""
+        """The balance of two states (``mjSTATE_INTEGRATION``)."""
         rows = [self._read(state) for state in (first, last)]
         return EnergyBalance(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]))
 
@@ -50,7 +50,7 @@ class EnergyMeter:
 
 
 def sheets_of(model: Any) -> list[Sheet]:
-    """The elastic flexes of triangles, whose stretch energy MuJoCo does not count."""
+    """The elastic two-dimensional flexes, whose stretch energy MuJoCo does not count."""
     return [
         _sheet(model, flex)
         for flex in range(model.nflex)
@@ -64,5 +64,5 @@ def _sheet(model: Any, flex: int) -> Sheet:
     own = model.flex_elemedge[begin : begin + 3 * elements] + edges
     ends = (model.flex_edge[own] + int(model.flex_vertadr[flex])).astype(np.int32).ravel()
     packed = model.flex_stiffness[place : place + 21 * elements].reshape(-1, 21)
-    stiffness = packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]  # of its upper triangle, by rows
+    stiffness = packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]  # MuJoCo stores the upper triangle
     return Sheet(ends, model.flexedge_length0[own] ** 2, np.ascontiguousarray(stiffness).ravel())

@@ -1,9 +1,9 @@
-"""Addresses of MuJoCo's functions and of one model's and data's fields, for the native guard.
+"""Addresses of MuJoCo's functions, and of the fields of a model and its data, for the native guard.
 
-Functions come from the library that the Python binding has loaded. Arrays are found through the
-binding. Scalars, and arrays that MuJoCo moves within its arena, are found through the layout of
-the structs, as :mod:`mujoco.introspect` declares it for the installed version; it is compared with
-what the binding shows.
+Functions are those of the library that the Python binding has loaded. The binding gives the
+addresses of arrays. Scalars, and arrays that MuJoCo moves within its arena, are found by the layout
+of the structs, which :mod:`mujoco.introspect` declares for the installed version. This layout is
+checked against values of the binding.
 """
 
 import ctypes
@@ -36,7 +36,7 @@ FUNCTIONS = (
     "_mjPRIVATE_setTlsLogHandler",  # as in the Python binding: errors become exceptions
     "_mjPRIVATE_getGlobalLogHandler",
 )
-#: Flags of features whose state or distances a guarded step cannot roll back.
+#: Flags of features that are refused, because a step with them cannot be rolled back.
 REFUSED = {
     "ipc": mujoco.mjtEnableBit.mjENBL_IPC,
     "speculative": mujoco.mjtEnableBit.mjENBL_SPECULATIVE,
@@ -71,7 +71,7 @@ OPTIONS = (
     *("timestep", "disableflags", "enableflags", "integrator", "cone", "solver", "iterations"),
     *("o_margin", "o_solref"),
 )
-#: Options of physics; like a model's other numbers, they must be finite.
+#: Physical options, which must be finite.
 PHYSICS = (
     *("gravity", "wind", "magnetic", "density", "viscosity", "impratio", "tolerance"),
     *("o_margin", "o_solref", "o_solimp", "o_friction"),
@@ -105,9 +105,9 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
 
     Args:
         model: MjModel.
-        data: the MjData to step.
-        end: another MjData of the model.
-        other: a third MjData; without mocap bodies it may be ``end``.
+        data: The MjData to step.
+        end: Another MjData of the model.
+        other: A third MjData; without mocap bodies it may be ``end``.
 
     Raises:
         RuntimeError: the structs of the installed MuJoCo differ from their declared layout.
@@ -174,8 +174,8 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
     )
     if not all(same):
         raise RuntimeError(
-            f"MuJoCo {mujoco.__version__}: its structs are laid out otherwise than it declares; "
-            "guarded steps need MuJoCo 4.0"
+            f"MuJoCo {mujoco.__version__}: its structs differ from their declared layout; guarded "
+            "steps need MuJoCo 4.0"
         )
 
 
@@ -184,7 +184,7 @@ def _array(owner: Any, name: str) -> int:
 
 
 def _structs() -> Any:
-    """MuJoCo's declarations by the name of the struct (a slow import)."""
+    """MuJoCo's declarations of structs by name; the import is slow."""
     from mujoco.introspect.structs import STRUCTS
 
     return STRUCTS

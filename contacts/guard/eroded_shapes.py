@@ -15,7 +15,7 @@ _NONE = np.zeros((0, 3))
 
 
 class ErodedShapes:
-    """The shapes of a model's geoms at any depth; each is added to a native guard once.
+    """Eroded shapes of a model's geoms; each is added to the native guard once.
 
     Args:
         model: MjModel.
@@ -41,7 +41,7 @@ class ErodedShapes:
         return self._hull(geom).radius if kind == "mesh" else 0.0
 
     def add(self, geom: int, layer: float) -> int:
-        """Erode ``geom`` by ``layer`` [m], less than its radius; return the shape's number."""
+        """Erode ``geom`` by ``layer`` [m], below its radius, and return the shape's number."""
         key = (geom, layer)
         if key not in self._added:
             self._added[key] = self._new(geom, layer)
@@ -68,10 +68,10 @@ class ErodedShapes:
 
 
 def frame_on_body(model: Any, geom: int) -> tuple[Array, Array]:
-    """Position (3,) [m] and rotation (9,) of a geom on its body in MuJoCo's kinematics.
+    """Position (3,) [m] and rotation (9,) of a geom relative to its body, as MuJoCo uses them.
 
-    A geom that had the frame of its body or of the body's inertia when the model was compiled
-    keeps it, whatever ``geom_pos`` and ``geom_quat`` say (``geom_sameframe``).
+    If the compiled geom has the frame of its body or of the body's inertia (``geom_sameframe``),
+    MuJoCo ignores ``geom_pos`` and ``geom_quat``.
     """
     kinds, own = mujoco.mjtSameFrame, int(model.geom_sameframe[geom])
     body = int(model.geom_bodyid[geom])
@@ -90,7 +90,7 @@ def frame_on_body(model: Any, geom: int) -> tuple[Array, Array]:
 
 
 class _Hull:
-    """The convex hull of points around a mesh's centre, and its faces pushed inwards."""
+    """A convex hull and its erosion. The origin is the centre of the mesh."""
 
     def __init__(self, vertices: Array) -> None:
         from scipy.optimize import linprog
@@ -101,15 +101,15 @@ class _Hull:
         try:
             self._faces = np.unique(ConvexHull(vertices).equations, axis=0)
         except QhullError:
-            return  # flat: its middle surface only
-        # The largest ball inside: n.x + r <= -d for every face.
+            return  # a flat hull is not eroded
+        # The largest ball inside the hull: n.x + r <= -d for every face.
         n, d = self._faces[:, :3], self._faces[:, 3]
         ball = linprog([0, 0, 0, -1], np.c_[n, np.ones(len(n))], -d, bounds=[(None, None)] * 4)
         if ball.success and ball.x[3] > 0:
             self._middle, self.radius = ball.x[:3], float(ball.x[3])
 
     def core(self, layer: float) -> Array:
-        """The corners of the hull eroded by a layer."""
+        """The vertices of the hull eroded by ``layer`` [m]."""
         from scipy.spatial import HalfspaceIntersection, QhullError
 
         if layer <= 0 or self._faces is None:
@@ -120,8 +120,8 @@ class _Hull:
             corners = corners[np.isfinite(corners).all(axis=1)]
         except QhullError:
             corners = _NONE
-        if len(corners) < 4:  # a very thin body: scale towards the middle instead
+        if len(corners) < 4:  # a very thin body is scaled towards its middle instead
             corners = self._middle + (1 - layer / self.radius) * (self._vertices - self._middle)
-        # The mesh's own centre is in every eroded shape, although a thinner end may lie deeper.
+        # Every eroded shape must contain the centre of the mesh, also if erosion would remove it.
         about_centre = (1 - layer / self.radius) * self._vertices
         return np.ascontiguousarray(np.unique(np.concatenate([corners, about_centre]), axis=0))

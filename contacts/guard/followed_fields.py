@@ -1,8 +1,8 @@
 """The model's fields that a guard compares between two steps, and values that it refuses.
 
-If a field that the guard has copied from has changed, the guard reads pairs and shapes anew. Other
-numbers only have to be valid. The native part follows the contact parameters that the guard itself
-writes.
+The guard copies some fields; if one of them has changed, it reads pairs and shapes again. All other
+numbers must only be valid. The contact parameters that the guard itself writes are followed by the
+native part (stiffening.hpp).
 """
 
 import functools
@@ -25,7 +25,7 @@ _PAIRS = (
     *("flex_contype", "flex_conaffinity", "flex_selfcollide", "flex_rigid", "flex_dim"),
     *("exclude_signature", "pair_geom1", "pair_geom2"),
 )
-#: Fields of shapes and of their poses on bodies.
+#: Fields that determine shapes and their poses on bodies.
 _SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
     *("flex_radius", "flex_elem"),
@@ -34,33 +34,35 @@ _SHAPES = (
 _MOTION = (
     *("flex_stiffness", "flexedge_length0", "eq_type", "eq_objtype", "eq_obj1id", "eq_obj2id"),
 )
-#: How the model is built; MuJoCo reads and writes beyond its arrays where this is edited.
+#: Fields of the model's structure; if they are edited, MuJoCo reads and writes beyond its arrays.
 _STRUCTURE = re.compile(
     "(body|jnt|dof|tree|geom|site|flex|tendon|wrap|actuator|sensor|mesh|hfield)_.*(adr|num|id|row)$"
     "|(jnt|wrap)_type$"
 )
 _NOT_STRUCTURE = re.compile("geom_dataid|.*matid")
-#: Fields with the number of contact dimensions, and its allowed values.
+#: Fields with the number of contact dimensions.
 _DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
+#: Allowed numbers of contact dimensions.
 _CONDIM = (1, 3, 4, 6)
-#: Objects whose numbers must be valid, by the rules of followed_fields.hpp: limits may be infinite.
+#: Fields whose numbers must be valid, by the rules of followed_fields.hpp.
 _OBJECTS = re.compile("(body|jnt|dof|geom|pair|flex|eq|site|tendon|wrap|actuator)_|qpos(0|_spring)")
 _FINITE, _NOT_NAN, _NOT_NEGATIVE = range(3)
-_LIMITS = re.compile("range|yield|_user")
+_LIMITS = re.compile("range|yield|_user")  # these fields may be infinite
 _MASSES = ("body_mass", "body_inertia", "dof_armature", "tendon_armature", "flex_radius")
-_WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # by the guard itself
-#: MuJoCo normalizes quaternions when it compiles a model, and later assumes unit length.
+_WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # written by the guard itself
+#: Largest deviation of a quaternion's length from 1. MuJoCo normalizes quaternions when it compiles
+#: a model, and later assumes unit length.
 _UNIT = 1e-6
 
 Regions = list[tuple[int, int]]
 
 
 def followed_fields(model: Any, options: Regions) -> Regions:
-    """Addresses and sizes in bytes of the fields that a guard of this model depends on.
+    """Addresses and sizes in bytes of the fields that a guard of this model copies.
 
     Args:
         model: MjModel.
-        options: address and size in bytes of the followed options.
+        options: Addresses and sizes in bytes of the options that are followed.
     """
     out = list(options)
     for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS, *_structure()):
@@ -75,7 +77,7 @@ def followed_fields(model: Any, options: Regions) -> Regions:
 
 @functools.cache
 def _fields() -> dict[str, NDArray[Any]]:
-    """Every array of a model without objects: the names and kinds of all models' fields."""
+    """Every array of an empty model, from which names and types of fields are read."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     fields = {name: getattr(model, name) for name in dir(model)}
     return {name: field for name, field in fields.items() if isinstance(field, np.ndarray)}
@@ -88,28 +90,28 @@ def _structure() -> tuple[str, ...]:
 
 
 def structure(model: Any) -> dict[str, NDArray[np.int32]]:
-    """Copies of the fields that say how the model is built, by name."""
+    """Copies of the fields of the model's structure, by name."""
     return {name: getattr(model, name).copy() for name in _structure()}
 
 
 def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
-    """Refuse another structure than the one the model was built with.
+    """Compare the structure of the model with the structure ``built`` at compilation.
 
     Raises:
-        ValueError: the field and row, with both values.
+        ValueError: they differ; the message names field, row and both values.
     """
     for name, before in built.items():
         now = getattr(model, name)
         if (now != before).any():
             row = int(np.argwhere(now != before)[0, 0])
             raise ValueError(
-                f"{name}: row {row} is {now[row].tolist()}, when compiled it was "
-                f"{before[row].tolist()}; change the MjSpec and recompile it"
+                f"{name}: row {row} is {now[row].tolist()}, expected {before[row].tolist()} as "
+                "compiled; change the MjSpec and recompile it"
             )
 
 
 def hull_rows(model: Any) -> NDArray[np.int64]:
-    """Vertices of the hulls of all meshes that are geoms: rows of ``mesh_vert``, in order."""
+    """Rows of ``mesh_vert`` that are vertices of the hulls of mesh geoms, sorted."""
     rows = []
     kinds = np.array(geom_kinds(model))
     for mesh in np.unique(model.geom_dataid[kinds == "mesh"]).tolist():
@@ -124,7 +126,7 @@ def hull_rows(model: Any) -> NDArray[np.int64]:
 
 @functools.cache
 def _rules() -> dict[str, int]:
-    """The rule of each field of doubles of the objects."""
+    """The rule of each field of doubles."""
     rules = {
         name: _NOT_NAN if _LIMITS.search(name) else _FINITE
         for name, field in _fields().items()
@@ -138,7 +140,7 @@ def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
 
     Args:
         model: MjModel.
-        physics: address and size in bytes of the options, all of which must be finite.
+        physics: Addresses and sizes in bytes of options that must be finite.
     """
     out = [(*region, _FINITE) for region in physics]
     for name, rule in _rules().items():
@@ -149,12 +151,12 @@ def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
 
 
 def refuse_values(model: Any) -> None:
-    """Refuse numbers and shapes with which MuJoCo or a guard cannot step.
+    """Check for values with which MuJoCo or a guard cannot step.
 
     Raises:
-        ValueError: a number that is not finite (limits may be infinite), a negative mass, moment of
-            inertia, armature, radius or size, a quaternion that is not of unit length, an unknown
-            type of geom or number of contact dimensions (field, row and value).
+        ValueError: a number that is not finite (limits may be infinite); a negative mass, moment of
+            inertia, armature, radius or size; a quaternion without unit length; an unknown id, type
+            of geom or number of contact dimensions. The message names field, row and value.
     """
     for name, rule in _rules().items():
         _refuse_rows(model, name, np.isnan if rule == _NOT_NAN else _infinite, "not finite")
@@ -167,7 +169,7 @@ def refuse_values(model: Any) -> None:
     for name in _DIMENSIONS:
         _refuse_rows(model, name, lambda rows: ~np.isin(rows, _CONDIM), "not 1, 3, 4 or 6")
     kinds = [int(kind) for kind in mujoco.mjtGeom.__members__.values()]
-    _refuse_rows(model, "geom_type", lambda rows: ~np.isin(rows, kinds), "no type of MuJoCo's")
+    _refuse_rows(model, "geom_type", lambda rows: ~np.isin(rows, kinds), "an unknown type")
     for name, least, end in _targets(model):
         outside = partial(_outside, least=least, end=end)
         _refuse_rows(model, name, outside, "no such object")
@@ -181,7 +183,7 @@ def refuse_values(model: Any) -> None:
 
 
 def _targets(model: Any) -> list[tuple[str, Any, Any]]:
-    """Fields of ids: the least one of each row, and the end of their range."""
+    """Fields of ids, with the lowest valid id and the first invalid one above it, by row."""
     geoms, kind, of = mujoco.mjtGeom, model.geom_type, model.eq_type
     field = kind == geoms.mjGEOM_HFIELD
     needed = np.isin(kind, (geoms.mjGEOM_MESH, geoms.mjGEOM_SDF, geoms.mjGEOM_HFIELD))
@@ -201,7 +203,7 @@ def _targets(model: Any) -> list[tuple[str, Any, Any]]:
 
 
 def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str) -> None:
-    """Refuse a field with a wrong entry; the message has the first such row."""
+    """Raise a ``ValueError`` with the first row in which an entry is ``wrong``."""
     rows = getattr(model, name)
     found = np.argwhere(wrong(rows))
     if len(found):

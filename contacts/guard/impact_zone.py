@@ -18,10 +18,10 @@ class Hit:
     """A pair that would pass through itself."""
 
     pair: Pair
-    vertices: NDArray[np.int32]  #: of flexes, that take part; empty for two geoms
+    vertices: NDArray[np.int32]  #: affected vertices of flexes; empty for two geoms
 
 
-#: Further pairs are added this many times before everything is stopped.
+#: Number of times that pairs are added before everything is stopped.
 ROUNDS = 8
 
 
@@ -35,24 +35,25 @@ def impact_zone(
 ) -> tuple[list[Hit], float]:
     """Repeat a sub-step so that no pair passes through.
 
-    The velocity at its end is changed by as little as possible, in the metric of the inertia, so
-    that the partners of each hit do not move relative to each other (rigid impact zones: Provot
-    1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds none, except for
-    the work of mocap bodies. The bodies then follow that velocity for the sub-step. Pairs that meet
-    on this new path are added. If this does not end, or the inertia after an edit gives no
-    finite velocity, everything except mocap bodies stands still for the sub-step.
+    The velocity at the end of the sub-step is changed by as little as possible, in the metric of
+    the inertia, so that the partners of each hit do not move relative to each other (rigid impact
+    zones: Provot 1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds
+    none, except for the work of mocap bodies. The bodies move with this velocity for the sub-step.
+    Pairs that pass through on the new path are added, and the computation is repeated. If the limit
+    of repetitions is reached, or if an edited inertia gives no finite velocity, everything except
+    mocap bodies stands still for the sub-step.
 
     Args:
         model: MjModel.
-        data: MjData after the failed sub-step; its kinematics are those of the start, its mocap
-            poses those of the end.
-        qpos: Joint positions at the sub-step's start.
+        data: MjData after the failed sub-step, with the kinematics of its start and the mocap poses
+            of its end.
+        qpos: Joint positions at the start of the sub-step.
         length: Length of the sub-step [s].
         hits: The pairs that passed through.
         judge: Finds the pairs that pass through on the path from the start to ``data.qpos``.
 
     Returns:
-        All hits whose partners were stopped, and the resulting work of mocap bodies [J].
+        All hits whose partners were joined, and the resulting work of mocap bodies [J].
     """
     stopped, velocity = list(hits), data.qvel.copy()
     for _ in range(ROUNDS):
@@ -75,8 +76,9 @@ def _joined(
 ) -> tuple[Array, float] | None:
     """The velocity nearest to ``velocity`` at which the partners of each hit move as one.
 
-    With rows J, inertia M, mocap velocity c and S the impulses, J M^-1 J' S = J v + c; mocap
-    bodies do the work S c. None if a number is not finite, as M^-1 of negative moments of inertia.
+    With J the Jacobian of relative motion, M the inertia, c the mocap velocity and S the impulses:
+    J M^-1 J' S = J v + c, and mocap bodies do the work S c. ``None`` if a result is not finite, for
+    example with negative moments of inertia.
     """
     field = MocapVelocityField(model, data, length) if model.nmocap else None
     parts = [_rows(model, data, hit, field) for hit in hits]
@@ -97,7 +99,7 @@ def _joined(
 
 
 def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> tuple[Array, Array]:
-    """Jacobian of the relative motion of a hit's partners, shape (R, nv), and mocap velocity."""
+    """Jacobian of the partners' relative motion, shape (R, nv), and mocap velocity, shape (R,)."""
 
     def of(body: int, point: Array, count: int) -> tuple[Array, Array]:
         jacobian = np.zeros((6, model.nv))
@@ -125,7 +127,7 @@ def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> 
 def _apart(
     a: Sequence[tuple[Array, Array]], b: Sequence[tuple[Array, Array]]
 ) -> tuple[Array, Array]:
-    """Differences of rows and of velocities, stacked."""
+    """Differences a - b of Jacobians and of velocities, stacked."""
     pairs = list(zip(a, b, strict=True))
     return (
         np.concatenate([one[0] - other[0] for one, other in pairs]),

@@ -1,4 +1,4 @@
-"""Bodies attached to mocap bodies: their velocity, for impact zones, and their equalities."""
+"""Bodies attached to mocap bodies: velocities for impact zones, and equality constraints."""
 
 from typing import Any
 
@@ -10,12 +10,12 @@ from tauguard.arrays import Array
 
 
 class MocapVelocityField:
-    """The velocity that mocap bodies give to all bodies attached to them, over a sub-step.
+    """The mean velocity, over a sub-step, of the bodies attached to mocap bodies.
 
     Args:
         model: MjModel.
-        data: MjData whose kinematics are those of the sub-step's start; mocap poses are its end's.
-        length: length of the sub-step [s].
+        data: MjData with the kinematics of the sub-step's start and the mocap poses of its end.
+        length: Length of the sub-step [s].
     """
 
     def __init__(self, model: Any, data: Any, length: float) -> None:
@@ -27,28 +27,28 @@ class MocapVelocityField:
             number = int(model.body_mocapid[body])
             unit, turn = data.mocap_quat[number].copy(), np.zeros(3)
             mujoco.mju_normalize4(unit)
-            mujoco.mju_subQuat(turn, unit, data.xquat[body])  # in the body's own frame
+            mujoco.mju_subQuat(turn, unit, data.xquat[body])  # in the frame of the body
             turn = data.xmat[body].reshape(3, 3) @ turn
             self._start.append((number, data.xpos[body].copy()))
             self._step.append((data.mocap_pos[number] - data.xpos[body], turn))
 
     def velocity(self, body: int, point: Array) -> Array:
-        """Linear velocity of a body's point, and angular velocity, due to mocap, shape (6,)."""
+        """Linear velocity of a point of a body, and angular velocity, due to mocap. Shape (6,)."""
         carrier = int(self._carrier[body])
         out = np.zeros(6)
-        for (number, start), (way, turn) in zip(self._start, self._step, strict=True):
+        for (number, start), (shift, turn) in zip(self._start, self._step, strict=True):
             if number == carrier:
                 arm, turned = point - start, np.zeros(3)
                 angle, quat = float(np.linalg.norm(turn)), np.zeros(4)
                 axis = turn / angle if angle else np.array([1.0, 0, 0])
                 mujoco.mju_axisAngle2Quat(quat, axis, angle)
                 mujoco.mju_rotVecQuat(turned, arm, quat)
-                out[:3], out[3:] = way + turned - arm, turn
+                out[:3], out[3:] = shift + turned - arm, turn
         return out / self._length
 
 
 def pulled(model: Any) -> NDArray[np.uint8]:
-    """For each equality, whether a body attached to a mocap body takes part in it."""
+    """For each equality constraint, whether it acts on a body attached to a mocap body."""
     carried = model.body_mocapid[model.body_rootid] >= 0
     flexes = [bool(carried[_bodies(model, flex)].any()) for flex in range(model.nflex)]
     kinds, objects = mujoco.mjtEq, mujoco.mjtObj
@@ -66,7 +66,7 @@ def pulled(model: Any) -> NDArray[np.uint8]:
 
 
 def _bodies(model: Any, flex: int) -> NDArray[np.int32]:
-    """Bodies of a flex's vertices, or of its nodes if it is interpolated."""
+    """Bodies of the vertices and nodes of a flex."""
     vertices = model.flex_vertadr[flex] + np.arange(model.flex_vertnum[flex])
     nodes = model.flex_nodeadr[flex] + np.arange(model.flex_nodenum[flex])
     bodies = np.concatenate([model.flex_vertbodyid[vertices], model.flex_nodebodyid[nodes]])

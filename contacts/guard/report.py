@@ -17,7 +17,7 @@ Pair = tuple[Partner, Partner]
 
 
 def partner_name(model: Any, partner: Partner) -> str:
-    """The partner as text: ``geom 'cup'`` or ``flex 'sheet'``; a number replaces a missing name."""
+    """The partner as text, such as ``geom 'cup'`` or ``flex 3`` (without a name)."""
     kind, number = partner
     if kind == "geom":
         return f"geom {geom_name(model, number)}"
@@ -29,14 +29,14 @@ def partner_name(model: Any, partner: Partner) -> str:
 class Cut:
     """One sub-step that was rolled back."""
 
-    time: float  #: end time of the next attempt [s]
-    pair: Pair  #: the pair that would have passed through, become too deep, or separated unseen
-    stiffened: bool  #: its contact parameters are changed until the pair separates
+    time: float  #: time at which the next attempt ends [s]
+    pair: Pair  #: the cause: it would have passed through, become too deep, or separated unseen
+    stiffened: bool  #: whether the pair's contact parameters are changed until it separates
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """The report of one guarded step; ``guard.partners(pair)`` gives the names of a pair."""
+    """The report of one guarded step; ``guard.partners(pair)`` returns the names of a pair."""
 
     steps: int  #: calls of ``mj_step``, including those that were rolled back
     contacts: int  #: largest number of contacts that MuJoCo listed in an accepted sub-step
@@ -44,12 +44,12 @@ class StepReport:
     restored: tuple[Pair, ...] = ()  #: pairs whose original contact parameters were restored
     passed: tuple[Pair, ...] = ()  #: pairs that may have passed through
     impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
-    energy_added: float = 0.0  #: gains by constraint forces in sub-steps, losses left out [J]
+    energy_added: float = 0.0  #: sum of gains by constraint forces over sub-steps, no losses [J]
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property
     def exhausted(self) -> bool:
-        """Whether a pair may have passed through (:attr:`passed` names it)."""
+        """Whether a pair may have passed through; see :attr:`passed`."""
         return bool(self.passed)
 
     @cached_property

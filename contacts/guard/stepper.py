@@ -1,4 +1,4 @@
-"""Steps without tunnelling: plain steps, or sub-steps in which the solver stops the approach."""
+"""Steps without tunnelling."""
 
 from __future__ import annotations
 
@@ -29,48 +29,50 @@ from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
 from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
-#: Settings of the native part.
+#: Settings of the native part; "held" pairs are those whose approach the solver stops.
 SETTINGS = {
-    "beyond": 1e-5,  # how far beyond the touch a cut sub-step goes, so that MuJoCo finds it [m]
-    "room": 1.25,  # margins over what the pair travelled in the attempt that failed
-    "smallest": 1 / 64,  # sub-steps up to this fraction of the step are not cut further
-    "push": 0.2,  # fraction of a depth that is pushed out in each step
+    "beyond": 1e-5,  # penetration at the end of a cut sub-step, so that MuJoCo lists it [m]
+    "room": 1.25,  # margin of a held pair divided by its approach in the failed attempt
+    "smallest": 1 / 64,  # sub-steps of at most this fraction of the step are not cut further
+    "push": 0.2,  # fraction of a penetration that is pushed out in each step
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
-    "look": 16,  # number of steps after which separation of pairs is checked at the latest
-    "allowed": 0.01,  # energy budget: fraction of the first kinetic energy that contacts may add
-    "deeper_geom": 1 / 8,  # sub-steps above this fraction may not deepen a held pair
-    "deeper_flex": 1 / 2,  # the same for a flex
-    "turned": 1.0,  # rotation in a step above which its whole turns are counted [rad]
+    "look": 16,  # largest number of steps between two tests whether held pairs have separated
+    "allowed": 0.01,  # energy that contacts may add, as a fraction of the first kinetic energy
+    "deeper_geom": 1 / 8,  # in longer sub-steps (fraction of the step) no held pair may get deeper
+    "deeper_flex": 1 / 2,  # the same for pairs with a flex
+    "turned": 1.0,  # rotation in a step above which full turns are counted [rad]
 }
 
 
 class GuardedStepper:
-    """``mj_step`` that lets no pair pass through itself.
+    """``mj_step`` without tunnelling: no covered pair passes through itself.
 
-    Between two steps everything in ``model`` and ``data`` may be changed. The next step uses the
-    change, or refuses it by name. The path of a geom that an edit moves is not checked. An error of
-    MuJoCo's or an exception in ``each`` restores the state before the step. Copies, deep copies and
-    unpickled guards continue with the same bits; a plain copy shares model and data.
+    A step has these stages:
 
-    A plain step is tried first. It is accepted, with the bits of ``mj_step``, unless the verdict
-    finds a pair that becomes too deep or that touches and separates unseen. Otherwise the state is
-    rolled back and the pair is made stiff until it separates. The step is then taken in sub-steps:
-    one up to the touch, and others in which the solver stops the approach. A sub-step that still
-    fails is halved. If that does not help, the partners move rigidly together
-    (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`).
+    1. A plain step is accepted, with the bits of ``mj_step``, unless a pair becomes too deep or
+       touches and separates without a contact in MuJoCo's list.
+    2. Otherwise the state is rolled back, and the pair is made stiff until it separates. The step
+       is taken in sub-steps: one up to the touch, and others in which the solver stops the
+       approach. A sub-step that still fails is halved.
+    3. If this does not help, the partners move rigidly together
+       (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`).
+
+    Between two steps everything in ``model`` and ``data`` may be changed; :meth:`step` uses the
+    change or refuses it. The path on which an edit moves a geom is not checked. After an error of
+    MuJoCo or an exception in ``each``, the state before the step is restored. Copies, deep copies
+    and unpickled guards continue with the same bits; a shallow copy shares model and data.
 
     Args:
-        model: the scene's. Its ``opt.timestep``, margins and contact parameters are changed within
-            a step and restored; those of ``stiff`` pairs are restored when the pair separates.
-        data: the MjData to step.
-        checkers: names of checkers, whose pairs are covered: ``rigid`` geoms against geoms,
-            ``cloth`` flexes against geoms, other flexes and themselves. :attr:`uncovered` lists the
-            pairs that may touch and are not covered.
-        stiff: whether the contacts of pairs that caused a rollback are made stiff.
-        most: calls of ``mj_step`` that one step may cost before partners are stopped.
+        model: MjModel. A step changes and restores ``opt.timestep``, margins and contact
+            parameters; the parameters of ``stiff`` pairs are restored when the pair separates.
+        data: The MjData to step.
+        checkers: The covered pairs: ``rigid`` for geoms with geoms, ``cloth`` for flexes with
+            geoms, other flexes and themselves. :attr:`uncovered` lists the other pairs.
+        stiff: Whether pairs that cause a rollback are made stiff.
+        most: Largest number of calls of ``mj_step`` in one step, before partners are stopped.
 
     Raises:
-        ValueError: another name, ``most`` below 2, or a model that :meth:`step` refuses.
+        ValueError: an unknown checker, ``most`` below 2, or a model that :meth:`step` refuses.
     """
 
     def __init__(
@@ -81,16 +83,15 @@ class GuardedStepper:
         stiff: bool = True,
         most: int = 40,
     ) -> None:
-        """Copy the shapes and allocate one saved state."""
+        """Check the model, and make the native guard."""
         if most < 2:
-            raise ValueError(f"most {most}: expected 2 or more steps")
+            raise ValueError(f"most {most}: expected 2 or more calls of mj_step")
         self._rigid, self._cloth = names(checkers)
         self._model, self._data, self._stiff, self._most = model, data, stiff, most
         warn_of_sparse_newton(model)
         self._start()
 
     def _start(self) -> None:
-        """Make the native guard."""
         model = self._model
         _refuse(model, self._data)
         end = mujoco.MjData(model)
@@ -108,7 +109,7 @@ class GuardedStepper:
         self._cover()
 
     def _cover(self) -> None:
-        """Give the native guard the model's present pairs and shapes."""
+        """Pass the present pairs and shapes of the model to the native guard."""
         model = self._model
         self._guard.clear()
         covered = Covered(model, self._guard, self._rigid, self._cloth)
@@ -127,7 +128,7 @@ class GuardedStepper:
         self._guard.follow(followed_fields(model, self._flags), numbers(model, self._physics))
 
     def _follow(self) -> None:
-        """Follow the changes since the last step, or refuse them."""
+        """Apply changes of the model since the last step, or refuse them (``ValueError``)."""
         refuse_structure(self._model, self._built)
         _refuse(self._model, self._data)
         if self._guard.changed():
@@ -148,7 +149,7 @@ class GuardedStepper:
 
     @property
     def model(self) -> Any:
-        """The scene's model. Another model, also a recompiled one, needs a new guard."""
+        """The model. Another model, also a recompiled one, needs a new guard."""
         return self._model
 
     @property
@@ -158,7 +159,7 @@ class GuardedStepper:
 
     @property
     def most(self) -> int:
-        """Calls of ``mj_step`` that one step may cost before partners are stopped."""
+        """Largest number of calls of ``mj_step`` in one step, before partners are stopped."""
         return self._most
 
     @property
@@ -167,54 +168,53 @@ class GuardedStepper:
         return self._pairs
 
     def partners(self, pair: Pair) -> tuple[str, str]:
-        """Names of both partners of a pair, as :attr:`pairs` and the reports hold them.
+        """Names of the partners of a pair of :attr:`pairs` or of a report.
 
         Returns:
-            ``geom 'cup'``, or ``geom 3 (of body 'arm')`` where it has no name; the same of flexes.
+            Names such as ``geom 'cup'``, ``geom 3 (of body 'arm')`` without a name, or ``flex 2``.
         """
         first, second = (partner_name(self.model, partner) for partner in pair)
         return first, second
 
     @property
     def uncovered(self) -> tuple[Pair, ...]:
-        """Pairs that may touch by MuJoCo's rules and are not covered.
+        """Pairs that MuJoCo tests and the guard does not cover.
 
-        These are height fields and signed distance fields against anything, flexes against flexes
-        unless both are of triangles, and pairs that ``checkers`` excludes.
+        These are all pairs with height fields or signed distance fields, pairs of flexes unless
+        both are two-dimensional, and pairs that ``checkers`` excludes.
         """
         return self._uncovered
 
     @property
     def sunk(self) -> tuple[Pair, ...]:
-        """Pairs that were deep in one another when one of them last moved.
+        """Pairs whose partners were already deep in each other at the start of a step.
 
-        The cause is an edit or the scene itself. Such a pair is not followed until it has
-        separated, so it may leave on either side unreported.
+        The cause is an edit or the scene itself. Such a pair is not guarded until it has separated,
+        so it may separate on either side without a report.
         """
         return self._named(self._guard.sunk())
 
     @property
     def stiffened(self) -> tuple[Pair, ...]:
-        """Pairs whose contact parameters differ from the scene's at present."""
+        """Pairs whose contact parameters are changed at present."""
         return self._named(self._guard.stiffened())
 
     def step(self, each: Callable[[], None] | None = None) -> StepReport:
         """Advance by one ``model.opt.timestep``.
 
         Args:
-            each: called at the end of every sub-step of a step that was cut, with ``data`` at that
-                time; a step that is accepted whole does not call it.
+            each: Called at the end of every sub-step, with ``data`` at this time. A plain step that
+                is accepted does not call it.
 
         Raises:
             ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
-                ``speculative`` or ``sleep`` (their state or distances cannot be rolled back); the
-                integrator RK4; an unknown friction cone; a contact filter
-                (``mjcb_contactfilter``); a mocap pose that is not finite; a shape that is none;
-                a mass, contact parameter or other number of the model that is not finite, a
-                negative mass; an edited address, count or id by which the model is built. Nothing
-                was stepped.
-            mujoco.FatalError: an error of MuJoCo's; the state before the step is restored.
-            RuntimeError: called within a step of this guard: by another thread, or in a callback.
+                ``speculative`` or ``sleep``, with which a step cannot be rolled back; the
+                integrator RK4; an unknown friction cone; a contact filter (``mjcb_contactfilter``);
+                a mocap pose, mass, contact parameter or other number of the model that is not
+                finite; a negative mass or size; an unknown geom type; an edited address, count or
+                id of the model's structure. The state is unchanged.
+            mujoco.FatalError: an error of MuJoCo; the state before the step is restored.
+            RuntimeError: called during a step of this guard, by another thread or in a callback.
         """
         contacts = self._guard.step(self, each)
         if contacts < 0:
@@ -224,15 +224,15 @@ class GuardedStepper:
         return self._quiet[contacts]
 
     def reset(self) -> None:
-        """Start anew at the present state, with mocap bodies at their given poses.
+        """Start again at the present state, with mocap bodies at their present poses.
 
-        Contact parameters are restored and the memory of earlier steps is cleared. A change of
-        ``data.time`` between two steps does the same for the mocap poses at the next one.
+        Contact parameters are restored and the memory of earlier steps is cleared. If ``data.time``
+        is changed between two steps, mocap bodies also start at their present poses.
         """
         self._guard.reset()
 
     def close(self) -> None:
-        """Put every contact parameter back."""
+        """Restore all contact parameters."""
         self._guard.close()
 
     def __enter__(self) -> GuardedStepper:
@@ -245,7 +245,7 @@ class GuardedStepper:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put every contact parameter back."""
+        """Restore all contact parameters."""
         self.close()
 
     def _named(self, numbers: Sequence[int]) -> tuple[Pair, ...]:
@@ -280,9 +280,9 @@ class GuardedStepper:
         return self._tunnelling.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
 
     def _impact_zone(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
-        """Stop the partners of these rows, starting from the positions at the given address.
+        """Join the partners of ``rows`` in an impact zone; ``qpos`` is an address.
 
-        Returns also the work that mocap bodies did through these contacts [J].
+        Returns the pairs that were joined, and the work of mocap bodies on them [J].
         """
         size = ctypes.c_double * self.model.nq
         start = np.array(size.from_address(qpos))
@@ -332,7 +332,7 @@ def _refuse(model: Any, data: Any) -> None:
         raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
         raise ValueError(
-            "mjcb_contactfilter: a guard cannot know which pairs it rejects; remove it"
+            "mjcb_contactfilter: a guard cannot know which pairs the filter rejects; remove it"
         )
     refuse_values(model)
     for name in ("mocap_pos", "mocap_quat"):

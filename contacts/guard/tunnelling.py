@@ -1,4 +1,4 @@
-"""Find crossings of the middle surfaces of flexes of triangles, with each other and themselves."""
+"""Find crossings of the middle surfaces of two-dimensional flexes, also with themselves."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,8 +15,8 @@ class TunnellingEvents:
 
     Args:
         model: MjModel.
-        pairs: pairs of two-dimensional flexes, by their ids.
-        first: number of the first of these pairs.
+        pairs: Pairs of two-dimensional flexes, by ids.
+        first: Native number of the first of these pairs.
     """
 
     def __init__(self, model: Any, pairs: Sequence[tuple[int, int]], first: int) -> None:
@@ -31,11 +31,11 @@ class TunnellingEvents:
         self._number = {pair: first + k for k, pair in enumerate(pairs)}
 
     def find(self, x_t0: Array, x_t1: Array) -> list[tuple[int, list[int], float]]:
-        """A row for each crossing: the pair's number, the vertices, a bound of their approach [m].
+        """A row per crossing: number of the pair, vertices, and bound of their approach [m].
 
         Args:
             x_t0: Vertices of all flexes at the start of a step. Shape (V, 3), m.
-            x_t1: The same at its end.
+            x_t1: Vertices of all flexes at the end of the step. Shape (V, 3), m.
         """
         frame = self._mesh.find(x_t0, x_t1)
         faces, edges = self._mesh.faces, self._mesh.edges

@@ -1,4 +1,4 @@
-"""Scenes whose contacts are hard to find, each with only what it needs."""
+"""Small scenes whose contacts are hard to find."""
 
 from collections.abc import Callable
 

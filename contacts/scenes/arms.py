@@ -1,4 +1,4 @@
-"""Arms that touch rigid objects: boxes on both sides, and each other over a table."""
+"""Scenes with arms: one between boxes, and two that meet over a table."""
 
 import mujoco
 import numpy as np
@@ -10,7 +10,7 @@ from tauguard.models.scene import INTEGRATORS
 
 #: Distance between the pedestals of both arms along x [m].
 DISTANCE = 1.0
-#: Amplitudes of their first three joints [rad].
+#: Amplitudes of the first three joints in ``two_arms`` [rad].
 REACH = (0.15, 0.25, 0.1)
 
 
@@ -18,7 +18,7 @@ def arm_boxes(speed: float = 1.0) -> ContactScene:
     """The arm swings its base joint between two rows of boxes; a free box stands in its path.
 
     Args:
-        speed: speed of the swing, 1 is a period of 1.2 s.
+        speed: Factor of the swing's speed; 1 is a period of 1.2 s.
     """
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False)).xml)
     for i, (x, y, z) in enumerate(
@@ -50,7 +50,7 @@ def two_arms(speed: float = 1.0) -> ContactScene:
     """Two arms face each other over one table, reach for its middle and meet there.
 
     Args:
-        speed: speed of the swing, 1 is a period of 1.2 s.
+        speed: Factor of the swing's speed; 1 is a period of 1.2 s.
     """
     table = Table(position=(DISTANCE / 2, 0.15, 0.5), half_extents=(0.2, 0.5, 0.02))
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False, table=table)).xml)
@@ -70,7 +70,7 @@ def _swinging(
     amplitude: tuple[float, float, float],
     period: float,
 ) -> ContactScene:
-    """The scene ``spec`` in which every arm sways its first three joints about its home pose."""
+    """The scene ``spec``, in which every arm swings its first three joints about its home pose."""
     spec.option.integrator = INTEGRATORS["implicitfast"]
     arm = load_arm("cura6")
     reference = sway(arm.home, np.arange(3), np.array(amplitude), period)

@@ -1,4 +1,4 @@
-"""The control of the arms in contact scenes: stiff position control along a function of time."""
+"""Stiff position control of the arms in contact scenes, along a function of time."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,7 @@ from tauguard.contacts.scenes.scene import ContactScene, Control
 
 #: Reference positions and velocities at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
 Reference = Callable[[float], tuple[Array, Array]]
-#: Natural frequency of every joint's loop [rad/s].
+#: Natural frequency of every joint's control loop [rad/s].
 BANDWIDTH = 25.0
 
 
@@ -65,9 +65,9 @@ def follow(
     """Position control with gravity compensation, written into ``qfrc_applied``.
 
     Args:
-        model: model of the whole scene.
-        qpos: the pose whose inertia sets the gains, shape (nq,).
-        arms: indices in qpos and in qvel, and the reference, of each arm.
+        model: Model of the whole scene.
+        qpos: Pose whose inertia sets the gains, shape (nq,).
+        arms: For each arm the indices in qpos and in qvel, and the reference.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos

@@ -12,7 +12,7 @@ from tauguard.models.cloth import add_sheet
 
 #: Young's modulus of the fabrics: 400 N/m over their width, a soft knit [Pa].
 FABRIC_YOUNG = 2e5
-#: The forearm's link; the sleeve lies around its capsule.
+#: The link of the forearm; the sleeve surrounds its capsule.
 SLEEVED_LINK = "link3"
 
 
@@ -39,8 +39,8 @@ def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> Contact
 
     Args:
         around: vertices around the tube.
-        along: vertices along it.
-        speed: speed of the swing, 1 is a period of 0.8 s.
+        along: vertices along the tube.
+        speed: factor of the swing's speed; 1 is a period of 0.8 s.
     """
     scene = compose(SceneSpec(labels=False, integrator="discrete"))
     model, data = scene.model, mujoco.MjData(scene.model)
@@ -73,7 +73,7 @@ def tube(around: int, along: int, radius: float, length: float) -> tuple[Array, 
 
 
 def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
-    """A cloth hangs over a person's chest (a held proxy), and the arm presses into both.
+    """A cloth hangs over a person's chest (a fixed proxy), and the arm presses into both.
 
     Args:
         count: vertices along each side of the cloth.
@@ -91,7 +91,7 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
     scene = compose(SceneSpec(labels=False, proxies=(chest,), cloth=cloth, integrator="discrete"))
     spec = mujoco.MjSpec.from_string(scene.xml)
     worn = spec.geom("chest")
-    worn.contype, worn.conaffinity = 4, 6  # meets the cloth; the arm meets it by contact pairs
+    worn.contype, worn.conaffinity = 4, 6  # collides with the cloth; with the arm by explicit pairs
     for flex in spec.flexes:
         flex.contype, flex.conaffinity = 6, 5
     moves = [(scene.joint_names, turn(scene.home, 0, speed, 0.6))]

@@ -1,4 +1,4 @@
-"""Fast spheres against thin objects, which they can pass within one step."""
+"""Scenes with a fast sphere and a thin object, which it can pass through within one step."""
 
 import mujoco
 import numpy as np
@@ -13,9 +13,9 @@ PLATE_HALF_THICKNESS = 0.001  #: [m]
 BALL_MASS = 0.020  #: [kg]
 #: Young's modulus of the cloth: 20 kN/m over its width, a woven fabric [Pa].
 CLOTH_YOUNG = 1e7
-#: Initial distance of the ball's surface from the cloth's or plate's, without ``offset`` [m].
+#: Initial distance of the surfaces of ball and cloth or plate, without ``offset`` [m].
 BALL_GAP = 0.005
-#: Contact parameters stiff enough that a fast ball does not sink through: solref, solimp.
+#: solref and solimp of contacts so stiff that a fast ball does not sink through.
 STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))
 #: MuJoCo's extra contact modes by name: the enable bit of each.
 MODES = {
@@ -23,7 +23,7 @@ MODES = {
     "speculative": int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
     "ipc": int(mujoco.mjtEnableBit.mjENBL_IPC),
 }
-#: Impact points on the cloth, as weights of one face's three vertices.
+#: Impact points on the cloth, as weights of the three vertices of a face.
 IMPACT_POINTS = {
     "vertex": (1.0, 0.0, 0.0),
     "edge": (0.5, 0.5, 0.0),
@@ -44,10 +44,10 @@ def ball_cloth(
 
     Args:
         speed: speed of the ball, along -z [m/s].
-        offset: by how much farther away it starts [m].
+        offset: additional initial distance [m].
         impact: one of :data:`IMPACT_POINTS`, on a face in the middle of the cloth.
-        stiff: the cloth's contacts use :data:`STIFF`; otherwise MuJoCo averages the time constants
-            of cloth (0.003 s) and ball (0.02 s).
+        stiff: whether contacts of the cloth use :data:`STIFF`. Otherwise MuJoCo averages the time
+            constants of cloth (0.003 s) and ball (0.02 s).
         mode: one of :data:`MODES`.
         count: vertices along each side of the cloth.
         pinned: fixed vertices, see :class:`tauguard.models.Cloth`.
@@ -103,12 +103,12 @@ def sphere_plate(
 
     Args:
         speed: speed of the sphere, along -z [m/s].
-        offset: by how much farther away it starts [m].
-        stiff: the plate's contacts use :data:`STIFF` instead of MuJoCo's default.
+        offset: additional initial distance [m].
+        stiff: whether contacts of the plate use :data:`STIFF` instead of MuJoCo's default.
         mode: ``plain`` or ``speculative``.
 
     Raises:
-        ValueError: another mode, a speed that is not above 0.
+        ValueError: another mode, or a speed that is not above 0.
     """
     spec = _spec("implicitfast", speed, mode, ("plain", "speculative"))
     plate = spec.worldbody.add_geom(

@@ -1,4 +1,4 @@
-"""A contact scene: a compiled model, its first state, and its control."""
+"""A contact scene: a compiled model with its initial state and its control."""
 
 import copy
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 
-#: Called before every step; writes ``data.ctrl`` or ``data.qfrc_applied`` from the state alone.
+#: Called before every step. Sets ``data.ctrl`` or ``data.qfrc_applied`` as a function of the state.
 Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 
@@ -25,7 +25,7 @@ class ContactScene:
     control: Control | None = None
 
     def start(self, timestep: float | None = None) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """A copy of the model, at ``timestep`` [s] if given, and data in the first state.
+        """A copy of the model, with ``timestep`` [s] if given, and data in the initial state.
 
         Raises:
             ValueError: a timestep that is not above 0 or not finite.

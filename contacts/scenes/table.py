@@ -1,4 +1,4 @@
-"""A mesh that falls onto the table."""
+"""A scene with a mesh that falls onto the table."""
 
 from pathlib import Path
 
@@ -14,19 +14,20 @@ from tauguard.models.scene import INTEGRATORS
 from tauguard.untrusted_input import reading
 
 SIZE = 0.15  #: longest side of the mesh's bounding box [m]
-HEIGHT = 0.05  #: its lowest point starts this and SIZE / 4 above the table [m]
+HEIGHT = 0.05  #: the lowest point of the mesh starts at HEIGHT + SIZE / 4 above the table [m]
 
 
 def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactScene:
     """A mesh falls onto the table, tumbling; MuJoCo collides its convex hull.
 
     Args:
-        mesh: a file that trimesh can read, for example the Stanford bunny; scaled to 15 cm.
+        mesh: A file that trimesh can read, for example the Stanford bunny; scaled to 15 cm.
             ``None``: a lumpy ball of 1,280 triangles.
-        speed: initial speed, downwards [m/s].
+        speed: Initial speed, downwards [m/s].
 
     Raises:
-        FileNotFoundError: no such file.
+        FileNotFoundError: the file does not exist.
+        ValueError: not a triangle mesh, or vertices that are not finite.
     """
     points, faces = _lumpy_ball() if mesh is None else _load(Path(mesh))
     points = (

@@ -1,4 +1,4 @@
-// Types of arrays that pass between Python and the kernels.
+// Types of the arrays that are passed between Python and the kernels.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -64,7 +64,7 @@ inline std::pair<Shape, LocalFrame> shape_of(int core, const Doubles& size, doub
   return {std::move(shape), frame};
 }
 
-// The guarded stepper's part of the module.
+// Binds the guarded stepper.
 void bind_guard(nb::module_& m);
 
 }  // namespace tauguard::contacts

@@ -1,4 +1,4 @@
-// tauguard.contacts._contacts: a scene's pairs over one step. Arguments are checked in Python.
+// tauguard.contacts._contacts: contacts of a scene in one step. Arguments are checked in Python.
 #include <mutex>
 
 #include "arrays.hpp"
@@ -13,8 +13,7 @@ Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1,
   return {xpos_t0.data(), xmat_t0.data(), xpos_t1.data(), xmat_t1.data()};
 }
 
-// Rows as (first, second, feature) and (time, distance, point, normal), and the counts.
-// Rows (first, second, feature), rows (t, distance, point, normal), counts.
+// Contacts as rows (first, second, feature) and rows (time, distance, point, normal); and counts.
 using Answer = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
                          nb::ndarray<nb::numpy, double, nb::shape<-1, 8>>,
                          nb::typed<nb::tuple, int, int, int>>;
@@ -43,7 +42,7 @@ class Scene {
     geoms_.add(std::move(shape), body, frame);
   }
 
-  // Gives the geom that was added last its surface, in place of its hull.
+  // Sets the surface of the geom that was added last, which replaces its hull.
   void surface(Rows3 vertices, IntRows faces) {
     const std::vector<Vec3> points = vectors(vertices);
     Surface surface;
@@ -109,7 +108,7 @@ class Scene {
   std::mutex busy_;
 };
 
-// Points (V, 3) that bodies carry, in the order of MuJoCo's own sums so that the bits are its own.
+// World positions of points `local` (V, 3) on bodies, with MuJoCo's order of sums and its bits.
 auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
   std::vector<double> out(3 * body.size());
   for (std::size_t i = 0; i < body.size(); ++i) {
@@ -128,7 +127,7 @@ auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
 bool all_finite(Anything a, Anything b, Anything c) {
   for (const Anything* values : {&a, &b, &c}) {
     const double* x = values->data();
-    // x - x is 0, or NaN where x is not finite; a sum of them needs no branch.
+    // x - x is 0, or NaN if x is not finite. Summing needs no branch.
     double sum = 0;
     for (std::size_t i = 0; i < values->size(); ++i) sum += x[i] - x[i];
     if (sum != 0) return false;
@@ -136,7 +135,7 @@ bool all_finite(Anything a, Anything b, Anything c) {
   return true;
 }
 
-// Rows (simplex, simplex), of two lists, that come within `distance` of one another.
+// Contacts of pairs of simplices, of two lists, that come within `distance` of each other.
 Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, double distance) {
   std::vector<Row> rows;
   {
@@ -157,7 +156,7 @@ Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, do
 }  // namespace
 
 NB_MODULE(_contacts, m) {
-  nb::set_leak_warnings(false);  // a callback of MuJoCo may keep a guard until the end
+  nb::set_leak_warnings(false);  // a callback of MuJoCo may keep a guard alive until the end
   m.doc() = "Contacts of a moving scene, and the guarded stepper. Arguments are checked in Python.";
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())

@@ -1,8 +1,8 @@
-// Errors of MuJoCo as C++ exceptions. By default mju_error ends the process.
+// Converts errors of MuJoCo to C++ exceptions. By default mju_error ends the process.
 //
-// MuJoCo sends an error to the thread's log handler, which must not return. The handler here jumps
-// back to where MuJoCo was called, over MuJoCo's own frames and no others: every call has a jump
-// buffer of its own, so that destructors of this library run as usual.
+// MuJoCo passes an error to the thread's log handler, which must not return. The handler here jumps
+// back to the call of MuJoCo. Every call has its own jump buffer, so the jump skips only frames of
+// MuJoCo, and destructors of this library run as usual.
 #pragma once
 
 #include <csetjmp>
@@ -10,21 +10,21 @@
 
 namespace tauguard::contacts {
 
-// The message of mju_error.
+// An error of MuJoCo, with the message of mju_error.
 struct MujocoError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// MuJoCo's functions for handlers, and its layout of a message, as far as they are needed.
+// MuJoCo's functions for log handlers, and the layout of a log message.
 struct Logging {
   using Handler = void (*)(const void*);
   Handler (*set)(Handler) = nullptr;  // sets this thread's handler and returns the previous one
-  Handler (*global)() = nullptr;      // of all threads
-  int error = 0;                      // the level of an error
+  Handler (*global)() = nullptr;      // returns the handler of all threads
+  int error = 0;                      // the level of errors
   int at_subject = 0;                 // offset of the text; the level is the first field, an int
 };
 
-// Catches the errors of the thread during its lifetime.
+// While this object lives, errors of the thread become exceptions.
 class Catching {
  public:
   explicit Catching(const Logging& logging);
@@ -38,12 +38,11 @@ class Catching {
   Logging::Handler before_, outer_before_;
 };
 
-// The jump target of an error of the thread; nullptr outside of calls.
+// The jump target of errors of the thread; nullptr outside of calls.
 std::jmp_buf*& landing();
 [[noreturn]] void throw_error();
 
-// A function of MuJoCo that may fail. During the lifetime of a Catching an error is thrown as
-// MujocoError.
+// A function of MuJoCo that may fail. While a Catching lives, an error throws MujocoError.
 template <class... A>
 class Call {
  public:
@@ -54,7 +53,7 @@ class Call {
     std::jmp_buf*& target = landing();
     std::jmp_buf* const outer = target;
     target = &here;
-    // _setjmp saves no signal mask: no system call.
+    // _setjmp does not save the signal mask, which would need a system call.
     if (_setjmp(here) != 0) {
       target = outer;
       throw_error();

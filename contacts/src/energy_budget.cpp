@@ -50,7 +50,7 @@ double EnergyBudget::stretch(const double* x) const {
   return sum;
 }
 
-// Power of the forces that are applied to bodies [W].
+// Power of the applied forces [W].
 double EnergyBudget::pushed(const double* velocity) {
   double power = 0;
   std::vector<double> jacobian;

@@ -5,13 +5,12 @@
 
 namespace tauguard::contacts {
 
-// An elastic flex of triangles (St. Venant-Kirchhoff). For each element it holds the vertices at
-// the ends of the edges, the squared edge lengths at rest, and the stiffness matrix K. With e the
-// change of the squared lengths, the energy of an element is e K e / 4, whose gradient is MuJoCo's
-// spring force.
+// An elastic flex of triangles (St. Venant-Kirchhoff). Let e be the change of the squared edge
+// lengths of an element and K its stiffness matrix. The energy of the element is e K e / 4, whose
+// gradient is MuJoCo's spring force.
 struct Sheet {
-  std::vector<std::int32_t> ends;        // 6 for each element
-  std::vector<double> rest, stiffness;   // 3 and 9 for each element
+  std::vector<std::int32_t> ends;        // vertices at the ends of the edges, 6 per element
+  std::vector<double> rest, stiffness;   // squared edge lengths at rest (3), and K (9 per element)
   double energy(const double* x) const;  // at vertices x (n, 3) [J]
 };
 
@@ -21,8 +20,9 @@ struct EnergyChange {
   double kinetic;  // kinetic energy at the end of the sub-step [J]
 };
 
-// Limits the energy that contacts add. The total energy is kinetic energy, gravity, springs and the
-// stretch of flexes. Losses in joints and materials are attributed to contacts.
+// Limits the energy that contacts add. The total energy consists of kinetic energy and the
+// potential energy of gravity, springs and stretched flexes. Losses in joints and materials count
+// as contacts'.
 class EnergyBudget {
  public:
   EnergyBudget(const Engine& engine, Mocap& mocap, std::vector<Sheet> sheets, double share)

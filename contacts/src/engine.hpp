@@ -1,6 +1,5 @@
-// The parts of MuJoCo that the guard uses: functions and fields of one model and its data, by
-// address. Python finds the addresses (contacts/guard/engine.py); nothing here depends on MuJoCo's
-// headers.
+// The parts of MuJoCo that the guard uses: functions, and fields of a model and its data, by
+// address. Python finds them (contacts/guard/engine.py); MuJoCo's headers are not needed.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +11,15 @@
 
 namespace tauguard::contacts {
 
-// Which parts of a state are saved, restored and copied (MuJoCo's mjtState).
+// Bits of MuJoCo's mjtState: the parts of a state that determine a step, and its kinematics.
 struct Signatures {
   int integration, pose;
 };
 
-// One contact in MuJoCo's list.
+// A contact in MuJoCo's list.
 struct Contact {
   double distance;
-  int dim, row;  // condim; its first row, -1: none
+  int dim, row;  // condim; first constraint row, or -1
   int geom[2], flex[2];
   const double *at, *normal;  // from the first partner to the second
 };
@@ -28,7 +27,7 @@ struct Contact {
 struct Engine {
   using Step = void (*)(const void*, void*);
   const void* model;
-  void *data, *end;  // the data that is stepped; data for the kinematics at a step's end
+  void *data, *end;  // the stepped data; data for the kinematics at the end of a step
   void* other;       // only with mocap bodies: data with the same joints and other mocap poses
 
   Logging logging;
@@ -44,13 +43,13 @@ struct Engine {
   int nq, nv, nbody, nmocap, ngeom, npair, nflex, nflexvert, ntendon;
   Signatures signature;
   int state_size;
-  bool interpolated;  // some flex has vertices without bodies of their own
+  bool interpolated;  // whether some flex has vertices without their own bodies
 
-  // Fields of the model. Timestep, flags, margins and parameters are changed within a step.
+  // Fields of the model. A step changes and restores timestep, flags, margins and parameters.
   double* timestep;
   int *disableflags, *enableflags, *integrator, *cone, *solver, *iterations;
-  double *o_margin, *o_solref;                // of all contacts, if the flag `override` is set
-  double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
+  double *o_margin, *o_solref;                // for all contacts, if the flag `override` is set
+  double *margin[3], *solref[3], *solimp[3];  // indexed by Place::Kind: explicit pair, geom, flex
   double* friction[3];
   int* priority[3];
   const int *pair_geom1, *pair_geom2;
@@ -68,7 +67,7 @@ struct Engine {
   double *const *efc_vel, *const *efc_pos, *const *efc_force;
   int *const *efc_type, *const *efc_id;
 
-  int* resets[3];  // how often MuJoCo has warned of positions, velocities and accelerations
+  int* resets[3];  // MuJoCo's counts of warnings of bad positions, velocities and accelerations
 
   // Fields of `end`.
   double *end_qvel, *end_energy;
@@ -81,7 +80,7 @@ struct Engine {
   // Values of MuJoCo's enumerations, and refused flags.
   int discrete, runge_kutta, pyramidal, elliptic, refsafe, newton, equality, override_flag, refused;
   void* const* contact_filter;      // MuJoCo's global callback
-  std::size_t at_stack, at_frames;  // mjData's pointers into its stack
+  std::size_t at_stack, at_frames;  // offsets of mjData's pointers into its stack
 
   Contact contact(int k) const {
     const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;
@@ -112,8 +111,9 @@ struct Engine {
   bool is_discrete() const { return *integrator == discrete; }
 };
 
-// Whether MuJoCo resets the data meanwhile, as it does where numbers are not finite or too large.
-// Time alone does not show this at the start of a scene. The counts of warnings are restored.
+// Detects whether MuJoCo resets the data while this object lives, because numbers are not finite or
+// too large. At time 0 a reset does not change the time, so counts of warnings are compared. They
+// are restored afterwards.
 class ResetWatch {
  public:
   explicit ResetWatch(const Engine& engine) : e_(engine) {

@@ -1,4 +1,4 @@
-// Detects changes of the model's fields, and numbers in them that are not valid.
+// Detects changes of a model's fields, and invalid numbers in them.
 #pragma once
 
 #include <algorithm>
@@ -15,9 +15,8 @@ class FollowedFields {
  public:
   using Regions = std::vector<std::pair<std::uintptr_t, std::size_t>>;
   FollowedFields() = default;
-  // Addresses and sizes in bytes; their present values are the reference. Arrays that are
-  // neighbours in MuJoCo's buffer, where each begins at a multiple of 64 bytes, are compared as
-  // one.
+  // Regions are addresses and sizes in bytes; their present values are the reference. Neighbouring
+  // arrays in MuJoCo's buffer, where arrays begin at multiples of 64 bytes, are compared as one.
   explicit FollowedFields(Regions regions) {
     std::sort(regions.begin(), regions.end());
     for (const auto& [at, size] : regions) {
@@ -52,7 +51,7 @@ class FollowedFields {
   std::vector<char> copy_;
 };
 
-// Numbers of the model that only have to be valid.
+// Numbers of the model that may change but must be valid.
 class Numbers {
  public:
   enum Rule { finite, not_nan, not_negative };
@@ -78,7 +77,7 @@ class Numbers {
   std::vector<Region> regions_;
 };
 
-// The fields of a model that a guard has copied from, and the numbers that only have to be valid.
+// The fields of a model that a guard has copied, and the numbers that must be valid.
 class FollowedModel {
  public:
   FollowedModel() = default;
@@ -87,9 +86,9 @@ class FollowedModel {
     for (const auto& [at, size, rule] : numbers) fields.emplace_back(at, size);
     all_ = FollowedFields(std::move(fields));
   }
-  // Whether a field that was copied has changed.
+  // Whether a copied field has changed.
   bool changed() const { return fields_.changed(); }
-  // The same, or whether a number is not valid.
+  // Whether a copied field has changed or a number has become invalid.
   bool to_look_at() {
     if (!all_.changed()) return false;
     if (fields_.changed() || !numbers_.valid()) return true;

@@ -1,4 +1,4 @@
-// Binding of the guarded stepper: the pairs that it covers, and its steps.
+// Binding of the guarded stepper.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
@@ -19,7 +19,7 @@
 namespace tauguard::contacts {
 namespace {
 
-// Fills an engine from addresses and numbers by name; Python holds what they point into.
+// Sets fields of an engine from addresses and numbers by name. Python keeps the objects alive.
 class Addresses {
  public:
   explicit Addresses(const nb::dict& values) : values_(values) {}
@@ -121,8 +121,7 @@ nb::object array_of(const std::vector<double>& values) {
   return nb::cast(owned(std::vector<double>(values), std::array<std::size_t, 1>{values.size()}));
 }
 
-// Converts hits to rows: the pair, whether it passed, the simplices of a flex that came deepest,
-// and the vertices of flexes that crossed.
+// Converts hits to rows: pair, passed, deepest simplices of a flex, crossed vertices of flexes.
 nb::list rows_of(const std::vector<PairHit>& hits) {
   nb::list out;
   for (const PairHit& hit : hits) {
@@ -157,9 +156,9 @@ class Guard {
     verdict_.add_flex_pair(list<std::int32_t>(a), list<double>(radii), list<std::int32_t>(elements),
                            static_cast<int>(elements.shape(1)), list<std::uint8_t>(skip));
   }
-  // Partners of every pair, in the order in which pairs were added; flexes against flexes come
-  // last. A row holds (kind, number) of the first partner, of the second and of the carrier of
-  // their parameters, and the last level.
+  // Partners of every pair, in the order in which pairs were added; pairs of flexes are last. A row
+  // is (kind, number) of the first partner, of the second partner and of the object that has the
+  // contact parameters, and the last level.
   void partners(IntRows rows) {
     for (std::size_t i = 0; i < rows.shape(0); ++i) {
       const std::int32_t* r = rows.data() + 7 * i;
@@ -171,20 +170,20 @@ class Guard {
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
-  // The fields of the model that the guard has copied from (their present values are the
-  // reference), and numbers that only have to be valid: address, size [bytes], Numbers::Rule.
+  // Fields that the guard has copied (their present values are the reference), and numbers that
+  // must be valid: address, size [bytes], Numbers::Rule.
   void follow(FollowedFields::Regions fields, std::vector<Numbers::Region> numbers) {
     model_ = FollowedModel(std::move(fields), std::move(numbers));
   }
   bool changed() const { return model_.changed(); }
-  // Removes all that was added since the last start.
+  // Removes everything that was added since the last start.
   void clear() {
     verdict_ = Verdict{}, pairs_.clear(), last_.clear(), sheets_.clear(), spins_.clear();
     pulled_.clear();
   }
 
-  // Call this after everything was added. `sheets`: whether flexes are covered against flexes,
-  // whose crossings the owner's `_tunnelling_events` finds.
+  // Call this after everything was added. `sheets`: whether pairs of flexes are covered, whose
+  // crossings `owner._tunnelling_events` finds.
   void start(bool sheets) {
     if (stepper_)
       stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),
@@ -200,8 +199,8 @@ class Guard {
                                          double length) { return joined(hits, qpos, length); });
   }
 
-  // The number of contacts, or -1 if there is more to report. `owner` holds this object, so it is
-  // referenced during the call only.
+  // One step. Returns the number of contacts, or -1 if there is more to report. `owner` owns this
+  // object, so a reference to it is kept only during the call.
   int step(nb::handle owner, nb::object each) {
     refuse_within_step();
     const Stepping stepping(this);
@@ -222,7 +221,7 @@ class Guard {
       quiet = stepper_->step(call);
     } catch (const MujocoError& error) {
       undo(stacks);
-      // An exception in a Python callback of MuJoCo arrives here as an error of MuJoCo.
+      // An exception in a Python callback of MuJoCo also arrives here as an error of MuJoCo.
       if (!PyErr_Occurred())
         PyErr_SetString(nb::module_::import_("mujoco").attr("FatalError").ptr(), error.what());
       throw nb::python_error();
@@ -244,8 +243,7 @@ class Guard {
     stepper_->archive(reader), reader.end();
   }
 
-  // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and in impact zones,
-  // energy added, and the state at the start if the step was rolled back.
+  // The fields of StepReport; the last item is the state at the start if the step was rolled back.
   using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int, bool>>;
   using State = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
   nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double, std::optional<State>>
@@ -263,7 +261,7 @@ class Guard {
                           r.rolled_back ? array_of(stepper_->first()) : nb::none());
   }
 
-  // The pairs that pass through each other between the start and the present state of the data.
+  // The pairs that pass through themselves between the start and the present state of the data.
   nb::typed<nb::list, nb::any> passing() {
     std::vector<PairHit> through;
     for (PairHit& hit : stepper_->judge())
@@ -293,11 +291,12 @@ class Guard {
   void refuse_within_step() const {
     if (stepping_ != std::thread::id{})
       throw std::runtime_error(
-          "a step of this guard is being made, by another thread or around this callback: wait for "
-          "its end, or use a guard and an MjData for each thread");
+          "this guard is in a step, by another thread or around this callback: wait for its end, "
+          "or "
+          "use a guard and an MjData per thread");
   }
 
-  // MuJoCo's stack pointers. An error does not reset them, so they are saved and restored.
+  // Saves MuJoCo's stack pointers and restores them after an error, which does not reset them.
   struct Stacks {
     explicit Stacks(const Engine& engine) : e(engine) {
       for (int k = 0; k < 3; ++k)
@@ -322,7 +321,7 @@ class Guard {
     stepper_->abandon();
   }
 
-  // Rows (pair, vertices, way) of owner._tunnelling_events(x_t1).
+  // Appends the rows (pair, vertices, approach) of owner._tunnelling_events(x_t1).
   void add_tunnelling(std::vector<PairHit>* hits) {
     const nb::gil_scoped_acquire acquire;
     for (const nb::handle row : owner_.attr("_tunnelling_events")(array_of(stepper_->vertices()))) {
@@ -332,7 +331,7 @@ class Guard {
       hits->push_back(std::move(hit));
     }
   }
-  // The pairs that owner._impact_zone(rows, qpos, length) stopped, and the work of mocap bodies.
+  // The pairs that owner._impact_zone(rows, qpos, length) joined, and the work of mocap bodies.
   Stepper::Stopped joined(const std::vector<PairHit>& hits, const double* qpos, double length) {
     const nb::gil_scoped_acquire acquire;
     Stepper::Stopped out{};
@@ -346,7 +345,7 @@ class Guard {
   Engine engine_;
   FollowedModel model_;
   nb::object held_;   // keeps the objects behind the addresses alive
-  nb::handle owner_;  // of the step that is being made
+  nb::handle owner_;  // during a step
   Settings s_{};
   double allowed_ = 0;
   Verdict verdict_;
@@ -355,7 +354,7 @@ class Guard {
   std::vector<char> pulled_;
   std::vector<Sheet> sheets_;
   std::unique_ptr<Stepper> stepper_;
-  std::thread::id stepping_;  // that is making a step, or none
+  std::thread::id stepping_;  // the thread that is in a step, or none
 };
 
 }  // namespace

@@ -13,7 +13,7 @@ void multiply(const double* a, const double* b, double* out) {
   out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
 }
 
-// Scales to unit length. Like MuJoCo, it takes a quaternion of length zero for no rotation.
+// Scales to unit length. As in MuJoCo, a quaternion of length zero means no rotation.
 void normalize(const double* quat, double* out) {
   double sum = 0;
   for (int k = 0; k < 4; ++k) sum += quat[k] * quat[k];
@@ -21,7 +21,7 @@ void normalize(const double* quat, double* out) {
   for (int k = 0; k < 4; ++k) out[k] = length < 1e-15 ? (k == 0) : quat[k] / length;
 }
 
-// The shortest rotation vector from one orientation to another [rad].
+// The shortest rotation vector from one orientation to the other [rad].
 Vec3 turn_between(const double* from, const double* to) {
   double a[4], b[4], d[4];
   normalize(from, a), normalize(to, b);
@@ -71,7 +71,7 @@ void Mocap::write(const Poses& poses) {
   }
 }
 
-// Computes the kinematics of the other data: its joint positions with these poses.
+// Computes the kinematics of `other` for its joint positions and these mocap poses.
 void Mocap::stand(const Poses& poses) {
   for (std::size_t m = 0; m < poses.size(); ++m) {
     std::copy_n(poses[m].pos, 3, e_.other_mocap_pos + 3 * m);
@@ -140,9 +140,9 @@ bool Mocap::shifted() {
   return true;
 }
 
-// The displacement of a point that moves with the mocap body which carries `body`. The point is
-// given in the present kinematics of the data: those of the start of a sub-step, or of the end of a
-// whole step.
+// The displacement of a point that moves with the mocap body to which `body` is attached. The point
+// is given in the present kinematics of the data, which are those of the start of a sub-step or of
+// the end of a whole step.
 Vec3 Mocap::way(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
   if (m < 0) return {};

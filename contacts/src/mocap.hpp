@@ -1,8 +1,8 @@
-// Bodies that the user moves by mocap poses, and everything attached to them.
+// Mocap bodies, which the user moves by setting poses, and all bodies attached to them.
 //
-// MuJoCo sets their new pose at the start of a step, without a velocity. Here they move during the
-// step: from their pose at the end of the last step to the commanded one, on a straight line and
-// with a constant rotation rate.
+// MuJoCo sets the new pose at the start of a step, without a velocity. Here mocap bodies move
+// during the step, from their pose at the end of the last step to the commanded one, on a straight
+// line and with a constant rotation rate.
 #pragma once
 
 #include "engine.hpp"
@@ -15,8 +15,7 @@ using namespace rigid;  // the convex kernel
 
 class Mocap {
  public:
-  // `pulled`: for each equality, whether a mocap body or something attached to one takes part in
-  // it.
+  // `pulled`: for each equality constraint, whether it acts on a body attached to a mocap body.
   Mocap(const Engine& engine, std::vector<char> pulled);
 
   void set_pulled(std::vector<char> pulled) { pulled_ = std::move(pulled); }
@@ -29,29 +28,26 @@ class Mocap {
 
   // Takes the present poses as the start of the next step's motion.
   void remember();
-  // Begins a step at the present state. False if the state was changed from outside since the last
-  // step.
+  // Begins a step at the present state. False if the user changed the state since the last step.
   bool begin();
   bool moves() const { return moves_; }  // whether some mocap body moves in this step
 
-  // Sets the fractions of the motion between which the next attempt runs. The data is at the
-  // attempt's start.
+  // Sets the part of the motion, as fractions, for the next attempt; the data is at its start.
   void sub_step(double from, double to);
-  // Write the poses of a sub-step's start, of its end, and of the step's end as the user gave them.
+  // Write the poses of the sub-step's start, of its end, and the poses commanded by the user.
   void depart() { write(from_); }
   void arrive() { write(to_); }
   void command() { write(commanded_); }
 
-  // Positions at the start. Whole steps are computed with the poses of their end, so the data
-  // itself does not have them.
+  // Positions at the start. In whole steps the data has the mocap poses of their end instead.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
   const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
   const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }
-  // Adds the rotation of each body that its mocap body causes (nbody, 3) [rad].
+  // Adds, for each body (nbody, 3), the rotation of the mocap body that it is attached to [rad].
   void add_turns(double* turn) const;
 
-  // For a sub-step: computes the potential energy of the start's joint positions with the end's
-  // mocap poses [J], and the vertices. False if nothing moves or the data already has these poses.
+  // For a sub-step: computes the potential energy [J] and the vertices for the joint positions of
+  // the start and the mocap poses of the end. False if nothing moves or the data has these poses.
   bool shifted();
   double potential() const { return e_.other_energy[0]; }
   const double* vertices() const { return e_.other_flexvert; }
@@ -60,8 +56,8 @@ class Mocap {
   bool carries(const Partners& pair) const;
   // The distance by which mocap bodies separate the partners along the contact's normal [m].
   double parting(const Contact& contact) const;
-  // Work that mocap bodies did on all others, by contacts and equalities [J]. `velocity` is the
-  // mean velocity.
+  // Work of mocap bodies on all others, by contacts and equality constraints [J]. `velocity` is the
+  // mean velocity of the sub-step.
   double work(const double* velocity, double length);
 
  private:

@@ -1,4 +1,4 @@
-// Rolls a step back that was not accepted, and takes it again in sub-steps.
+// Rolls back a step that was not accepted, and repeats it in sub-steps.
 #include <algorithm>
 
 #include "stepper.hpp"
@@ -6,12 +6,11 @@
 namespace tauguard::contacts {
 namespace {
 
-// Fractions of the sub-step's path. They are tried in turn until the sub-step is within the energy
-// budget.
+// Factors of the velocity, tried in turn until the sub-step is within the energy budget.
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
-// If only an impact zone helps, shorter sub-steps are useless: each zone makes the shortest
-// sub-step longer by this factor, up to this fraction of a step.
+// If only an impact zone helps, short sub-steps are useless. So each impact zone multiplies the
+// length of the shortest sub-step by `longer`, up to the fraction `longest` of a step.
 constexpr double longer = 4, longest = 0.25;
 
 }  // namespace
@@ -25,7 +24,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
   push_ = s_.push / whole_;
-  if (hits.empty()) {  // the pair was only pushed out too fast
+  if (hits.empty()) {  // held pairs were pushed out too fast; nothing else is wrong
     push_ = 0;
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
@@ -47,7 +46,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   }
 }
 
-// Advances by at most `length`, in as many attempts as needed. Returns the time advanced [s].
+// Advances by at most `length`, in shorter attempts if one fails. Returns the time advanced [s].
 double Stepper::sub_step(double length, const std::function<void()>& each) {
   const double share = 1 - rest_ / whole_;
   mocap_.sub_step(share, 1), mocap_.depart();
@@ -99,8 +98,8 @@ std::vector<Held> Stepper::held(double length) const {
   return out;
 }
 
-// Whether no pair passes through, and none becomes deeper. Deeper pairs are accepted once a shorter
-// sub-step was tried.
+// Whether the hits are acceptable: no pair passes through, and pairs only become deeper if they are
+// held and the sub-step is short already.
 bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
@@ -109,8 +108,8 @@ bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   });
 }
 
-// Ends a step whose attempts are used up. Joins pairs that pass through in impact zones, then slows
-// the motion down until it is within the energy budget.
+// Ends a step that has used all its attempts. Pairs that pass through are joined in impact zones.
+// Then the motion is slowed down until it is within the energy budget.
 EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hits,
                                   EnergyChange change) {
   std::vector<PairHit> through;
@@ -142,13 +141,13 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     again();
   }
   if (!mocap_.moves()) return change;
-  // If the bodies are slowed down, a mocap body may pass through one of them. Too much energy is
-  // then the smaller error.
+  // A mocap body may pass through bodies that were slowed down. Too much energy is the smaller
+  // error.
   if (passes()) go(1), note_passed(), again();
   return change;
 }
 
-// Marks the pairs that pass through on the present path.
+// Marks the pairs that pass through between the start and the present state.
 void Stepper::note_passed() {
   for (const PairHit& hit : judge())
     if (hit.passed) passed_[hit.pair] = 1;
@@ -159,7 +158,7 @@ bool Stepper::passes() {
   return std::any_of(hits.begin(), hits.end(), [](const PairHit& h) { return h.passed; });
 }
 
-// The length of the next attempt. The pairs in `hits` are held from now on.
+// The length of the next attempt. From now on the approach of the pairs in `hits` is stopped.
 double Stepper::shorter(const std::vector<PairHit>& hits, double length) {
   double share = 1;
   bool fresh = false;

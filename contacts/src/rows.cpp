@@ -5,17 +5,17 @@
 namespace tauguard::contacts {
 namespace {
 
-// Time constant of a row under the integrator `discrete`, short enough to act within the step [s].
+// Time constant of a row with the integrator `discrete`, short enough to act within the step [s].
 constexpr double rigid = 1e-6;
 
 constexpr int least_iterations = 100;
 
-// The number of friction coefficients of an explicit pair, a geom and a flex; how many of them are
-// sliding friction; and MuJoCo's smallest coefficient (mjMINMU).
-constexpr int frictions[] = {5, 3, 3}, tangents[] = {2, 1, 1};
-constexpr double least_friction = 1e-5;
+// Indexed by Place::Kind (explicit pair, geom, flex):
+constexpr int frictions[] = {5, 3, 3};   // number of friction coefficients
+constexpr int tangents[] = {2, 1, 1};    // number of coefficients of sliding friction
+constexpr double least_friction = 1e-5;  // MuJoCo's smallest coefficient (mjMINMU)
 
-// Restores margins, parameters and flags at the end, also after an exception.
+// Restores margins, parameters and flags when it is destroyed, also by an exception.
 class Borrowed {
  public:
   explicit Borrowed(const Engine& e)
@@ -43,8 +43,7 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
-  // Newton's solver is used because others do not converge on stiff rows within their iterations,
-  // so that pairs would pass through.
+  // With other solvers, stiff rows do not converge within the iterations, and pairs pass through.
   *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {
@@ -92,14 +91,13 @@ void Rows::aim_contact(const Contact& contact, double length, double push) {
   const int first = contact.row, count = e_.normal_rows(contact);
   const bool discrete = e_.is_discrete();
   const double* now = *e_.efc_vel;
-  // The normal speed is the mean over the two edges of a pyramid's first direction.
+  // With a pyramidal cone the normal speed is the mean over the first two opposite edges.
   const double normal = count > 1 ? 0.5 * (now[first] + now[first + 1]) : now[first];
   const double apart =
       contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
   const double speed = apart - mocap_.parting(contact) / length;
   for (int row = first; row < first + count; ++row) {
-    // Friction acts only between bodies that touch. Across a gap only the motion along the normal
-    // is stopped.
+    // Friction acts only if the bodies touch. Otherwise only normal motion is stopped.
     const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);
     if (discrete)
       (*e_.efc_margin)[row] = (*e_.efc_pos)[row] + length * aim;

@@ -1,15 +1,17 @@
-// A sub-step in which the solver stops the approach of chosen pairs before they are deep.
+// A sub-step in which the solver stops the approach of chosen ("held") pairs before they are deep.
 //
-// The margins of the chosen pairs are as wide as the pair may travel, so that MuJoCo lists every
-// place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets a
-// target velocity for the end of the sub-step. At a signed distance d > 0 and a length h of the
-// sub-step the bodies approach at most at d / h; in overlap they do not approach. The solver then
-// finds the least change of velocity (in the metric of the inertia) that satisfies these rows. All
-// of them allow standing still, so the change removes energy and adds none, except to push an
-// overlap out. Mocap bodies carry others along by their own velocity, which MuJoCo's rows do not
-// contain. They push without friction: with MuJoCo's friction, bodies that slide at a speed v
-// separate at mu v. A ball between a paddle and a table, which must slide on one of them, would
-// then leave at many times the paddle's speed.
+// * The margin of a held pair is the largest approach in the sub-step, so that MuJoCo lists all
+//   places in which the pair may meet.
+// * Between mj_step1 and mj_step2 each constraint row of these contacts gets a target velocity for
+//   the end of the sub-step. At a signed distance d > 0 the bodies approach at most at d / h, where
+//   h is the length of the sub-step. In overlap they do not approach.
+// * The solver finds the least change of velocity, in the metric of the inertia, that satisfies the
+//   rows. All rows allow standing still, so the change removes energy and adds none, except to push
+//   out an overlap.
+// * MuJoCo's rows do not contain the velocity of mocap bodies, so it is added here. Mocap bodies
+//   push without friction: with MuJoCo's friction, bodies that slide at a speed v separate at mu v.
+//   A ball between a paddle and a table, which must slide on one of them, would leave at many times
+//   the speed of the paddle.
 #pragma once
 
 #include "mocap.hpp"
@@ -17,7 +19,7 @@
 
 namespace tauguard::contacts {
 
-// A pair whose approach is stopped, and how far it may travel in the sub-step [m].
+// A held pair, and the margin of its contacts [m].
 struct Held {
   int pair;
   double margin;
@@ -32,7 +34,7 @@ class Rows {
         geoms_(engine.ngeom, 0),
         flexes_(static_cast<std::size_t>(engine.nflex), 0) {}
 
-  // One mj_step of `length` [s]; overlaps are pushed out at most at `push` times their depth [1/s].
+  // One mj_step of `length` [s]. Overlaps are pushed out at `push` [1/s] times the depth.
   void step(double length, const std::vector<Held>& held, double push);
 
  private:

@@ -1,5 +1,4 @@
-// Saves a guard's memory of earlier steps as bytes. A copy that reads them continues with the same
-// bits.
+// Saves a guard's memory of earlier steps as bytes, with which a copy continues with the same bits.
 #pragma once
 
 #include <cstring>
@@ -37,7 +36,7 @@ class Reader {
     if (static_cast<std::size_t>(end_ - at_) < sizeof value) fail();
     std::memcpy(&value, at_, sizeof value), at_ += sizeof value;
   }
-  // Reads or writes a list whose length both sides know.
+  // Reads or writes a list; on reading, its length must be the saved one.
   template <class T>
   void operator()(std::vector<T>& values) {
     std::size_t count = 0;

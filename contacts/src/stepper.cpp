@@ -13,7 +13,7 @@ std::uint64_t key(const Place& first, const Place& second) {
   return one(first) << 32 | one(second);
 }
 
-// A key of both partners of a contact. As in pairs, flexes come first, then the lower number.
+// A key of the partners of a contact, in the order of pairs: flexes first, then the lower number.
 std::uint64_t key(const Contact& contact) {
   Place p[2];
   for (int i = 0; i < 2; ++i)
@@ -30,7 +30,7 @@ std::vector<int> marked(const std::vector<char>& marks) {
   return out;
 }
 
-// Sets the timestep and mocap poses back at the end, also after an exception.
+// Restores the timestep and mocap poses when it is destroyed, also by an exception.
 struct Back {
   const Engine& e;
   double whole;
@@ -163,7 +163,7 @@ bool Stepper::step(const std::function<void()>& each) {
   return false;
 }
 
-// Accepts the step that mj_step made. True if the parameters of some pair were restored.
+// Accepts the plain step. True if the parameters of some pair were restored.
 bool Stepper::stands() {
   watched_ = std::max(watched_ - 1, 0);
   if (!guarded_count_) return false;
@@ -201,8 +201,8 @@ std::vector<PairHit> Stepper::judge() {
   return hits;
 }
 
-// Rotation vectors of the bodies over the step, estimated from their speed at its end. nullptr if
-// nothing turns fast.
+// Rotation vectors of the bodies over the step, estimated from the velocity at its end; nullptr if
+// all are slow.
 const double* Stepper::turns() {
   double most = 0;
   const double h = *e_.timestep;
@@ -216,7 +216,7 @@ const double* Stepper::turns() {
   return turn_.data();
 }
 
-// The flexes' vertices at the end of the step, in the order of MuJoCo's own sums.
+// Computes the vertices of flexes at the end of the step, with MuJoCo's order of sums.
 void Stepper::carry() {
   if (e_.interpolated) {
     e_.com_pos(e_.model, e_.end), e_.flex(e_.model, e_.end);
@@ -234,7 +234,7 @@ void Stepper::carry() {
   }
 }
 
-// MuJoCo found numbers that are not finite and reset the data: nothing is known of any pair.
+// MuJoCo has reset the data because of bad numbers, so any pair may have passed through.
 void Stepper::note_reset() { std::fill(passed_.begin(), passed_.end(), 1); }
 
 void Stepper::note_lost(const std::vector<PairHit>& hits) {
@@ -242,8 +242,8 @@ void Stepper::note_lost(const std::vector<PairHit>& hits) {
     if (hit.lost) passed_[hit.pair] = 1;
 }
 
-// Removes pairs that are no longer tracked, and pairs that touched only briefly if MuJoCo listed
-// the contact.
+// Removes pairs that are no longer guarded, and pairs that only touched if MuJoCo listed the
+// contact.
 std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
   hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
@@ -263,7 +263,7 @@ bool Stepper::within_budget() {
   return true;
 }
 
-// For each pair, whether MuJoCo lists a contact of it.
+// For each pair, whether MuJoCo lists a contact.
 std::vector<char> Stepper::listed() const {
   std::vector<char> seen(pairs_.size(), 0);
   for (int k = 0; k < *e_.ncon; ++k) {
@@ -273,14 +273,14 @@ std::vector<char> Stepper::listed() const {
   return seen;
 }
 
-// Releases the pairs that have parted; returns those whose parameters were restored.
+// Releases the pairs that have separated. Returns those whose parameters were restored.
 std::vector<int> Stepper::release() {
   std::vector<int> out;
   if (!guarded_count_) return out;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
-    // Pairs with a moving mocap body are left out: it sinks into others within a whole step, and a
-    // stiff contact would eject them.
+    // Pairs with a moving mocap body are always released: it sinks into others within a whole step,
+    // and a stiff contact would eject them.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

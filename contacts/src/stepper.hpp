@@ -1,5 +1,5 @@
-// The guarded step: a plain step if no pair passes through; otherwise it is rolled back and taken
-// in sub-steps that stop the approach.
+// The guarded step: a plain step if no pair passes through. Otherwise it is rolled back and
+// repeated in sub-steps that stop the approach (rows.hpp).
 #pragma once
 
 #include <cmath>
@@ -12,20 +12,20 @@
 
 namespace tauguard::contacts {
 
-// What a step would do to a pair. For a flex, the earliest contact and the deepest level over its
-// simplices.
+// A pair that a step brings into contact. For a flex, `time` is the earliest and `deepest` the
+// deepest over its simplices.
 struct PairHit {
-  int pair, deepest;
-  bool passed;   // its last eroded shapes met: the pair would have passed through itself
-  bool lost;     // they met at the start already and had been apart: the pair is no longer tracked
-  bool brushed;  // it touched and separated within the step, no eroded shapes met
-  double time;   // of the first touch, as a fraction of the step; 0 if it touched at the start
-  double way;    // upper bound of the approach of its points in the step [m]
-  std::vector<std::int32_t> features;  // simplices of the flex that came deepest
-  std::vector<std::int32_t> corners;   // flexes against flexes: vertices that crossed
+  int pair, deepest;  // number of the pair; deepest level (verdict.hpp) whose eroded shapes met
+  bool passed;        // the eroded shapes of the last level met: the pair would have passed through
+  bool lost;  // these shapes meet at the start, but had been apart: the pair is no longer guarded
+  bool brushed;  // the pair touched and separated within the step; no eroded shapes met
+  double time;   // first touch, as a fraction of the step; 0 if the pair touched at the start
+  double way;    // upper bound of the approach of the pair's points in the step [m]
+  std::vector<std::int32_t> features;  // deepest simplices of the flex
+  std::vector<std::int32_t> corners;   // of a pair of flexes: the vertices that crossed
 };
 
-// One sub-step that was rolled back: when the next attempt ends [s], the pair that caused it, and
+// A sub-step that was rolled back: when the next attempt ends [s], the pair that caused it, and
 // whether its contact parameters were stiffened.
 struct Cut {
   double time;
@@ -33,7 +33,7 @@ struct Cut {
   bool stiffened;
 };
 
-// What one step did, beside the number of contacts.
+// The report of a step.
 struct Report {
   int steps = 1, contacts = 0;
   std::vector<Cut> cuts;
@@ -42,25 +42,20 @@ struct Report {
   bool rolled_back = false;
 };
 
+// SETTINGS and GuardedStepper in contacts/guard/stepper.py explain the fields.
 struct Settings {
   bool stiff;
-  int most;           // calls of mj_step that one step may cost
-  double beyond;      // how far beyond the touch a sub-step goes [m]
-  double room;        // margins over what the pair travelled in the attempt that failed
-  double smallest;    // sub-steps up to this fraction of the step are not cut further
-  double push;        // fraction of a depth that is pushed out in each step
-  int watched, look;  // steps after a rollback in which energy is counted; steps between looks for
-                      // parted pairs
-  double deeper_geom, deeper_flex;  // sub-steps above this fraction may not deepen a held pair
-  double turned;                    // rotation in a step above which whole turns are counted [rad]
+  int most;
+  double beyond, room, smallest, push;
+  int watched, look;
+  double deeper_geom, deeper_flex, turned;
 };
 
 class Stepper {
  public:
-  // Finds the crossings of flexes with flexes in a step.
+  // Appends the crossings of flexes with flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
-  // Joins the partners of each pair that passed in the last sub-step in an impact zone, from `qpos`
-  // on.
+  // Repeats a sub-step of this length from `qpos`, with the hits' partners in impact zones.
   struct Stopped {
     std::vector<int> pairs;
     double work;  // work of mocap bodies [J]
@@ -77,22 +72,21 @@ class Stepper {
   void set_callbacks(TunnellingEvents tunnelling, ImpactZone impact_zone) {
     tunnelling_ = std::move(tunnelling), impact_zone_ = std::move(impact_zone);
   }
-  // Advances by one timestep; `each` is called after every sub-step. Returns true if the number of
-  // contacts is the whole report; otherwise report() has more.
+  // Advances by one timestep; `each` is called after every sub-step. Returns true if the report has
+  // nothing but the number of contacts.
   bool step(const std::function<void()>& each);
   std::vector<PairHit> judge();
   std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
   // Restores every contact parameter.
   void close();
-  // The state was set from outside: clears the memory of earlier steps.
+  // Clears the memory of earlier steps, after the user has set the state.
   void reset();
-  // Replaces the covered pairs, as in the constructor; the memory of pairs that are in both is
-  // kept.
+  // Replaces the covered pairs, as in the constructor. The memory of pairs that remain is kept.
   void follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
               std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled);
   // Whether the guard can step the model and the data.
   bool acceptable() const;
-  // Restores the state at the start after an exception in a step.
+  // Restores the state at the start of the step, after an exception.
   void abandon();
   // Writes or reads the memory of earlier steps.
   template <class Archive>
@@ -137,7 +131,7 @@ class Stepper {
   std::unordered_map<std::uint64_t, int> number_;  // the number of a pair, by its partners
   std::vector<int> spins_;                         // rotational degrees of freedom
 
-  bool stepping_ = false;  // the state of the start is in first_
+  bool stepping_ = false;  // first_ contains the state at the start of the step
   std::vector<double> first_, saved_, velocity_, qpos_, x_t1_, turn_;
   std::vector<char> guarded_;
   int guarded_count_ = 0, watched_ = 0, since_ = 0, contacts_ = 0;
@@ -145,9 +139,9 @@ class Stepper {
   // State of the step that is rolled back.
   Report report_;
   double whole_ = 0, rest_ = 0, push_ = 0;  // whole and remaining time [s]; push-out rate [1/s]
-  double least_ = 0;                        // sub-steps of this fraction are not cut further
+  double least_ = 0;                        // smallest sub-step, as a fraction of the step
   int stops_ = 0;                 // number of impact zones in the last step that was rolled back
-  std::map<int, double> speeds_;  // of the pairs that are held [m/s]
+  std::map<int, double> speeds_;  // held pairs, and the bound of their speed of approach [m/s]
   std::vector<char> passed_, in_zone_;
 };
 

@@ -1,4 +1,4 @@
-// Contact parameters that are changed while a guarded contact lasts, and restored after it.
+// Changes contact parameters while a guarded contact lasts, and restores them after it.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace tauguard::contacts {
 
-// The carrier of a contact's parameters: an explicit pair, a geom or a flex, and its number.
+// An object with contact parameters: an explicit pair, a geom or a flex, and its number.
 struct Place {
   enum Kind { pair, geom, flex } kind;
   int number;
@@ -18,7 +18,7 @@ struct Place {
   bool operator==(const Place& o) const { return kind == o.kind && number == o.number; }
 };
 
-// Both partners of a contact (flexes first), and the carrier of its parameters.
+// Both partners of a contact (flexes first), and the object whose parameters are changed.
 struct Partners {
   Place first, second, carrier;
 };
@@ -32,15 +32,15 @@ class Stiffening {
   Stiffening(const Engine& engine, const std::vector<Partners>& pairs)
       : e_(engine), pairs_(pairs), stiff_(pairs.size(), 0) {}
 
-  // Makes a pair stiff. Its carrier gets a priority above the partner's, so that averaging does not
-  // soften the contact. False if the pair was stiff already.
+  // Makes a pair stiff. `carrier` gets a priority above that of the other partner, so that MuJoCo
+  // does not average the parameters. False if the pair was stiff already.
   bool stiffen(int pair);
   // Restores the parameters once no other pair needs them stiff. False if the pair was not stiff.
   bool restore(int pair);
   bool is_stiff(int pair) const { return stiff_[pair]; }
-  // Takes over values that the user has written meanwhile; they are restored later.
+  // Stores values that the user has written meanwhile; they are restored later.
   void follow();
-  // Follows a new list of pairs, none of them stiff.
+  // Starts with a new list of pairs, none of them stiff.
   void resize() { stiff_.assign(pairs_.size(), 0), saved_.clear(); }
   template <class Archive>
   void archive(Archive& a) {
@@ -55,7 +55,7 @@ class Stiffening {
     std::array<double, 2> solref;
     std::array<double, 5> solimp;
     int priority, users;
-    int raised;  // the priority that was written
+    int raised;  // the priority that the guard has written
   };
   using Entry = std::pair<Place, Saved>;
   template <class Archive>

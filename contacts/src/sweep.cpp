@@ -43,8 +43,8 @@ rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const R
 
 }  // namespace
 
-// The box of both ends contains the chord of every point's path. The path leaves its chord by at
-// most rho (1 - cos(angle / 2)). The last term covers rounding.
+// The box of both ends contains the chord of every point's path. The distance of the path from its
+// chord is at most rho (1 - cos(angle / 2)). The last term covers rounding.
 Aabb swept(SupportShape m, const RigidMotion& motion) {
   if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
   m.move_to(0);
@@ -97,7 +97,7 @@ void Geoms::update(const Poses& p) {
 
 namespace {
 
-// Polytopes without a threshold use the kernel of rigid/ that follows their features.
+// First contact of two polytopes without threshold, by the kernel of rigid/ for vertex lists.
 Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& origin, SupportShape& a,
                       SupportShape& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);
@@ -109,8 +109,7 @@ Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& orig
                   impact.t);
 }
 
-// The first triangle of b's surface that a touches; the deepest one if several are touched at the
-// same time.
+// First contact with a triangle of b's surface; of several at the same time, with the deepest.
 Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec3& origin,
                     std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);
@@ -123,7 +122,7 @@ Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, 
   Touch first;
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     const Vec3 y = in_body.out(surface.centre[i]), c = body.out(y);
-    // No point of the triangle leaves this ball; the factor covers rounding.
+    // `way` bounds the motion of the triangle's points; the factor covers rounding.
     const double way =
         (surface.radius[i] * (1 + motion.speed) + drift + motion.speed * norm(y)) * (1 + 0x1p-40);
     bool far = false;

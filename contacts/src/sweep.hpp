@@ -1,4 +1,4 @@
-// A scene's pairs over one step: swept boxes first, then the time of impact of the remaining pairs.
+// Contacts of the pairs of a scene in one step: a filter by swept boxes, then times of impact.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace tauguard::contacts {
 using namespace rigid;  // the convex kernel
 using geometry::Aabb;
 
-// Two geoms. Contacts are listed up to the distance `reach` of the surfaces.
+// Two geoms. Contacts are listed if the surfaces are within the distance `reach`.
 struct GeomPair {
   std::int32_t a, b;
   double reach;
@@ -24,12 +24,11 @@ struct Row {
   Vec3 point, normal;
 };
 
-// The box of all places of a moving shape in the step; `motion` is its body's.
+// A box that contains a moving shape during the whole step; `motion` is the motion of its body.
 Aabb swept(SupportShape mover, const RigidMotion& motion);
 
 // Poses of the bodies at both ends of a step, (nbody, 3) and (nbody, 9). `turn`, if given, is an
-// estimate of each body's rotation between them (nbody, 3) [rad]; it decides how many whole turns
-// are made.
+// estimate of the bodies' rotation vectors (nbody, 3) [rad], which determines the full turns.
 struct Poses {
   const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;
   const double* turn = nullptr;
@@ -42,21 +41,23 @@ struct Counts {
 // The triangles of a mesh, for pairs that test its surface instead of its hull.
 struct Surface {
   std::vector<Shape> triangles;
-  std::vector<Vec3> centre;  // of a ball around each, in the geom's frame
-  std::vector<double> radius;
+  std::vector<Vec3> centre;    // centre of a ball around each triangle, in the geom's frame
+  std::vector<double> radius;  // radius of the ball
 };
 
 class Geoms {
  public:
   void add(Shape shape, int body, const LocalFrame& in_body);
-  // Gives the last geom a surface.
+  // Sets the surface of the last geom.
   void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
   // Updates motions and swept boxes of bodies that moved in this step or since the last one.
   void update(const Poses& poses);
-  bool still(int geom) const { return still_[body_[geom]]; }     // unmoved in this step
-  bool as_before(int geom) const { return same_[body_[geom]]; }  // and unmoved in the last step too
+  bool still(int geom) const { return still_[body_[geom]]; }  // at rest in this step
+  bool as_before(int geom) const {
+    return same_[body_[geom]];
+  }  // at rest in this and the last step
   const Aabb& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
   const Surface& surface(int geom) const { return surfaces_[geom]; }
@@ -93,19 +94,19 @@ class RigidPairs {
   std::vector<Cached> cache_;
 };
 
-// A geom that the simplices of a flex are tested against. `skip` leaves out simplices attached to
-// the geom's own body.
+// A geom against which the simplices of a flex are tested. `skip` marks simplices attached to the
+// geom's body, which are left out.
 struct FlexPair {
   std::int32_t geom;
   double reach;
-  const std::uint8_t* skip;  // one for each simplex
+  const std::uint8_t* skip;  // one per simplex
 };
 
 Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
                  const std::int32_t* elements, std::size_t count, int corners, double radius,
                  const std::vector<FlexPair>& pairs, std::vector<Row>* rows);
 
-// Two simplices of linearly moving vertices. True if they come within `distance` of each other.
+// Whether two simplices of linearly moving vertices come within `distance` of each other.
 bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a,
                      const std::int32_t* b, int corners, double distance, Touch* touch);
 

@@ -110,7 +110,7 @@ def test_pairs_that_a_checker_does_not_cover_are_not_counted():
         ({"distance": [np.nan]}, "distance nan, expected a finite number"),
         ({"normal": [[0, 0, 2]]}, r"normal \[0.0, 0.0, 2.0\], expected length 1, or NaN"),
         ({"normal": [[0, 0, np.nan]]}, r"normal \[0.0, 0.0, nan\], expected length 1, or NaN"),
-        ({"geom": [[0, -1]]}, "a partner is either a geom or a flex"),
+        ({"geom": [[0, -1]]}, "a partner with a geom and a flex, or neither"),
     ],
 )
 def test_a_contact_of_another_model_or_step_is_refused(change, said):

@@ -87,7 +87,7 @@ PADDLE = '<body mocap="true" pos="0 0 3"><geom size=".1"/></body>'
         (option("density", np.inf), "opt.density: inf, not finite"),
         (option("o_solref", [np.nan, 1]), "opt.o_solref: [nan, 1.0], not finite"),
         (put("geom_condim", 0, 7), "geom_condim: row 0 is 7, not 1, 3, 4 or 6"),
-        (put("geom_type", 0, 99), "geom_type: row 0 is 99, no type of MuJoCo's"),
+        (put("geom_type", 0, 99), "geom_type: row 0 is 99, an unknown type"),
         (put("geom_dataid", 2, 0), "geom_dataid: row 2 is 0, no such object"),
         (put("mocap_pos", 0, np.nan, of="data"), "mocap_pos: row 0 is"),
         (put("mocap_quat", 0, np.inf, of="data"), "mocap_quat: row 0 is"),

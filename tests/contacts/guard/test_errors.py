@@ -103,7 +103,7 @@ def test_a_step_within_a_step_is_refused():
 
     def each():
         for call in (guard.step, guard.reset, guard.close, lambda: copy.deepcopy(guard)):
-            with pytest.raises(RuntimeError, match="a step of this guard is being made") as found:
+            with pytest.raises(RuntimeError, match="this guard is in a step") as found:
                 call()
             messages.append(found.value)
         assert isinstance(guard.stiffened, tuple)
@@ -131,5 +131,5 @@ def test_threads_on_one_guard_are_refused_not_mixed():
     for thread in threads:
         thread.join()
     assert len(made) + len(refused) == 40
-    assert all("use a guard and an MjData for each thread" in text for text in refused)
+    assert all("use a guard and an MjData per thread" in text for text in refused)
     assert data.time == pytest.approx(len(made) * 5e-3)
