@@ -39,14 +39,15 @@ RECORDED = "cloth-ball"  #: the recorded scene with a target
 
 NOTES = {
     "frame": "all collisions of one step. volume: of the broad phase; (moving_)k_dopK has K/2 axes "
-    "and bounds the whole step (moves with it). First each method with the volume that it was "
-    "published with, then iccd and vcd with ab2pf's. times_ab2pf: time over ab2pf's. missed, "
+    "and bounds the whole step (moves with it). First each method with its published volume, then "
+    "iccd and vcd with that of ab2pf. times_ab2pf: time / time of ab2pf. missed, "
     "added: hits of ab2pf that the method lacks, and the reverse. late: common hits whose time is "
     "more than 1e-9 after ab2pf's; late_most: by which fraction of the step.",
-    "frame mean": "times_ab2pf over the cloths of the table above, cloth-ball among them.",
-    "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns, ee_ns each). "
-    "speedup: both over ab2pf's whole frame.",
-    "listed": "recorded frames beside the collisions that their authors list; late as above.",
+    "frame mean": "mean of times_ab2pf over the cloths of the table above, with cloth-ball.",
+    "frame peer": "the same step by ipctk: broad phase, then vf_ns, ee_ns for each candidate. "
+    "speedup: time of both phases / time of ab2pf's whole frame.",
+    "listed": "hits compared with the collisions that the authors of the frames list; late as "
+    "above.",
 }
 
 

@@ -45,13 +45,13 @@ METHODS = ("plain", "speculative", "ipc", "guarded")
 
 NOTES = {
     "thrown": "held: nothing tunnelled; silent: tunnelling that the guard did not report; "
-    "exhausted: reported; impact_zones: scenes with partners that moved rigidly together. energy: "
-    "the most over that at first (mocap: over all bodies at twice its speed); energy_above: scenes "
-    f"with more than {ADDED:g}; rolled_back_above: of those with a rollback, with more than plain "
-    "steps too; rolled_back_added: most that rollbacks gave. over_plain: time over plain steps'; "
-    "over_fixed: over the largest fixed step (stiff contacts) from which on all finer ones hold, "
-    "fixed_ms, one scene in four. Medians.",
-    "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
+    "exhausted: reported tunnelling; impact_zones: scenes with rigidly moved pairs. energy: "
+    "largest / initial energy (mocap: / that of all bodies at twice its speed); energy_above: "
+    f"scenes above {ADDED:g}; rolled_back_above: those of them with a rollback and more energy "
+    "than plain steps; rolled_back_added: largest energy added by rollbacks. Medians: over_plain: "
+    "time / time of plain steps; over_fixed: time / time of the fixed step fixed_ms, the largest "
+    "(with stiff contacts) at which nothing tunnels there and below, for one scene in four.",
+    "overhead": "a step of a scene without fast contacts, plain and guarded.",
 }
 
 

@@ -37,9 +37,9 @@ NAME, PER_HOUR = "tauguard-collisions-v2", 10.0
 QUICK, QUICK_EPISODES, QUICK_SECONDS = ("residual-thresholds",), {"train": 6, "test": 2}, 30.0
 
 NOTES = {
-    "entries": "Trained on the train split of each of its arms, 10 false alarms an hour aimed at; "
-    "all arms of a split together. from_16: fraction found of the collisions from 16 N m up; "
-    "delays [ms] are of those. train_s: of one arm.",
+    "entries": "one detector per arm, trained on the train split for 10 false alarms per hour; "
+    "rates over all arms of a split. from_16: fraction found of the collisions from 16 N m up, "
+    "and their delays [ms]. train_s: training time for one arm [s].",
 }
 
 

@@ -43,23 +43,23 @@ METHODS = ("surface", "exposed", "usual", "exact")
 EXPOSED = (2, 3, 4, 5, 6)
 
 _ALARMS = (
-    "of the collisions that raised an alarm. surface: this project's; exposed: with link 1 out of "
-    "reach; usual, the peer: last joint with a residual, damped least squares at the "
-    "middle of its link; exact: surface with the true torque, what no observer can better. "
+    "over the collisions that raised an alarm. Methods: surface is tauguard's; exposed: the same "
+    "without link 1; usual, the peer: last joint with a residual, damped least squares at the "
+    "middle of its link; exact: surface with the true torque, a bound for every observer. "
 )
 #: What the columns of each table mean.
 NOTES = {
-    "link": "rates " + _ALARMS + "Missed collisions are not in it.",
+    "link": "rates " + _ALARMS + "Missed collisions do not count.",
     "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
-    "kind": "counts: one row for each true kind, one column for each diagnosed kind. Everything "
-    "is simulated, pushes included: no person made one.",
+    "kind": "counts: one row for each true kind, one column for each diagnosed kind. All "
+    "events are simulated, also the pushes.",
     "payload": "loads that are picked up and put down, unknown to the detector. mass_error_g: "
     "median error of those not diagnosed as a collision.",
-    "severity": "how often the 90 % interval holds the true value, of the collisions that raised "
-    "an alarm. width: median ratio of its upper to its lower end; identifiable: fraction with a "
-    "ratio of 6 or less. Impulse [N s] and peak force [N] of the window.",
-    "cost": "wall time of the diagnosis of one alarm; aftermath_us: the part that computes the "
-    "residual around it.",
+    "severity": "of the collisions that raised an alarm. held: fraction whose 90 % interval "
+    "contains the true value; width: median of upper / lower end; identifiable: fraction with a "
+    "width of 6 or less. Impulse [N s] and peak force [N] of the window.",
+    "cost": "wall time of the diagnosis of one alarm; aftermath_us: computation of the residual "
+    "around the alarm, included.",
 }
 
 

@@ -55,18 +55,18 @@ NOTES = {
     "speed": _JUDGED + "and specificity, of collision-free cases of 2 s; by percent of the largest "
     "speed. threshold_a: the operating point [A]; threshold: of each arm's own, median [least, "
     "most]. All arms and collisions are simulated.",
-    "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms an hour; "
-    "alarms_per_hour: what came of it in so many hours. Delays from the touch [ms]. tau98: the "
-    "least torque above which 98 % are found [N m], by speed.",
-    "strata": "collisions found of all, by torque [N m]; collisions below 4 N m count in no "
-    "other rate.",
-    "dissertation": "TP, FN, FP, TN printed for a real arm beside ours for simulated ones: the "
-    "same experiment, not the same collisions. Sensitivities are of all from 4 N m up.",
-    "conditions": "conditions that training did not have, at the third operating point, for one "
-    "speed and arm; nothing is trained again.",
-    "headline": "sensitivity / specificity of the best detector (one for all cells) and of SVR-SRQ "
-    "beside the dissertation's SVR. met: both rates of the best reach 0.98, and both of SVR-SRQ's "
-    "the dissertation's.",
+    "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms per hour; "
+    "alarms_per_hour: measured rate, and its hours. Delays from the touch [ms]. Columns of "
+    "speeds: tau98, the smallest torque above which 98 % are found [N m].",
+    "strata": "collisions found / all, by torque [N m]; collisions below 4 N m count in no "
+    "other table.",
+    "dissertation": "TP, FN, FP, TN: theirs as printed for a real arm, ours for simulated arms in "
+    "the same experiment. Sensitivities are of all collisions from 4 N m up.",
+    "conditions": "conditions that training lacked, at the third operating point, for one "
+    "speed and arm; detectors and thresholds stay the same.",
+    "headline": "sensitivity / specificity of the best detector (one for all cells), of SVR-SRQ, "
+    "and of the dissertation's SVR. met: both rates of the best detector reach 0.98, and both of "
+    "SVR-SRQ reach those of the dissertation.",
 }
 
 

@@ -35,18 +35,18 @@ PER_HOUR = 10.0
 
 #: What the columns of each table mean.
 NOTES = {
-    "real time": "processor time of one core at 1 kHz [us a sample], of collision-free motion: "
+    "real time": "processor time of one core per sample at 1 kHz [us], of collision-free motion: "
     "simulation, the plain observer, and the rest of the shipped detector (tracking, features, "
-    "400 support vectors, threshold). times: how many times real time all of it runs. peer: "
-    "MuJoCo's own rollout of the bare arm in the same run. difference_to_online: of the scores, "
-    "largest.",
+    "400 support vectors, threshold). times: speed of all together / real time. peer: "
+    "MuJoCo's own rollout of the bare arm in the same run. difference_to_online: largest "
+    "difference of the scores.",
     "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "
     "[us]; over_a_period: number of samples that took over 1 ms; difference_to_batch: largest "
     "difference of the scores.",
-    "kernel": "one window of the SVR alone: all support vectors, then ever fewer. The peer is "
-    "scikit-learn's predict with its kernel row by NumPy, less than its own callable kernels do. "
-    "error: of the output, beside all vectors. What fewer vectors cost in missed collisions is not "
-    "shown.",
+    "kernel": "one window of the SVR alone: all support vectors, then fewer. The peer is "
+    "scikit-learn's predict with a kernel row by NumPy, which is faster than its callable kernels. "
+    "error: difference of the output from that of all vectors. Effects on missed collisions are "
+    "not measured.",
 }
 
 

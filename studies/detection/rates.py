@@ -49,8 +49,8 @@ NOTES = {
     "alarms per hour: aimed at, as `train` chooses them, or guaranteed with 95 % confidence "
     "(conformal). found: rate in other motion of all these arms, with its exact 95 % interval; "
     "kept: fraction of the arms whose own interval begins at or below the requested rate; refused: "
-    "arms whose calibration is too short for the guarantee. sensitivity from 16 N m up and of "
-    "all from 4 N m up; delays of the former [ms].",
+    "arms whose calibration is too short for the guarantee. sensitivity: of collisions from 16 N m "
+    "up; all: from 4 N m up; delays of those from 16 N m up [ms].",
 }
 
 

@@ -28,9 +28,9 @@ ASKED = 1.0
 
 NOTES = {
     "robot": "one individual of each robot, with thresholds from its own motion for one false "
-    "alarm an hour. share: the robot's largest torque limit over the CURA6-like arm's, at most "
-    "1; payloads and torques are multiplied by it. sensitivity: of the collisions from 16 N m "
-    "times share up; all: from 4 N m times share up. Delays of the former [ms].",
+    "alarm per hour. share: largest torque limit / that of the CURA6-like arm, at most "
+    "1; payloads and torques are multiplied by it. sensitivity: of collisions from 16 N m "
+    "times share up; all: from 4 N m times share up. Delays of those of `sensitivity` [ms].",
 }
 
 FULL = Size(1, NAMES, (ASKED,), Training(free=10), 0.3, 0.4, 1)

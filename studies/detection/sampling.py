@@ -27,8 +27,8 @@ ASKED = 1.0
 
 NOTES = {
     "sample rate": "The same arms and motion at every rate [Hz], thresholds from each arm's own "
-    "motion for one false alarm an hour. sensitivity: of the collisions from 16 N m up; all: from "
-    "4 N m up. Delays of the former from the touch [ms]."
+    "motion for one false alarm per hour. sensitivity: of collisions from 16 N m up; all: from "
+    "4 N m up. Delays of those from 16 N m up, from the touch [ms]."
 }
 
 FULL = Size(3, NAMES, (ASKED,), Training(), 0.4, 0.6, 1)

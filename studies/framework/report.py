@@ -45,13 +45,12 @@ FIGURES = (
     "Circles are tauguard's, squares are peers of the same run.</p>"
 )
 RUNS = (
-    "A quick run shows the form of the answers, a full run their size; two quick parts run at a "
-    "time. load: programs that wanted to run when a part ended; above the number of cores its "
-    "times are too long."
+    "Numbers of a quick run are rough; two quick parts run at the same time. load: number of "
+    "running programs at the end of a part; above the number of cores, times are too long."
 )
 UNRECORDED = "<p>A quick run records none: <code>tauguard report --bound</code> does.</p>"
 CASES = (
-    "<p>Named cases with exact answers, put to every library that is installed; "
+    "<p>Named cases with exact answers, run on every installed library; "
     "<code>tauguard hard-cases</code> runs them, on other libraries too. "
     "Right answers of those asked:</p>"
 )

@@ -44,7 +44,7 @@ class Study:
 
 
 def package(study: str) -> ModuleType:
-    """The package of a study, which is light to import."""
+    """The package of a study; it imports quickly."""
     return importlib.import_module(f"studies.{study}")
 
 

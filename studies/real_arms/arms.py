@@ -47,13 +47,13 @@ class Touched:
 class ArmData:
     """One arm."""
 
-    name: str  #: folder, and preset and URDF where nothing else is said
+    name: str  #: folder; also preset and URDF, unless ``columns`` and ``robot`` name others
     free: tuple[str, ...]  #: folders of collision-free logs
     contact: str = ""  #: folder of logs with pushes, beside the arm's
-    robot: str = ""  #: file of the package
+    robot: str = ""  #: robot file of the package
     columns: str = ""  #: preset
-    parts: int = 1  #: that a free log is cut into
-    loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, where there were any
+    parts: int = 1  #: number of parts into which a free log is cut
+    loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, if the arm had a load
 
     @property
     def file(self) -> Path:
@@ -94,12 +94,12 @@ def thinned(trace: Trace, rate: float) -> Trace:
 
 
 def folder() -> Path:
-    """Where the logs are."""
+    """The folder of the logs."""
     return Path(os.environ.get("TAUGUARD_DATA", "data"))
 
 
 def available() -> list[ArmData]:
-    """The arms whose logs are there."""
+    """The arms whose logs exist."""
     return [arm for arm in ARMS if (folder() / arm.name).is_dir() and arm.file.is_file()]
 
 

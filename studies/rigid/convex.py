@@ -41,14 +41,14 @@ NOTES = {
     "table 2.1 static": "ns for a pair in one pose, one thread. coal_net: without loop and call; "
     "a_vs_b: time of b over time of a; published: the printed ratio; wrong: fraction of all "
     "pairs.",
-    "table 2.1 dynamic": "ns a pair that moves by a constant translation; a_vs_b: b's time over "
-    "a's. The published collision entries 2.58 and 1.37 are not inverted in their source: "
-    "elimination was that much slower.",
-    "batched box-box": "ns a pair; wrong: of all pairs; exact_rows: left to exact arithmetic.",
+    "table 2.1 dynamic": "ns per pair in translation; a_vs_b: time of b / time of a. In the "
+    "published collision entries 2.58 and 1.37 elimination was slower, not faster, by this factor.",
+    "batched box-box": "ns per pair; wrong: fraction of all pairs; exact_rows: pairs that exact "
+    "arithmetic decided.",
     "coherent frames": "ns for a pair of slowly moving bodies, with separating planes cached "
     "from frame to frame and without.",
-    "hard cases": "false_hit and false_clear count wrong answers; exact_share: left to exact "
-    "arithmetic.",
+    "hard cases": "false_hit, false_clear: numbers of wrong answers; exact_share: fraction that "
+    "exact arithmetic decided.",
 }
 
 

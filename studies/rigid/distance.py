@@ -30,9 +30,9 @@ ROUNDED = (
     ("rounded boxes", "rounded boxes"),
 )
 NOTES = {
-    "distance": "ns for the signed distance of a pair; coal's with the call of its binding. "
-    "wrong_sign: of all pairs, judged by the exact overlap; wrong_overlap: of the `known` rows, "
-    "judged by rational arithmetic; error: of the known distances, as a fraction of the pair's "
+    "distance": "ns for the signed distance of a pair; coal's times include its Python call. "
+    "wrong_sign: fraction of all pairs, by the exact overlap; wrong_overlap: of the `known` pairs, "
+    "by rational arithmetic; error: largest of the known distances, as a fraction of the pair's "
     "size.",
 }
 

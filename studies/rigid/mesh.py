@@ -32,16 +32,17 @@ ADVANCED = 16
 #: Of rounded shapes, coal takes only spheres and capsules beside a mesh.
 BODIES = ("spheres", "capsules", "tetrahedra", "boxes")
 NOTES = {
-    "mesh build": "one tree; times_faster: the time of coal's OBBRSS over ours.",
-    "table 2.2 static": "first hit of two copies in random poses [us]; times_faster: coal's mean, "
-    "net of its call, over ours; disagree: answers that differ from coal's.",
-    "table 2.2 dynamic": "two copies, one of which moves: us of a pair that touches, that stays "
-    "apart. coal_us: advancement over coal's distance (OBBRSS), its calls alone, on some of the "
-    "pairs. late: pairs that overlap 1e-10 before the time, not_touching: 1e-7 after it, by the "
-    "exact query. met_before: pairs that coal says meet before; distance_at_toi: coal's [m].",
-    "mesh and convex": "one mesh and convex bodies, us a body, coal's with its binding; "
-    "coal_differs_most: of distances of pairs apart [m].",
-    "mesh and convex in motion": "as table 2.2 dynamic, the body moves.",
+    "mesh build": "one tree; times_faster: time of coal's OBBRSS / this time.",
+    "table 2.2 static": "first hit of two copies in random poses [us]; times_faster: coal's mean "
+    "without its Python call / this mean; disagree: answers that differ from coal's.",
+    "table 2.2 dynamic": "two copies, one of which moves. us_hit, us_miss: time for a pair that "
+    "touches, and that stays apart. coal_us: the distance calls (OBBRSS) of conservative "
+    "advancement, on some of the pairs. late: pairs that overlap 1e-10 before the time found; "
+    "not_touching: pairs apart 1e-7 after it, by the exact query. met_before: pairs that meet "
+    "before by coal's distance; distance_at_toi: coal's distance at the time found [m].",
+    "mesh and convex": "one mesh and convex bodies, us per body, coal's with its Python call; "
+    "coal_differs_most: largest difference of distances, pairs apart [m].",
+    "mesh and convex in motion": "as table 2.2 dynamic; the body moves.",
 }
 
 

@@ -28,16 +28,16 @@ WHOLE, THREADED = "the environment", "make_vec, 2 threads"
 NOTES = {
     "step": "processor time of an action (10 ms) of one Reach environment, one thread. The peers: "
     "MuJoCo's rollout of the same scene and forces; the same physics and drives in a bare loop. "
-    "added_us: over the environment. q_difference_rad: largest, of rollout's joints. "
-    "Each row below the environment changes one thing of it.",
+    "added_us: additional time. q_difference_rad: largest difference from rollout's joints. "
+    "Each row below the environment changes one option of it.",
     "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
     "alone: physics without drives, observations or rewards; q_difference_rad: of its copies from "
     "mj_step of one. Means little on a loaded machine.",
     "reaction": "swings into the chest, median [least, most]. false_alarms: swings with an alarm "
     "before the contact, which are left out of the rest. delay_s: from the contact to the "
-    "reaction; stopping_distance_m, end_m: distance of the tool from where it touched; "
-    "force_over_limit: peak force over the standard's limit for a transient contact. A reaction "
-    "that knows the contact itself bounds what any detector can do.",
+    "reaction; stopping_distance_m, end_m: distance of the tool from the first contact; "
+    "force_over_limit: peak force / the standard's limit for a transient contact. A reaction "
+    "to the true contact is a bound for every detector.",
 }
 
 

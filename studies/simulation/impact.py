@@ -21,9 +21,9 @@ NOTES = {
     "two-mass model, for the worst region; energy_error: of the energy stored in the spring. "
     "direct: MuJoCo gets the stiffness directly.",
     "arm": "a link hits a region at 0.25 m/s. inertial_peak_n: without drives; predicted_n: from "
-    "its reflected mass, error: difference of both; standard_n: from half the moving mass and "
-    "the load; driven_peak_n: under position control, which neither predicts. The regions are "
-    "the standard's springs, not tissue.",
+    "its reflected mass, error: relative difference; standard_n: from half the moving mass and "
+    "the load; driven_peak_n: under position control, without a prediction. The regions are "
+    "the springs of the standard.",
 }
 
 

@@ -32,10 +32,10 @@ PAYLOADS = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
 #: collisions each and without (50 s).
 FULL, QUICK = (12, 18, 9, 24), (2, 3, 1, 1)
 NOTES = {
-    "needs": "srq-svr trained on simulations without a part, 10 false alarms an hour aimed at, and "
+    "needs": "srq-svr trained on simulations without a part for 10 false alarms per hour, and "
     "judged on other motion of the whole simulation and (believed) of the one without the part. "
-    "from_16: fraction found of the collisions from 16 N m up; delay: median of those [ms]. cost: "
-    "processor time of a sample over that of the whole simulation, taken in turn.",
+    "from_16: fraction found of the collisions from 16 N m up; delay: their median delay [ms]. "
+    "cost: processor time per sample / that of the whole simulation.",
 }
 Episodes = tuple[Episode, ...]
 
