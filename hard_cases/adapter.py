@@ -43,8 +43,8 @@ def adapters(names: tuple[str, ...] = ()) -> list[Adapter]:
     """Adapters by name of a library or by ``module:Class``; by default all installed libraries.
 
     Raises:
-        ValueError: a text that is neither a known name nor a class that can be imported and made
-            without arguments, or one without a name or without any of the methods.
+        ValueError: a text that is neither a known name nor an importable class, or a class that
+            needs arguments, has no ``name`` or has none of the methods.
     """
     if not names:
         return [one for one in map(_installed, BUILT_IN.values()) if one is not None]

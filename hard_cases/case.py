@@ -21,9 +21,9 @@ KINDS = (
     "scene",
     "observer",
 )
-#: A right time of impact is early by at most this fraction of the step, and late by no more than
-#: one rounding.
+#: A right time of impact is early by at most this fraction of the step.
 EARLY = 1e-5
+#: Relative error of one rounding, by which a right time of impact may be late.
 ROUNDING = 2.0**-52
 
 Answer = float | bool | None

@@ -1,4 +1,4 @@
-"""Ask every library every case; each answer is one row."""
+"""Run every case on every library; each answer is one row."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -8,12 +8,11 @@ from tauguard.hard_cases.case import Case, answer_text
 
 
 def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, Any]]:
-    """Put every case to every library and return one row for each answer.
+    """Run every case on every library and return one row for each answer.
 
-    A row has ``case``, ``library``, ``expected``, ``answer``, ``right`` and ``wrong``. ``wrong``
-    says in a few words what is wrong, see :meth:`Case.wrong`. A library without a method for a kind
-    of case is skipped, as is one that raises ``NotImplementedError``. Any other exception counts
-    as its answer, and ``wrong`` is ``failed``.
+    A row has ``case``, ``library``, ``expected``, ``answer``, ``right`` and ``wrong``, the error in
+    a few words (:meth:`Case.wrong`). A case is skipped if the library has no method for its kind or
+    the method raises ``NotImplementedError``. For any other exception ``wrong`` is ``failed``.
     """
     libraries = list(libraries)
     asked = [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
@@ -45,7 +44,7 @@ def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
 
 
 def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Count by kind and library: cases asked, right answers, and wrong ones by what is wrong.
+    """Count by kind and library: cases, right answers, and wrong answers by kind of error.
 
     ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is conservative.
     ``other`` is out of bounds, no number, or an error.

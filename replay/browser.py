@@ -26,7 +26,7 @@ HOST, PATIENCE = "127.0.0.1", 20.0
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
 #: Content policy: a page runs no script, and neither loads from nor sends to another host. A script
-#: could carry what it has read to another host. Our own script runs only in pages opened as files.
+#: could send data to another host. The script of the report runs only in pages opened as files.
 POLICY = (
     "default-src 'self' data:; script-src 'none'; style-src 'unsafe-inline'; form-action 'none'; "
     "base-uri 'none'"

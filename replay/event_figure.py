@@ -1,4 +1,4 @@
-"""A figure of ten seconds: the score with its threshold, and the speed of the fastest joint."""
+"""A figure of ten seconds: score, threshold, and speed of the fastest joint."""
 
 from __future__ import annotations
 

@@ -91,12 +91,12 @@ class EventFolder:
         """Make the folder.
 
         Args:
-            folder: new, or one that this has written before.
-            late: collisions found later than this are events [s].
-            alarm: the detector; without it each sample's score is used alone.
+            folder: new, or a folder that this class has written before.
+            late: a detection with a longer delay is an event [s].
+            alarm: the detector, whose confirmation time applies; without it, it is 0.
 
         Raises:
-            ValueError: the folder holds something else.
+            ValueError: the folder contains other files.
         """
         if folder.exists() and (not folder.is_dir() or not all(map(_own, folder.iterdir()))):
             raise ValueError(f"{folder}: holds other files; give --events a new folder")

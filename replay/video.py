@@ -17,9 +17,9 @@ from tauguard.traces import TARGETS, Trace
 
 #: File extensions that Pillow writes (Matplotlib installs it).
 PILLOW = (".gif", ".webp", ".png")
-#: Where the camera stands: azimuth and elevation [deg], distance in units of the arm's size.
+#: View of the camera: azimuth and elevation [deg], distance in units of the arm's size.
 VIEW = (140.0, -18.0, 2.0)
-#: Its least distance from people and arms, in units of the diagonal of their bounding box.
+#: Least distance of the camera from people and arms, in diagonals of their bounding box.
 AROUND = 1.6
 
 

@@ -62,7 +62,7 @@ def load() -> float | None:
 
 
 def load_line(begin: float | None, end: float | None) -> str:
-    """One line that says whether the machine's load made times unreliable.
+    """One line on the machine's load, and whether it made the times unreliable.
 
     Args:
         begin: :func:`load` before the times were measured.

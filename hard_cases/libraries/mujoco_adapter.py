@@ -67,7 +67,7 @@ class MuJoCo:
 
 
 class Speculative:
-    """The same steps with MuJoCo's own mode for fast bodies."""
+    """Steps of MuJoCo with speculative contacts, its mode for fast bodies."""
 
     name = "mujoco-speculative"
 
