@@ -1,7 +1,7 @@
-"""How it runs: the simulation loop, motions, injected collisions and environments.
+"""Simulation: the simulation loop, motions, injected collisions and Gymnasium environments.
 
-``gymnasium.make("tauguard/Reach-v0")`` makes an environment; ``wrappers``, ``controllers`` and
-``policies`` go with it.
+``gymnasium.make("tauguard/Reach-v0")`` makes an environment. The modules ``wrappers``,
+``controllers`` and ``policies`` work with environments.
 """
 
 import importlib
@@ -24,7 +24,7 @@ _MODULES = ("controllers", "policies", "wrappers")
 
 
 def __getattr__(name: str) -> Any:
-    """Load a module."""
+    """Load one of ``_MODULES``."""
     if name in _MODULES:
         return importlib.import_module(f"{__name__}.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Basic controllers on the nominal Pinocchio model; each gives joint torques [N m]."""
+"""Basic controllers that use the arm's nominal Pinocchio model."""
 
 import numpy as np
 import pinocchio as pin
@@ -9,18 +9,18 @@ from tauguard.models import Friction
 
 __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "friction_torque"]
 
-#: Speed over which the Coulomb part rises [rad/s].
+#: Scale of the speed over which the Coulomb friction changes its sign [rad/s].
 SMOOTHING = 0.02
-#: A direction whose mobility is below this fraction of the largest one is nearly singular. In such
-#: a direction the tool's stiffness is reduced, so that torques stay bounded. Other directions are
-#: not damped.
+#: A direction is nearly singular if its mobility (an eigenvalue of J M^-1 J^T) is below this
+#: fraction of the largest one. The tool's force is reduced in such directions only, so that torques
+#: stay bounded.
 NEARLY_LOST = 1e-4
-#: The integral is limited to the force of the spring at this error [m, rad].
+#: The integral term is limited to the stiffness times this error [m, rad].
 INTEGRAL_REACH = 0.05
 
 
 def per_joint(value: ArrayLike, joints: int, name: str) -> Array:
-    """A gain for each joint, shape (n,), from one number or n of them, none negative.
+    """The gains of n joints, shape (n,), from one number or n numbers of 0 or more.
 
     Raises:
         ValueError: another shape, or a gain that is negative or not finite.
@@ -36,8 +36,8 @@ def per_joint(value: ArrayLike, joints: int, name: str) -> Array:
 def friction_torque(friction: Friction | None, qd_des: Array) -> Array:
     """Nominal friction at the wanted speed [N m], shape (n,); zero without a friction model.
 
-    It takes the wanted speed, not the measured one: a compensation by the measured speed would
-    chatter at rest. ``scene.facts.nominal.friction`` is an arm's nominal friction.
+    A compensation by the measured speed would chatter at rest. ``scene.facts.nominal.friction`` is
+    the nominal friction of a scene's arm.
     """
     if friction is None:
         return np.zeros_like(qd_des)
@@ -48,8 +48,8 @@ def friction_torque(friction: Friction | None, qd_des: Array) -> Array:
 class GravityPD:
     """tau = g(q) + Kp (q_des - q) + Kd (qd_des - qd): goes to a pose (Takegaki & Arimoto 1981).
 
-    With a ``bandwidth`` the gains follow each joint's inertia, Kp = w^2 M_ii(q) and Kd = 2 w
-    M_ii(q): every joint of every arm is critically damped, where fixed numbers fit one arm.
+    With a ``bandwidth`` w the gains follow each joint's inertia: Kp = w^2 M_ii(q) and
+    Kd = 2 w M_ii(q). Every joint of any arm is then critically damped.
     """
 
     def __init__(
@@ -62,10 +62,10 @@ class GravityPD:
         """For an arm.
 
         Args:
-            model: what the controller believes about the arm.
+            model: the arm as the controller assumes it.
             kp: stiffness [N m/rad], a number or (n,).
             kd: damping [N m s/rad], a number or (n,).
-            bandwidth: w [rad/s]; replaces both.
+            bandwidth: w [rad/s]; replaces ``kp`` and ``kd``.
 
         Raises:
             ValueError: gains of another shape, negative or not finite, or a bandwidth not above 0.
@@ -89,8 +89,8 @@ class GravityPD:
 class ComputedTorque:
     """tau = ID(q, qd, qdd_des + 2 w (qd_des - qd) + w^2 (q_des - q)): follows a path.
 
-    ID is the inverse dynamics (Luh, Walker & Paul 1980); the error of every joint decays critically
-    damped with w where the model is right.
+    ID is the inverse dynamics (Luh, Walker & Paul 1980). If the model is correct, the error of
+    every joint decays with the bandwidth w, critically damped.
     """
 
     def __init__(self, model: pin.Model, bandwidth: float = 30.0) -> None:
@@ -133,17 +133,17 @@ class OperationalSpace:
         """For an arm.
 
         Args:
-            model: what the controller believes about the arm.
+            model: the arm as the controller assumes it.
             frame: name of the tool's frame in ``model``.
             stiffness: K [1/s^2], a number or (6,): three for position, three for orientation.
             damping: D [1/s], a number or (6,).
-            rest: pose of the null space [rad], (n,); the default is all zero.
+            rest: rest pose in the null space [rad], (n,); the default is all zero.
             rest_gains: Kn [N m/rad] and Dn [N m s/rad].
-            integral: I [1/s^3], a number or (6,), below K D for stability; 0 is none.
+            integral: I [1/s^3], a number or (6,); stable below K D; 0: no integral.
             dt: time between two calls of :meth:`torque` [s]; only the integral needs it.
 
         Raises:
-            ValueError: no such frame (the message lists those there are), or gains out of range.
+            ValueError: an unknown frame (the message lists the known ones), or gains out of range.
         """
         names = [f.name for f in model.frames]
         if frame not in names:
@@ -206,10 +206,10 @@ class OperationalSpace:
 
 
 class Admittance:
-    """M qdd + D qd + K (q - q_rest) = tau_ext: gives the reference that a position loop follows.
+    """M qdd + D qd + K (q - q_rest) = tau_ext: computes the reference of a position loop.
 
-    Hogan, "Impedance control" (1985), in its admittance form. K = 0 makes the arm float where it is
-    pushed to. The step is implicit, so that no gain and no rate makes it unstable.
+    This is the admittance form of Hogan, "Impedance control" (1985). With K = 0 the arm stays where
+    it is pushed to. The step is implicit, so it is stable for any gains and any ``dt``.
     """
 
     def __init__(
@@ -221,16 +221,16 @@ class Admittance:
         stiffness: ArrayLike = 0.0,
         dead_band: ArrayLike = 0.0,
     ) -> None:
-        """At rest at ``q``.
+        """Start at rest at ``q``.
 
         Args:
-            q: where it begins and where its spring rests [rad], (n,).
+            q: initial position and rest position of the spring [rad], (n,).
             dt: time between two calls of :meth:`step` [s].
             mass: M [kg m^2], a number or (n,), above 0.
             damping: D [N m s/rad], a number or (n,).
             stiffness: K [N m/rad], a number or (n,).
-            dead_band: torque that counts as zero [N m], a number or (n,): the residual of an
-                observer without contact.
+            dead_band: torque up to which ``tau_ext`` counts as zero [N m], a number or (n,), such
+                as the largest residual of an observer without contact.
 
         Raises:
             ValueError: gains of another shape or out of range, or a ``dt`` not above 0.

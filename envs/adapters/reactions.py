@@ -12,33 +12,36 @@ from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.settings import one_of
 
-#: The reactions, by name.
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
-#: Trigger of a reaction: the detector's alarm, or the contact itself, which no real robot knows.
+#: Trigger of a reaction: the detector's alarm, or the true contact, which no real robot measures.
 TRIGGERS = ("alarm", "contact")
-#: Delay from power-off until the brakes hold [s] (assumed; data sheets say 10 to 50 ms).
+#: Delay from power-off until the brakes hold [s]; assumed, data sheets state 10 to 50 ms.
 BRAKE_DELAY = 0.02
-#: A retraction goes back along the path at this fraction of the arm's former speed. It ends this
-#: time [s] after it has passed the point where the reaction began.
-RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
-#: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
-ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
+#: A retraction goes back along the path at this fraction of the arm's former speed.
+RETRACT_SPEED = 0.5
+#: A retraction ends this time after it has passed the point where the reaction began [s].
+RETRACT_TIME = 0.3
+#: Virtual inertia of the admittance, as a fraction of the joint's inertia.
+ADMITTANCE_INERTIA = 0.5
+ADMITTANCE_TIME = 0.1  #: time constant of the admittance [s]
 
 
 class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
     """Let the policy act until the trigger, and the reaction from then to the end of the episode.
 
-    * ``continue``: nothing happens.
-    * ``stop0``: category 0 of IEC 60204-1: power off at once, brakes after :data:`BRAKE_DELAY`.
+    * ``continue``: the policy goes on.
+    * ``stop0``: stop category 0 of IEC 60204-1: power off at once, brakes after
+      :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
-      The deceleration is the arm's own limit, which is gentler than a brake. The peak force occurs
-      within 50 ms of the contact and is higher than with ``stop0``. ``stop2`` and ``retract`` begin
-      with the same stop and have the same peak.
+      The deceleration is limited to the arm's acceleration limit, which is below that of the
+      brakes. The peak force occurs within 50 ms of the contact and is higher than with ``stop0``.
+      ``stop2`` and ``retract`` begin with the same stop and have the same peak.
     * ``stop2``: category 2: the drives stop the arm and hold it.
-    * ``retract``: stop as in category 2, go back along the path beyond where the arm was at the
+    * ``retract``: stop as in category 2, go back along the path to a point before the place of the
       trigger, hold.
-    * ``admittance``: the arm yields to the residual beyond the detector's thresholds (to the true
-      external torque where the trigger is the contact): ``M dv/dt = tau - D v`` in every joint.
+    * ``admittance``: ``M dv/dt = tau - D v`` in every joint, so that the arm yields. tau is the
+      part of the residual beyond the detector's thresholds, or the true external torque if the
+      trigger is the contact.
 
     ``info["reacting"]`` states whether the reaction has begun.
     """
@@ -59,7 +62,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             deceleration: deceleration of every joint [rad/s^2] (default: the arm's own limits).
 
         Raises:
-            ValueError: no such reaction or trigger, or trigger "alarm" without a detector.
+            ValueError: an unknown reaction or trigger, or trigger "alarm" without a detector.
         """
         RecordConstructorArgs.__init__(
             self, reaction=reaction, trigger=trigger, deceleration=deceleration
@@ -84,7 +87,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._forget()
 
     def _dead_zone(self) -> Array:
-        """Largest residual without contact [N m]; zero if the residual is the truth."""
+        """Largest residual without contact [N m]; zero if the trigger is the true contact."""
         sensing = self._arm.batch.sensing
         if not sensing or self.trigger != "alarm":
             return np.zeros(len(self._deceleration))
@@ -119,7 +122,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return observation, reward, terminated, truncated, info
 
     def _look(self, info: dict[str, Any]) -> None:
-        """Store the path of the arm, and decide whether the reaction begins."""
+        """Store the arm's state, and decide whether the reaction begins."""
         n = len(self._deceleration)
         observation = self._arm.batch.observation[0]
         self._past.append(observation[:n].copy())
@@ -152,10 +155,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return Override.VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
-        """Slow all joints together, so that the arm stays on its path; True once it stands.
+        """Slow all joints together, so that the arm stays on its path; True once it stands still.
 
-        If the person has already slowed the arm down, the stop continues from that speed: a ramp
-        over time alone would push.
+        If the contact has already slowed the arm down, the stop continues from the measured speed.
+        A ramp over time alone would accelerate the arm against the person.
         """
         squared = float(self._speed @ self._speed)
         if squared > 0:
@@ -173,7 +176,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         if self._returning is None:
             rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
             assert self._since is not None
-            gone = each * round(self._since / self._period)  # back to where the reaction began
+            gone = each * round(self._since / self._period)  # number of steps back to the trigger
             speeds = -np.diff(rows, axis=0)[::-1] / (each * self._period)
             back = np.repeat(speeds, each, axis=0)[: gone + self._retract_steps]
             self._returning = list(back)

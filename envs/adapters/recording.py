@@ -1,4 +1,4 @@
-"""A wrapper that writes every episode as an MCAP recording, with a row for each physics step."""
+"""A wrapper that writes every episode as an MCAP recording, with one row per physics step."""
 
 import hashlib
 import importlib.metadata
@@ -22,7 +22,7 @@ from tauguard.traces import TARGETS, Detection, Trace, Truth, write_mcap
 
 @dataclass
 class _Rows:
-    """The recorded data of one episode so far; a block for each action."""
+    """The recorded data of one episode so far, one block per action."""
 
     q: list[Array] = field(default_factory=list)
     qd: list[Array] = field(default_factory=list)
@@ -38,10 +38,10 @@ class _Rows:
 class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
     """Writes ``FOLDER/episode_00000.mcap`` and so on, each when its episode ends.
 
-    A recording has a row for every physics step. It holds positions, velocities and currents; they
-    are measured ones if the environment has a detector or noise, else true ones. Its truth holds
-    external torque, contact force, link and point, collisions, and the places of body regions and
-    targets. With a detector it also holds residual and alarms. ``tauguard replay`` shows it.
+    A recording has one row per physics step. Its positions, velocities and currents are measured
+    if the environment has a detector or noise, and true otherwise. Its truth consists of external
+    torque, contact force, link and point, collisions, and the places of body regions. It also has
+    the targets and, with a detector, the residual and the alarms. ``tauguard replay`` shows it.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], folder: str | Path) -> None:
@@ -58,7 +58,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Write the present episode, and begin another."""
+        """Write the recording of the last episode, and begin another episode."""
         self._finish()
         self._seed = "" if seed is None else str(seed)
         result: tuple[Array, dict[str, Any]] = self.env.reset(seed=seed, options=options)
@@ -78,7 +78,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         return result
 
     def close(self) -> None:
-        """Write the present episode."""
+        """Write the recording of the last episode, and close the environment."""
         self._finish()
         super().close()
 

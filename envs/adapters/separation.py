@@ -1,4 +1,4 @@
-"""Speed and separation monitoring: the arm stops before a person can be reached."""
+"""Speed and separation monitoring: the arm stops before it can reach a person."""
 
 from typing import Any
 
@@ -17,12 +17,12 @@ FAR = 3.0
 
 
 class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """Stops the arm (category 2) while a body region is nearer than the protective distance.
+    """Stops the arm (category 2) while a body region is nearer than the protective distance S.
 
-    ``S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z`` (ISO 13855 as ISO 10218-2 uses it):
-    v_h the region's approach speed, v_r the speed of the nearest point of the arm, T_r the reaction
-    time, T_s the stopping time from the present speed. The arm moves on once the separation
-    exceeds S by ``hysteresis``.
+    ``S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z`` (ISO 13855, as ISO 10218-2 uses it).
+    v_h is the approach speed of the region and v_r the speed of the arm's nearest point. T_r is the
+    reaction time and T_s the time to stop from the present speed. The arm moves on once the
+    separation exceeds S by ``hysteresis``.
 
     ``info`` gets ``separation`` [m] (at most :data:`FAR`), ``protective_distance`` [m] and
     ``stopped``.
@@ -37,16 +37,16 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         uncertainty: float = 0.05,
         hysteresis: float = 0.05,
     ) -> None:
-        """Set the terms.
+        """Set the terms of S.
 
         Args:
             env: an environment of tauguard with body regions.
-            approach_speed: v_h [m/s]; 1.6 is the standard's for a person whose speed is not
+            approach_speed: v_h [m/s]; the standard states 1.6 for a person whose speed is not
                 measured.
             reaction_time: T_r of sensor and controller [s].
             intrusion: C, how far a body part reaches before it is sensed [m].
-            uncertainty: Z, of both positions [m].
-            hysteresis: distance above the protective one at which the arm moves on [m].
+            uncertainty: Z, uncertainty of the positions of arm and person together [m].
+            hysteresis: the arm moves on at this distance above S [m].
 
         Raises:
             ValueError: a number below 0, or an environment without body regions.
@@ -91,7 +91,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         return observation, info | self._judge()
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act, or stand."""
+        """Act, or hold the arm still if it is stopped."""
         still = np.zeros(len(self._deceleration))
         self._arm.batch.plants[0].override(
             Override.VELOCITY if self._stopped else Override.FREE, still
@@ -122,7 +122,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         return float(distance), self._speed(int(model.geom_bodyid[geom]), ends[:3])
 
     def _speed(self, body: int, point: Array) -> float:
-        """Speed of a point of a link [m/s], from the present joint axes and velocities."""
+        """Speed of a point of a link [m/s]."""
         compiled, data = self._arm.compiled, self._arm.batch.datas[0]
         model, total = compiled.scene.model, np.zeros(3)
         for joint, dof, link in zip(

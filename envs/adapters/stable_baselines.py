@@ -14,29 +14,29 @@ from stable_baselines3.common.vec_env import VecEnv
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.envs.gym.vector import VectorArmEnv
 
-#: Keys of ``info`` that each copy gets.
+#: Keys in the ``info`` of each copy.
 KEYS = ("cost", "cost_sum", "success", "force", "limit_ratio")
 
 
 class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
     """``num_envs`` natively stepped copies of an environment for Stable-Baselines3.
 
-    A finished copy begins anew at once; its last observation is in
-    ``infos[i]["terminal_observation"]``, and ``infos[i]["TimeLimit.truncated"]`` says whether
-    the episode was truncated.
+    A finished copy is reset in the same step. The last observation of the finished episode is in
+    ``infos[i]["terminal_observation"]``. ``infos[i]["TimeLimit.truncated"]`` says whether that
+    episode was truncated.
     """
 
     def __init__(self, name: str, num_envs: int, keys: Sequence[str] = KEYS, **keywords: Any):
-        """Make them.
+        """Make the copies.
 
         Args:
-            name: as of ``gymnasium.make_vec``, such as "tauguard/Reach-v0".
+            name: name of the environment, such as "tauguard/Reach-v0".
             num_envs: number of copies.
-            keys: keys of ``info`` that each copy's dictionary has.
+            keys: keys in the ``info`` of each copy.
             **keywords: keywords of the environment, ``threads`` and ``max_episode_steps``.
 
         Raises:
-            ValueError: not an environment of tauguard, or as the environment itself.
+            ValueError: not an environment of tauguard, or a keyword that the environment refuses.
         """
         envs = gymnasium.make_vec(
             name,
@@ -53,7 +53,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         self._actions: NDArray[Any] | None = None
 
     def reset(self) -> NDArray[np.float64]:
-        """Begin all episodes, with the seeds of :meth:`seed` where it was called."""
+        """Begin an episode of every copy, with the seeds given to :meth:`seed`, if any."""
         known = [seed for seed in self._seeds if seed is not None]
         seeds = [None if seed is None else int(seed) for seed in self._seeds]
         observation, infos = self.envs.reset(seed=seeds if known else None)
@@ -63,11 +63,11 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         return observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions."""
+        """Store the actions for :meth:`step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Apply the actions: observations, rewards, ends of episodes, a dictionary per copy."""
+        """Apply the actions; returns observations, rewards, ends of episodes, infos."""
         assert self._actions is not None
         observation, reward, terminated, truncated, infos = self.envs.step(self._actions)
         over = terminated | truncated
@@ -82,7 +82,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         return {key: infos[key][i] for key in self._keys}
 
     def close(self) -> None:
-        """Close them."""
+        """Close all copies."""
         self.envs.close()
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
@@ -91,7 +91,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         return [None if picture is None else picture[0]] + [None] * (self.num_envs - 1)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute of the vector environment, once for each chosen copy."""
+        """The attribute of the vector environment, repeated for each chosen copy."""
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -110,5 +110,5 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         return [method(*args, **kwargs) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No copy is."""
+        """False for every copy."""
         return [False for _ in self._get_indices(indices)]

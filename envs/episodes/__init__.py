@@ -1,1 +1,1 @@
-"""The episode generator: motions, injected collisions, the simulation loop, and their truth."""
+"""The episode generator: motions, the simulation loop, injected collisions and their truth."""

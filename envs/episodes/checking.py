@@ -1,4 +1,4 @@
-"""Contact checkers on an episode: the recorded motion of the arm and of the obstacles, replayed."""
+"""Run contact checkers along the recorded motion of an episode's arm and obstacles."""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,20 +11,20 @@ from tauguard.envs.episodes.loop import Rollout
 from tauguard.models import Scene
 from tauguard.traces import CheckedContacts
 
-#: An obstacle that moves farther than this in one step was placed there and did not travel [m].
+#: An obstacle whose position changes by more than this in one step was placed anew [m].
 JUMP = 0.25
 
 
 def checked(
     scene: Scene, t: Array, rollout: Rollout, checkers: Sequence[str | Checker]
 ) -> tuple[CheckedContacts, ...]:
-    """Return what each checker reports on the true motion of an episode.
+    """The contacts that each checker reports on the true motion of an episode.
 
     Args:
-        scene: whose arm and obstacles were recorded.
+        scene: the simulated scene.
         t: times of the rows [s], shape (T,).
-        rollout: what the simulation loop saw.
-        checkers: names of registered checkers, or checkers.
+        rollout: the recorded states of the scene.
+        checkers: checkers, or names of registered ones.
 
     Raises:
         ValueError: an unknown checker, or one that cannot handle the scene.

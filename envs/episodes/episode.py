@@ -1,4 +1,4 @@
-"""An episode: one run of the arm, completely described by plain values and a seed."""
+"""An episode: one run of the arm, described completely by plain values and a seed."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from tauguard.traces import KINDS
 
 @dataclass(frozen=True)
 class CollisionPlan:
-    """A collision to inject; point and direction are drawn from the episode's seed.
+    """A collision to inject; the episode's seed determines its point and direction.
 
     Attributes:
         kind: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse).
-        time: when it should begin [s].
+        time: earliest time of the collision [s].
         link: 1-based link to strike.
-        severity: wanted peak of abs(tau_ext), joints 1-4 (low, high) [N m]; the strength is varied
-            until the achieved peak is in this range.
-        strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
-        duration: duration of a pulse or of a clamp [s]; it does not apply to a strike.
-        at_rest: a pulse or strike while the arm dwells, where one is near ``time``.
+        severity: wanted range (low, high) of the peak of abs(tau_ext) over joints 1 to 4 [N m]. The
+            strength is varied until the achieved peak is in this range.
+        strength: first guess of the strength: speed of a strike [m/s], depth of a clamp [m, 0.03 or
+            more], force of a pulse [N].
+        duration: duration of a pulse or of a clamp [s]; not used for a strike.
+        at_rest: a pulse or strike begins while the arm dwells, if it dwells soon after ``time``.
         force: wanted peak contact force (low, high) [N]; targets whose lever arms cannot give
             ``severity`` at such a force are skipped.
     """
@@ -58,7 +59,7 @@ class CollisionPlan:
 
 @dataclass(frozen=True)
 class PayloadPick:
-    """A payload taken up (or put down: 0 g) at a time, without telling the observer."""
+    """A payload picked up (or put down: 0 g) at a time; the observer does not get its mass."""
 
     time: float  #: [s]
     payload_g: float  #: mass from then on [g]
@@ -70,16 +71,16 @@ class Episode:
 
     seed: int
     seconds: float = 20.0  #: length [s]
-    speed: float = 30.0  #: percent of the joints' largest speeds, above 1 (no fraction) to 100
-    payload_g: float = 0.0  #: carried from the start, not told to the observer [g]
+    speed: float = 30.0  #: percent of the joints' largest speeds, above 1 and at most 100
+    payload_g: float = 0.0  #: carried from the start; the observer does not get it [g]
     collisions: tuple[CollisionPlan, ...] = ()
     picks: tuple[PayloadPick, ...] = ()
     mismatch: Mismatch | None = None  #: how the simulated arm differs from the nominal one
-    temperature: float | None = None  #: of the gears [degC]; None is the drive's own
+    temperature: float | None = None  #: of the gears [degC]; None: the drive's default
     ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
     timestep: float = 1e-3  #: [s]
     arm: str = "cura6"  #: a name or a file, see :func:`tauguard.models.load_arm`
-    objects: tuple[SceneObject, ...] = ()  #: things of your own around the arm
+    objects: tuple[SceneObject, ...] = ()  #: your own objects around the arm
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names what is wrong and what would work."""
@@ -100,18 +101,18 @@ class Episode:
                 raise ValueError(f"time {time}: outside the episode (0 to {self.seconds} s)")
 
     def to_json(self) -> str:
-        """The episode as JSON text, from which :meth:`from_json` makes an equal one."""
+        """The episode as JSON text, for :meth:`from_json`."""
         values = dataclasses.asdict(self)
-        if not self.objects:  # without them the text and its hash are as in earlier versions
+        if not self.objects:  # then the text and its hash are the same as in earlier versions
             del values["objects"]
         return json.dumps(values, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Episode:
-        """The episode that :meth:`to_json` wrote.
+        """The episode in a text of :meth:`to_json`.
 
         Raises:
-            ValueError: not JSON, or a key that an episode does not have.
+            ValueError: not JSON, or an unknown key.
         """
         try:
             values: dict[str, Any] = json.loads(text)

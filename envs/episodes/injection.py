@@ -12,15 +12,15 @@ from tauguard.envs.episodes.motions import Motion
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.models import Scene
 
-#: Least speed of a link that runs into a clamp [m/s].
+#: Least speed of a link's surface when it meets a clamp [m/s].
 CLAMP_SPEED = 0.005
 #: Least and largest travel of the link's surface after it meets a clamp [m].
 CLAMP_TRAVEL = (0.002, 0.06)
 #: A clamp stays for its duration plus this time [s].
 CLAMP_HOLD = 0.1
-#: Interval at which targets along a motion are sought [s], and number of rays at each time.
-STRIDE, CASTS = 0.02, 8
-#: An obstacle is in place this time before it touches [s].
+STRIDE = 0.02  #: interval at which targets are searched for along a motion [s]
+CASTS = 8  #: number of rays at each of these times
+#: A striker starts this time before it reaches its target [s].
 LEAD = 0.15
 
 
@@ -37,9 +37,12 @@ class Target:
 
 @dataclass(frozen=True)
 class _LinkPath:
-    """A link and the arm's joints at rows of the motion; the link has further rows at the end."""
+    """Poses of a link and of the arm's joints at R rows of the motion.
 
-    rows: list[int]  #: R of them
+    For a clamp the link's poses continue after these rows, for as long as the clamp stands.
+    """
+
+    rows: list[int]  #: row numbers, R of them
     body: int  #: MuJoCo body of the link
     position: Array  #: of the link's origin [m], shape (R or more, 3)
     rotation: Array  #: of the link, shape (R or more, 3, 3)
@@ -75,7 +78,7 @@ class Aim:
         self._still = np.abs(motion.qd).max(axis=1) <= 1e-9
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
-        """A target for ``plan`` at the first sample that offers one, up to sample ``last``."""
+        """The first target for ``plan`` from its time up to sample ``last``; None without one."""
         first = round(plan.time / self._dt)
         path = self._link_path(plan, range(first, max(first + 1, last), self._stride))
         usable = self._quick_enough(plan, path)
@@ -108,9 +111,10 @@ class Aim:
         return _LinkPath(list(rows), body, position, rotation, anchor, axis, speed, spin)
 
     def _quick_enough(self, plan: CollisionPlan, path: _LinkPath) -> NDArray[np.bool_]:
-        """The rows at which some point of :meth:`_inside` can be fast enough for a clamp.
+        """The rows at which some point of :meth:`_draw` can be fast enough for a clamp.
 
-        Speed is convex along a line, so it is largest at one of the ends of the line in each geom.
+        The points lie on a line in each geom. Speed is convex along a line, so it is largest at an
+        end of the line.
         """
         if plan.kind != "clamp":
             return np.ones(len(path.rows), dtype=bool)
@@ -128,9 +132,9 @@ class Aim:
     def _draw(
         self, plan: CollisionPlan, rng: np.random.Generator, count: int
     ) -> tuple[list[int], Array, Array]:
-        """Draw for ``count`` rays: geoms, places along their axes, pushes (none for clamps)."""
+        """Draw ``count`` rays: geoms, places along the geoms' axes, pushes (0 for a clamp)."""
         own, size = self._geoms[plan.link - 1], self._scene.model.geom_size
-        if plan.kind == "clamp" and len(own) == 1:  # nothing is drawn to choose one of one
+        if plan.kind == "clamp" and len(own) == 1:  # the loop would draw the same numbers
             reach = float(size[own[0], 1]) * 0.8
             return own * count, rng.uniform(-reach, reach, count), np.zeros((count, 3))
         geoms, places, pushes = [], np.empty(count), np.zeros((count, 3))
@@ -146,7 +150,10 @@ class Aim:
     def _cast(
         self, plan: CollisionPlan, path: _LinkPath, number: int, rng: np.random.Generator
     ) -> Target | None:
-        """The first target of :data:`CASTS` rays at a row; draws no more numbers than it needs."""
+        """The first target of :data:`CASTS` rays at a row; None without one.
+
+        Afterwards ``rng`` has drawn only the rays up to the target.
+        """
         data = self._data
         data.qpos[self._scene.qpos_adr] = self._motion.q[path.rows[number]]
         mujoco.mj_kinematics(self._scene.model, data)
@@ -173,7 +180,7 @@ class Aim:
     def _hits(
         self, body: int, inside: Array, pushes: Array, wanted: NDArray[np.bool_]
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Where rays towards points in a body meet it, and whether no other body is before it."""
+        """Where rays towards points in a body meet it, and whether they meet this body first."""
         model, geom, normal = self._scene.model, np.full(1, -1, dtype=np.int32), np.zeros(3)
         origins, distances = inside - 2.0 * pushes, np.zeros(len(inside))
         hit = wanted.copy()
@@ -187,7 +194,7 @@ class Aim:
     def _reaches(
         self, plan: CollisionPlan, path: _LinkPath, number: int, point: Array, push: Array
     ) -> bool:
-        """Whether a force in the plan's range gives a torque of its severity here."""
+        """Whether some force in the plan's range gives a torque in its severity range here."""
         if plan.severity is None or plan.force is None:
             return True
         levers = [0.0]
@@ -208,12 +215,15 @@ class Aim:
     def _stops_soon(
         self, plan: CollisionPlan, path: _LinkPath, number: int, points: Array, pushes: Array
     ) -> NDArray[np.bool_]:
-        """Whether the surface moves only a little further: it presses, and does not sweep past."""
+        """Whether the surface moves on by a distance within :data:`CLAMP_TRAVEL`.
+
+        It then presses against the clamp and does not sweep past it.
+        """
         count = len(range(0, self._standing(plan), self._stride))
         stand = slice(number, number + count)
         position, rotation = path.position[stand], path.rotation[stand]
         local = (points - position[0]) @ rotation[0]
-        # How far each point travels along -push: rows x points.
+        # Position of each point along its push, relative to its start; shape (rows, points).
         turned = np.einsum("pi,tij,pj->tp", pushes, rotation, local)
         along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
         reach = (-along).max(axis=0)
@@ -226,13 +236,13 @@ def pulse_wrench(
     """A half-sine force at the target's point as a wrench about ``com``.
 
     Args:
-        target: where, and in which direction.
-        com: centre of mass of the link while it is pushed, shape (rows, 3) [m].
-        force: peak [N].
-        duration: [s].
-        dt: [s].
-        rows: length of the table.
-        begin: its first pushed row.
+        target: point and direction of the force.
+        com: centre of mass of the link, shape (rows, 3) [m].
+        force: peak of the force [N].
+        duration: duration of the force [s].
+        dt: time between two rows [s].
+        rows: number of rows of the table.
+        begin: the force is 0 up to this row.
 
     Returns:
         Force [N] and torque [N m], world frame, shape (rows, 6).
@@ -250,7 +260,7 @@ def pulse_wrench(
 def launch(target: Target, speed: float, radius: float) -> tuple[Array, Array]:
     """Start position and velocity of a striker that reaches the target after :data:`LEAD` seconds.
 
-    ``speed`` is relative to the point that is hit, along the push.
+    ``speed`` is relative to the target's surface point, along the push [m/s].
     """
     velocity = target.velocity + speed * target.direction
     centre = target.point - radius * target.direction
@@ -262,8 +272,8 @@ def clamp_centre(target: Target, path: Array, depth: float, radius: float) -> Ar
 
     Args:
         target: the surface point that meets the sphere.
-        path: path of that point along the references while the clamp stands, shape (T, 3) [m].
-        depth: how far the references would go past the sphere's surface [m].
+        path: path of that point in the reference motion while the clamp stands, shape (T, 3) [m].
+        depth: how far the point would go past the sphere's surface [m].
         radius: radius of the sphere [m].
     """
     ahead = float((-(path - target.point) @ target.direction).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""The truth, from contact forces and applied wrenches; without limits and friction."""
+"""The truth of collisions: external torque, onset and end, from contact forces and wrenches."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tauguard.arrays import Array
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.traces import Collision
 
-#: Contacts closer in time than this are one collision [s].
+#: Contacts with a gap below this time are one collision [s].
 MERGE_GAP = 0.5
 
 
 @dataclass(frozen=True)
 class Wrenches:
-    """External wrenches on the links, a row per sample (world frame, about ``point``)."""
+    """External wrenches on the links in the world frame, about ``point``; one row per sample."""
 
     force: Array  #: [N], shape (T, links, 3)
     torque: Array  #: [N m], shape (T, links, 3)
@@ -25,16 +25,16 @@ class Wrenches:
 
     @classmethod
     def empty(cls, rows: int, links: int) -> Wrenches:
-        """No wrench at all."""
+        """Wrenches that are all zero."""
         return cls(*(np.zeros((rows, links, 3)) for _ in range(3)))
 
     @classmethod
     def from_contacts(cls, contact: Array) -> Wrenches:
-        """From the scene's contact sensors: found, force by the link, torque, position."""
+        """From the contact sensors, whose columns are: found, force by the link, torque, point."""
         return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
 
     def rows(self) -> NDArray[np.intp]:
-        """The samples at which something pushes or turns a link, shape (K,)."""
+        """The samples with a force or a torque on some link, shape (K,)."""
         pushed = (self.force != 0).any(axis=(1, 2))
         pushed |= (self.torque != 0).any(axis=(1, 2))
         return np.flatnonzero(pushed)
@@ -44,9 +44,9 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
     """``tau_ext``: the sum of J^T w over the links [N m], shape (T, n).
 
     Args:
-        poses: of the scene.
+        poses: forward kinematics of the scene.
         q: true joint positions [rad], shape (T, n).
-        wrenches: what pushes the links; rows without any cost nothing.
+        wrenches: external wrenches on the links.
     """
     tau = np.zeros_like(q)
     touched = wrenches.rows()
@@ -70,17 +70,17 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
 def collisions(
     t: Array, wrenches: Wrenches, tau_ext: Array, kinds: list[tuple[float, str]]
 ) -> tuple[Collision, ...]:
-    """Runs of contact, gaps below 0.5 s closed, in order of onset.
+    """The collisions in order of onset; contacts with gaps below 0.5 s are one collision.
 
-    An obstacle that touches two links at once is one collision; its link, point and force are those
-    of the largest force.
+    Contacts with two links at once are one collision, too. Its link, point and force are those of
+    the largest force.
 
     Args:
         t: sample times [s], shape (T,).
-        wrenches: what pushed the links.
-        tau_ext: shape (T, n) [N m].
-        kinds: (time, kind) of what was injected; a collision takes the kind of the latest one that
-            began before it.
+        wrenches: external wrenches on the links.
+        tau_ext: external torque [N m], shape (T, n).
+        kinds: (time, kind) of each injected collision; a collision gets the kind of the latest one
+            that was injected before its onset.
     """
     rows = wrenches.rows()
     if not len(rows):

@@ -1,4 +1,4 @@
-"""The simulation loop: a composed scene, its drive and position control, run natively."""
+"""The simulation loop: runs a scene with its drives and position control in native code."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class SimulationDiverged(RuntimeError):
 
 @dataclass(frozen=True)
 class Rollout:
-    """The record of a loop; row k belongs to the state before step k."""
+    """The states that a loop recorded; row k is the state before step k."""
 
     __repr__ = in_a_line
 
     q: Array  #: true joint positions [rad], shape (T, n)
     qd: Array  #: true joint velocities [rad/s], shape (T, n)
-    current: Array  #: true motor currents, held over the step [A], shape (T, n)
+    current: Array  #: true motor currents, constant during a step [A], shape (T, n)
     contact: Array  #: contact sensors [found, N, N m, m], shape (T, links, SENSOR_WIDTH)
     poses: Array  #: obstacle positions and quaternions (wxyz), shape (T, obstacles, 7)
 
@@ -45,9 +45,9 @@ class SimulationLoop:
         """Bind the native loop to ``scene``.
 
         Args:
-            scene: the composed scene; ``scene.drive`` is what is simulated.
-            nominal: drive that the controller assumes (its gains).
-            gains: gains of the position control; the default suits the arm's inertia.
+            scene: the composed scene, with the simulated drive in ``scene.drive``.
+            nominal: drive that the controller assumes.
+            gains: gains of the position control; default: :meth:`Gains.for_scene`.
         """
         self.scene = scene
         self.model = scene.model
@@ -68,7 +68,7 @@ class SimulationLoop:
         return int(model.sensor_adr[first]), links * SENSOR_WIDTH
 
     def reset(self, q: Array) -> None:
-        """Start at rest at ``q`` [rad], shape (n,), with no current and relaxed bristles."""
+        """Start at rest at ``q`` [rad], shape (n,), without currents; friction states are zero."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self.scene.qpos_adr] = q
         self._plant.relax()
@@ -82,12 +82,12 @@ class SimulationLoop:
         return state, np.array(self._plant.state())
 
     def restore(self, saved: tuple[Array, Array]) -> None:
-        """Go back to what :meth:`save` gave."""
+        """Restore a state of :meth:`save`."""
         mujoco.mj_setState(self.model, self.data, saved[0], mujoco.mjtState.mjSTATE_INTEGRATION)
         self._plant.restore(saved[1].tolist())
 
     def room_for(self, rows: int) -> Rollout:
-        """Room for so many rows."""
+        """A rollout with allocated arrays of ``rows`` rows."""
         joints, links = len(self.scene.joint_names), self._sensors[1] // SENSOR_WIDTH
         return Rollout(
             q=np.empty((rows, joints)),
@@ -109,16 +109,16 @@ class SimulationLoop:
         """Run one step per row of the references.
 
         Args:
-            q_des: [rad], shape (T, n).
-            qd_des: [rad/s], shape (T, n).
+            q_des: reference positions [rad], shape (T, n).
+            qd_des: reference velocities [rad/s], shape (T, n).
             tau_ff: feed-forward torque [N m], shape (T, n).
             wrench: force [N] and torque about the centre of mass [N m] in the world frame, applied
                 to ``wrench_body``, shape (T, 6).
             wrench_body: id of the body that the wrench acts on.
-            out: T rows to write into (default: new ones).
+            out: a rollout of T rows to write into (default: a new one).
 
         Raises:
-            SimulationDiverged: a joint position is not finite or a velocity beyond 1000 rad/s.
+            SimulationDiverged: a joint position is not finite, or a velocity is beyond 1000 rad/s.
         """
         rows = len(q_des)
         out = self.room_for(rows) if out is None else out
@@ -149,17 +149,17 @@ class SimulationLoop:
 
 @dataclass(frozen=True)
 class AlongMotion:
-    """A loop along one motion. It runs some of its rows and overwrites their record."""
+    """Runs a loop along rows of one motion, and writes the states into ``recorded``."""
 
     loop: SimulationLoop
     motion: Motion
     feed_forward: Array  #: torque at every row [N m], shape (T, n)
-    recorded: Rollout  #: of the motion's rows
+    recorded: Rollout  #: states at all rows of the motion
 
     def __call__(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1
     ) -> Rollout:
-        """Rows ``start`` to ``stop``, with a wrench on a body if one is given."""
+        """Run rows ``start`` to ``stop``, with a wrench on a body if one is given."""
         rows, out = slice(start, stop), self.recorded.rows(start, stop)
         wanted = self.motion.q[rows], self.motion.qd[rows], self.feed_forward[rows]
         return self.loop.run(*wanted, wrench, body, out)

@@ -1,4 +1,4 @@
-"""Smooth joint motions with speed as a percentage of the maximum."""
+"""Smooth joint motions whose speed is given as a percentage of the largest speed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array, in_a_line
 
-#: Peak velocity and acceleration of the quintic 10 s^3 - 15 s^4 + 6 s^5 per unit path and time.
+#: Peak velocity and peak acceleration of 10 s^3 - 15 s^4 + 6 s^5 for s from 0 to 1.
 _PEAK_VELOCITY = 1.875
 _PEAK_ACCELERATION = 5.7735026918962575
 
 
 @dataclass(frozen=True)
 class Motion:
-    """References of a joint motion, a row per sample."""
+    """References of a joint motion, one row per sample."""
 
     __repr__ = in_a_line
 
@@ -28,16 +28,16 @@ class Motion:
 def point_to_point(
     waypoints: ArrayLike, durations: ArrayLike, dwells: ArrayLike, dt: float
 ) -> Motion:
-    """Quintic rest-to-rest segments (Flash & Hogan 1985) with a dwell before each and at the end.
+    """Quintic rest-to-rest segments (Flash & Hogan 1985) with a dwell at each waypoint.
 
     Args:
-        waypoints: Shape (W, n) [rad].
-        durations: of the W - 1 segments [s].
-        dwells: before each segment and after the last, shape (W,) [s].
+        waypoints: shape (W, n) [rad].
+        durations: durations of the segments, shape (W - 1,) [s].
+        dwells: time at rest at each waypoint, shape (W,) [s].
         dt: sample interval [s].
 
     Raises:
-        ValueError: lengths that do not fit, or a duration that is not positive.
+        ValueError: lengths that do not match, a duration that is not above 0, or a negative dwell.
     """
     points = np.asarray(waypoints, dtype=float)
     spans, pauses = np.asarray(durations, dtype=float), np.asarray(dwells, dtype=float)
@@ -70,9 +70,9 @@ def _segment(start: Array, stop: Array, span: float, dt: float) -> tuple[Array, 
 
 
 def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: Array) -> float:
-    """Shortest time [s] in which a quintic covers ``path`` [rad] within ``speed`` percent.
+    """Duration of a quintic over ``path`` [rad] within the joints' limits [s], at least 0.2 s.
 
-    The percentage scales the velocity limit of every joint; the acceleration limit stays.
+    The percentage ``speed`` scales only the velocity limits.
     """
     by_speed = np.abs(path) * _PEAK_VELOCITY / (max_speed * speed / 100)
     by_acceleration = np.sqrt(np.abs(path) * _PEAK_ACCELERATION / max_acceleration)
@@ -80,14 +80,14 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
 
 
 def check_load(grams: float) -> None:
-    """Raise a ``ValueError`` unless ``grams`` is a payload that a simulation can hold."""
+    """Raise a ``ValueError`` unless ``grams`` is a possible payload."""
     if not 0 <= grams <= 1e6:
         why = "" if grams > 0 else "a load has 0 or more grams; "
         raise ValueError(f"payload_g {grams}: {why}expected 0 to 1,000,000 grams")
 
 
 def check_percent(speed: float) -> None:
-    """Raise a ``ValueError`` unless ``speed`` is a percentage that cannot be a fraction."""
+    """Raise a ``ValueError`` unless ``speed`` is a percentage above 1, so not a fraction."""
     if not 1 < speed <= 100:
         hint = f"; for {100 * speed:g} percent say {100 * speed:g}" if 0 < speed <= 1 else ""
         raise ValueError(
@@ -105,7 +105,7 @@ class Workspace:
     max_speed: Array  #: [rad/s], shape (n,)
     max_acceleration: Array  #: [rad/s^2], shape (n,)
     allowed: Callable[[Array], bool] = lambda q: True
-    """Whether the arm may stand at ``q`` (free of itself and of the floor)."""
+    """Whether the pose ``q`` is free of contact with the arm itself, the floor and objects."""
 
 
 def random_motion(
@@ -117,7 +117,7 @@ def random_motion(
     single_joint: float = 0.2,
     dwell: tuple[float, float] = (0.1, 0.8),
 ) -> Motion:
-    """A motion at work: from point to point with dwells, now and then a single joint.
+    """A random motion from point to point with dwells; some segments move a single joint.
 
     Args:
         rng: source of the waypoints.
@@ -125,11 +125,11 @@ def random_motion(
         seconds: exact length of the motion [s].
         speed: percent of ``space.max_speed``, above 1 to 100.
         dt: sample interval [s].
-        single_joint: fraction of the segments that move one joint only.
+        single_joint: fraction of the segments that move only one joint.
         dwell: shortest and longest pause [s].
 
     Raises:
-        ValueError: a speed outside (1, 100].
+        ValueError: a speed outside (1, 100], or too few allowed poses in ``space``.
     """
     check_percent(speed)
     points = [_free_point(rng, space)]

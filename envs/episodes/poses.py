@@ -1,4 +1,4 @@
-"""Where the links and joints of a scene's arm are along its joint positions."""
+"""Poses of the links and joints of a scene's arm, from joint positions."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ class Poses:
     """Forward kinematics of a scene over tables of joint positions, run natively."""
 
     def __init__(self, scene: Scene) -> None:
-        """For the arm of ``scene``; everything else in it stands where it starts."""
+        """For the arm of ``scene``; all other bodies are at their initial place."""
         self._scene, self._data = scene, mujoco.MjData(scene.model)
         self._physics = make_physics(scene.model, self._data)
         self._qpos = scene.qpos_adr.tolist()
@@ -45,7 +45,7 @@ class Poses:
         if not len(q):
             return position
         if point is None:
-            self.body(q[:1], body)  # the data stand at the last row
+            self.body(q[:1], body)  # leaves the pose of this row in the data
             point = self._data.xipos[body]
         return np.asarray(position + rotation @ (rotation[0].T @ (point - position[0])))
 
@@ -77,7 +77,7 @@ class Poses:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Of vectors along the last axis; on small arrays several times faster than ``np.cross``."""
+    """Cross product along the last axis; for small arrays several times faster than numpy's."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)

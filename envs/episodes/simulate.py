@@ -1,4 +1,4 @@
-"""From an episode to a trace: scene, motion, collisions, record, labels, measured signals."""
+"""Simulate an episode: scene, motion, injected collisions, truth and measured signals."""
 
 from __future__ import annotations
 
@@ -40,9 +40,10 @@ if TYPE_CHECKING:
 
 #: Range of drawn poses around the CURA6-like arm's home [rad].
 OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)
-#: Speed over which the Coulomb part of the compensation rises [rad/s], as in the native servo.
+#: Scale of the speed over which the compensated Coulomb friction changes its sign [rad/s]; equal to
+#: that of the native servo.
 FRICTION_SMOOTHING = 0.02
-#: Least height of links above the floor, and least distance from the base's axis [m].
+#: Least height of links above the floor, and least distance of links from the base's axis [m].
 CLEARANCE = (0.15, 0.22)
 
 
@@ -64,7 +65,7 @@ def workspace(scene: Scene) -> Workspace:
         near = min((float(np.hypot(*data.xpos[b][:2])) for b in links[1:]), default=np.inf)
         return low, near
 
-    # If the home pose is closer to floor or base than that, half of the pose's clearance is enough.
+    # For an arm whose home pose has little clearance, half of this clearance is enough.
     at_home = (np.inf, np.inf) if own else clearance(facts.home)
     least = [min(*pair) for pair in zip(CLEARANCE, np.multiply(at_home, 0.5), strict=True)]
 
@@ -87,7 +88,7 @@ def workspace(scene: Scene) -> Workspace:
 
 
 def scene_for(episode: Episode, visuals: bool = True) -> Scene:
-    """The scene that an episode needs, and nothing else; ``visuals`` as for ``compose``."""
+    """The scene that an episode needs; ``visuals`` as for ``compose``."""
     kinds = {plan.kind for plan in episode.collisions}
     carries = episode.payload_g > 0 or any(pick.payload_g > 0 for pick in episode.picks)
     scene = compose(
@@ -114,7 +115,7 @@ def scene_for(episode: Episode, visuals: bool = True) -> Scene:
 
 
 def can_touch(model: mujoco.MjModel) -> bool:
-    """Whether any two geoms of the scene may be in contact."""
+    """Whether contacts are enabled for any two geoms of the scene."""
     makes, takes = model.geom_contype[:, None], model.geom_conaffinity
     return bool(model.npair or model.nflex or (makes & takes).any())
 
@@ -134,7 +135,7 @@ class Simulation:
         Args:
             episode: what to simulate.
             nominal: drive that the controller assumes (default: the arm's nominal one).
-            checkers: contact checkers whose answers go into the trace.
+            checkers: contact checkers whose reports go into the trace.
             without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
         """
         self._checkers = [_known(c) for c in checkers]
@@ -191,7 +192,7 @@ class Simulation:
         return self._trace(self._rollout, payload, injected)
 
     def _known_friction(self) -> Array:
-        """The torque that the servo adds to compensate the friction that it knows [N m], (T, n)."""
+        """The torque by which the servo compensates the nominal friction [N m], (T, n)."""
         friction, fraction = self.nominal.friction, self.scene.facts.compensation
         if friction is None or fraction == 0:
             return np.zeros_like(self.motion.qd)
@@ -217,7 +218,7 @@ class Simulation:
     def _trace(self, rollout: Rollout, payload: Array, injected: list[tuple[float, str]]) -> Trace:
         scene, episode, motion = self.scene, self.episode, self.motion
         wrenches = labels.Wrenches.from_contacts(rollout.contact)
-        if not rollout.contact.shape[1]:  # links are listed where something pushes one
+        if not rollout.contact.shape[1]:  # no contact sensors: only pulses push the links
             links = len(scene.link_bodies) if self._windows else 0
             wrenches = labels.Wrenches.empty(len(motion.t), links)
         for window in self._windows:
@@ -300,7 +301,7 @@ def _truth(
 
 
 def sampled(trace: Trace, rows: NDArray[np.intp]) -> Trace:
-    """The trace at some of its rows; collisions keep their own times."""
+    """The trace at some of its rows; the times of collisions do not change."""
     n = len(trace.t)
     truth = trace.truth
     if truth is not None:
@@ -347,25 +348,25 @@ def simulate(
     checkers: Sequence[str | Checker] = (),
     without: Sequence[str] = (),
 ) -> Trace:
-    """Simulate ``episode``: the same arguments give the same bytes.
+    """Simulate ``episode``; equal arguments give equal bytes.
 
     Args:
         episode: what to simulate.
         nominal: drive that the controller assumes (default: the arm's nominal one).
-        checkers: contact checkers, by name or made, whose answers go into ``Trace.contacts``; they
+        checkers: contact checkers, or their names; their reports go into ``Trace.contacts`` and
             change nothing else.
         without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
 
     Raises:
-        SimulationDiverged: the simulation left every sensible range.
+        SimulationDiverged: a joint position is not finite, or a velocity is beyond 1000 rad/s.
         ValueError: an unknown checker or part.
     """
     return Simulation(episode, nominal, checkers, without).run()
 
 
 def _known(name: str | Checker) -> str | Checker:
-    """``name``, or ``ValueError`` before anything is simulated."""
-    from tauguard.contacts import registered  # and its room, which takes long to import
+    """``name``; raises ``ValueError`` if no checker has this name."""
+    from tauguard.contacts import registered  # takes long to import
 
     if isinstance(name, str) and name not in registered():
         raise ValueError(f"checker {name!r}: expected one of {', '.join(registered())}")
