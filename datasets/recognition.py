@@ -25,10 +25,7 @@ WORDS = {
     "torque": ("tau_j", "tau", "torque", "torques", "effort", "efforts", "joint_torque"),
     "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
 }
-TIMES = (
-    *("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time"),
-    "time_s",
-)
+TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
 #: Units of the time column, by the shortest usual step that they give.
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
 #: A name with such a word is of a command, an estimate or the tool, not of a joint's sensor.
@@ -47,23 +44,33 @@ _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
 #: A unit behind a name: "time [ms]", "angle (rad)".
 _UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
-#: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
-_WRITTEN = re.compile(
-    r"(?<=[a-z0-9])_(deg|degrees|rad|radians|deg_s|rad_s|deg_per_s|rad_per_s|ma|a|nm|n_m|ns|us|ms|s)$"
-)
-#: Units that names may have, as :func:`_unit` compares them: seconds, amperes, whether degrees.
+#: Units that names may have, as :func:`_unit` compares them: seconds, amperes and N m in one unit.
 _SECONDS = {
-    **dict.fromkeys(("nanoseconds", "nsec", "ns"), 1e-9),
+    **dict.fromkeys(("nanoseconds", "nanosec", "nsec", "ns"), 1e-9),
     **dict.fromkeys(("microseconds", "usec", "us"), 1e-6),
-    **dict.fromkeys(("milliseconds", "msec", "ms"), 1e-3),
-    **dict.fromkeys(("seconds", "sec", "s"), 1.0),
+    **dict.fromkeys(("milliseconds", "millis", "msec", "ms"), 1e-3),
+    **dict.fromkeys(("seconds", "secs", "sec", "s"), 1.0),
 }
-_AMPERES = {"milliamperes": 1e-3, "ma": 1e-3, "amperes": 1.0, "amps": 1.0, "a": 1.0}
+_AMPERES = {
+    **dict.fromkeys(("milliamperes", "milliamps", "ma"), 1e-3),
+    **dict.fromkeys(("amperes", "amps", "amp", "a"), 1.0),
+}
+_NEWTON_METRES = {
+    **dict.fromkeys(("mnm", "mn_m"), 1e-3),
+    **dict.fromkeys(("ncm", "n_cm"), 1e-2),
+    **dict.fromkeys(("nm", "n_m"), 1.0),
+}
+#: Units of angles and of their speeds: whether they are degrees. A map takes no other unit.
+_PER_SECOND = ("", "_s", "_per_s", "_sec")
 _ANGLES = {
     unit + per: unit.startswith("deg")
     for unit in ("degrees", "deg", "radians", "rad")
-    for per in ("", "_s", "_per_s", "_sec")
+    for per in _PER_SECOND
 }
+_OTHER_ANGLES = ("rpm", *(u + per for u in ("mrad", "turns", "rev") for per in _PER_SECOND))
+#: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
+_NAMES = "|".join((*_SECONDS, *_AMPERES, *_NEWTON_METRES, *_ANGLES, *_OTHER_ANGLES))
+_WRITTEN = re.compile(f"(?<=[a-z0-9])_({_NAMES})$")
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -91,14 +98,15 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _field(prefix: str) -> str | None:
-    plain = _WRITTEN.sub("", re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_"))
-    if _OTHER.search(plain):
+    whole = re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_")
+    if _OTHER.search(whole):
         return None
-    for field, words in WORDS.items():
-        if plain in words or any(
-            plain.endswith("_" + word) for word in words if len(word) > 1 or word == "q"
-        ):
-            return field
+    for plain in (_WRITTEN.sub("", whole), whole):  # "amps" is a unit and a signal
+        for field, words in WORDS.items():
+            if plain in words or any(
+                plain.endswith("_" + word) for word in words if len(word) > 1 or word == "q"
+            ):
+                return field
     return None
 
 
@@ -134,7 +142,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
 
     repair = {"repeat", "tail", "state"}
     used = {field: columns for field, columns in groups.items() if field in ("q", "qd", effort)}
-    degrees, amperes = _units(used, numbers)
+    degrees, amperes, newton_metres = _units(used, numbers)
     scale, clock = 1.0, 0.0
     if time is not None:
         t = numbers([time])[:, 0]
@@ -153,7 +161,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         time_scale=scale,
         clock=clock,
         current_scale=amperes,
-        torque_scale=-1.0 if effort == "torque" and _FRI in groups["torque"][0] else 1.0,
+        torque_scale=-newton_metres if _FRI in groups[effort][0] else newton_metres,
         joint_names=_joints(groups["q"]),
         repair=frozenset(repair),
     )
@@ -168,13 +176,21 @@ def _time_scale(name: str, t: Array) -> float:
 
 def _units(
     groups: Mapping[str, Sequence[str]], numbers: Callable[[Sequence[str]], Array]
-) -> tuple[bool, float]:
-    """Whether angles are degrees, and amperes in one unit of currents: as names say, else values.
+) -> tuple[bool, float, float]:
+    """Whether angles are degrees, amperes in one unit of currents, N m in one of torques.
+
+    Names decide, else values.
 
     Raises:
-        ValueError: columns in different units.
+        ValueError: columns in different units, or angles neither in radians nor in degrees.
     """
     angles = [*groups["q"], *groups.get("qd", ())]
+    for name in angles:
+        if _unit(name, dict.fromkeys(_OTHER_ANGLES, True)):
+            raise ValueError(
+                f"column {name}: expected radians or degrees, per second for a speed: convert it, "
+                "or give a column map without qd if only the velocities differ"
+            )
     degrees = _one(
         {name: _unit(name, _ANGLES) for name in angles},
         "convert one of them in the file, or give a column map without qd if only the velocities "
@@ -183,6 +199,10 @@ def _units(
     amperes = _one(
         {name: _unit(name, _AMPERES) for name in groups.get("current", ())},
         "give a column map with a current_scale for each joint",
+    )
+    newton_metres = _one(
+        {name: _unit(name, _NEWTON_METRES) for name in groups.get("torque", ())},
+        "give a column map with a torque_scale for each joint",
     )
 
     def beyond(field: str, limit: float) -> bool:
@@ -193,7 +213,7 @@ def _units(
         degrees = beyond("q", FURTHEST) or "deg" in groups["q"][0].lower()
     if amperes is None:
         amperes = 1e-3 if beyond("current", AMPERES) else 1.0
-    return degrees, amperes
+    return degrees, amperes, newton_metres or 1.0
 
 
 def _one(said: Mapping[str, Any], remedy: str) -> Any:
@@ -257,11 +277,14 @@ def described(columns: ColumnMap) -> str:
     time = f"time {columns.t} [{unit}]"
     if columns.t is None:
         time = f"no time, {columns.clock:g} rows a second as velocities say"
-    other = ", other sign" if columns.torque_scale == -1 else ""
+    scale = columns.torque_scale
+    assert isinstance(scale, float)  # one unit for all joints, as recognised
+    torque = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m"}[abs(scale)]
+    torque += ", other sign" if scale < 0 else ""
     parts = [time, f"positions {_span(columns.q)} [{angle}]"]
     parts.append(f"velocities {_span(columns.qd)} [{angle}/s]" if columns.qd else "no velocities")
     parts.append(
-        f"joint torques {_span(columns.torque)} [N m{other}]"
+        f"joint torques {_span(columns.torque)} [{torque}]"
         if columns.torque
         else f"currents {_span(columns.current)} [{ampere}]"
     )

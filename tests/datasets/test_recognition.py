@@ -111,6 +111,34 @@ def test_a_named_unit_beats_what_values_suggest(names, values, units):
     assert (found.time_scale, found.degrees, found.current_scale) == units
 
 
+@pytest.mark.parametrize(
+    ("time", "torque", "scales"),
+    [
+        ("timestamp_msec", "tau_mNm_#", (1e-3, 1e-3)),
+        ("time_sec", "joint_#_torque [mNm]", (1.0, 1e-3)),
+        ("time_seconds", "torque_# [N\u00b7cm]", (1.0, 1e-2)),
+        ("t_usec", "effort_Nm_#", (1e-6, 1.0)),
+        ("t [ms]", "measured_torque_# [mN m]", (1e-3, -1e-3)),
+    ],
+)
+def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
+    names = [time, *(kind.replace("#", k) for kind in ("q#", "qd#", torque) for k in "12")]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    table[:, 0] = 0.7 * np.arange(50)
+    found = recognised(names, table)
+    assert (found.t, found.torque) == (time, tuple(names[5:]))
+    assert (found.time_scale, found.torque_scale) == scales
+    unit = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m", -1e-3: "mN m, other sign"}[scales[1]]
+    assert f"[{unit}]" in described(found)
+
+
+@pytest.mark.parametrize("unit", ["rpm", "mrad/s", "turns", "rev_per_s"])
+def test_angles_in_other_units_are_refused(unit):
+    names = ["t", *(f"{kind}{k}" for kind in ("q", f"velocity_{unit}_", "current") for k in "12")]
+    with pytest.raises(ValueError, match=f"column velocity_{unit}_1: expected radians or degrees"):
+        recognised(names, np.ones((5, 7)) * np.arange(5)[:, None])
+
+
 def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):
     t, q, qd, i = motion()
     names = ["t", *(f"axis{k}_{kind}" for kind in ("pos_rad", "vel_deg_s", "amps") for k in (1, 2))]
@@ -362,5 +390,5 @@ def test_a_reduced_log_has_nothing_folded_in_and_says_its_cost(tmp_path):
     assert np.abs(log.trace.current - late)[1:].max() < 0.05
     np.testing.assert_allclose(log.trace.q[1:], np.hstack([late, late])[1:], atol=2e-3)
     assert "1e+03 Hz reduced to 100 Hz by means: alarms come 4.5 ms later" in log.notes[0]
-    with pytest.raises(ValueError, match="--resample 2000: hz 2000 of one of 1000 Hz"):
+    with pytest.raises(ValueError, match="--resample 2000: hz 2000 for a trace at 1000 Hz"):
         reduced(Log(trace, ()), 2000.0)
