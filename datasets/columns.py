@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tauguard.traces.trace import UR_JOINTS
 from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
@@ -19,14 +20,6 @@ SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
 REPAIRS = ("repeat", "tail", "nan", "state", "order")
 #: Seconds in one unit of a time column, by the unit's name.
 CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-UR_JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 
 
 @dataclass(frozen=True)

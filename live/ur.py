@@ -12,16 +12,8 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.live import rtde
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
+from tauguard.traces.trace import UR_JOINTS
 
-#: Joints of every UR arm by the names of UR's own ROS driver, as ``datasets.columns`` has them.
-UR_JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 #: The requested variables, and the types with which the controller must answer.
 VARIABLES = {
     "timestamp": "DOUBLE",

@@ -12,6 +12,15 @@ from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
+#: Joints of every UR arm by the names of UR's own ROS driver.
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
 #: Attachment of an environment's recording: JSON rows of a time [s] and the target of each tool
 #: from this time on [m].
 TARGETS = "targets.json"

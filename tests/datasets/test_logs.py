@@ -10,9 +10,9 @@ from mcap_ros2.writer import Writer
 
 from tauguard.datasets import PRESETS, ColumnMap, read_log
 from tauguard.datasets.arm_logs import read_logs
-from tauguard.datasets.columns import UR_JOINTS
 from tauguard.traces import Trace, write_mcap
 from tauguard.traces.mcap_container import walk
+from tauguard.traces.trace import UR_JOINTS
 
 JOINT_STATE = """\
 std_msgs/Header header
