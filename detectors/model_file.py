@@ -26,14 +26,14 @@ from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.detectors.signature import check_signature, key_of_user, signed
 from tauguard.untrusted_input import check_no_device, reading
 
-#: The version changes with what a detector computes from the same content, too: a threshold of
-#: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
-#: of regressors are severities; 4: that filter learns less of a held contact; 5: the noise model
-#: knows inertia, payload and changes of friction; 6: also changes of
-#: torque in slow logs, and a change of friction counts once; 7: the bound in free motion grows
-#: beyond the speeds and accelerations of the logs, and srq-svr's thresholds are those of
-#: moving-thresholds beneath its learned score.
-FORMAT, VERSION = "tauguard model", 7
+#: The version also changes if a detector computes other scores from the same content, because a
+#: threshold then has another meaning. Changes by version:
+#: 2: the filter of `Unknowns.for_detection`. 3: scores of regressors are severities. 4: the filter
+#: learns less of a held contact. 5: the noise grows with inertia, payload and changes of friction.
+#: 6: and with changes of torque in slow logs; a change of friction counts once. 7: the bound in
+#: free motion grows beyond the speeds and accelerations of the logs; srq-svr has the thresholds of
+#: moving-thresholds. 8: the shape of a window has no note.
+FORMAT, VERSION = "tauguard model", 8
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.

@@ -19,7 +19,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _kernel, _observer
 from tauguard.detectors.calibration.calibrate import calibrate
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
-from tauguard.detectors.estimation.noise_model import TERMS, NoiseModel
+from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
 from tauguard.detectors.estimation.velocity import SLOWEST
 from tauguard.detectors.events import undisturbed_rows
@@ -45,15 +45,13 @@ class Scaling(Frozen):
 
     @property
     def numbers(self) -> tuple[list[int], list[float], float, float, bool]:
-        """Joints, weights of the noise model, units, factor, whether it compresses: native form."""
+        """Arguments of the native forms: joints, noise weights, units, factor, compress."""
         weights = [] if self.noise_model is None else self.noise_model.weights.ravel().tolist()
         return list(self.joints), weights, self.units, self.factor, self.compress
 
     @cached_property
     def _native(self) -> _kernel.Scaling:
-        weights = np.empty((0, TERMS)) if self.noise_model is None else self.noise_model.weights
-        joints = np.array(self.joints, dtype=np.int64)
-        return _kernel.Scaling(joints, weights, self.units, self.factor, self.compress)
+        return _kernel.Scaling(*self.numbers)
 
     def rows(self, residual: Array, qd: Array, motion: Array) -> Array:
         """The scaled residual, shape (T, len(joints)).

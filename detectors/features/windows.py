@@ -23,44 +23,18 @@ WINDOW, INTERVAL = 80e-3, 8e-3
 
 @dataclass(frozen=True)
 class WindowShape:
-    """Which samples make a window, in whole samples."""
+    """Which samples make a window."""
 
-    lag: int  #: samples between two numbers of a window
-    count: int = 11  #: numbers of a window per joint
-    note: str = ""  #: what the sample rate could not represent; empty if nothing
+    lag: int  #: samples from one number of a joint to the next
+    count: int  #: numbers per joint
 
     @classmethod
-    def at(
-        cls, dt: float, window: float = WINDOW, interval: float = INTERVAL, confirmation: float = 0
-    ) -> WindowShape:
-        """The window at sample interval ``dt`` [s].
-
-        Args:
-            dt: [s].
-            window: t_W [s].
-            interval: t_I [s].
-            confirmation: t_c [s], for the note.
-        """
-        if not (dt > 0 and interval > 0 and window >= interval):
-            raise ValueError(
-                f"dt {dt}, t_I {interval}, t_W {window} s: expected 0 < dt, t_I <= t_W"
-            )
-        lag = max(1, round(interval / dt))
-        count = max(1, round(window / (lag * dt))) + 1
-        notes = []
-        for name, asked, got in (
-            ("t_I", interval, lag * dt),
-            ("t_c", confirmation, max(1, round(confirmation / dt)) * dt),
-        ):
-            if asked and abs(got - asked) > 0.05 * asked:
-                samples = round(got / dt)
-                plural = "" if samples == 1 else "s"
-                notes.append(f"{name} = {1e3 * asked:g} ms is {samples} sample{plural}")
-        if notes:
-            span = 1e3 * lag * dt * (count - 1)
-            text = ", ".join(notes)
-            notes = [f"at {1e3 * dt:g} ms a sample {text}; a window spans {span:g} ms"]
-        return cls(lag, count, "".join(notes))
+    def at(cls, dt: float) -> WindowShape:
+        """The dissertation's window, in whole samples of ``dt`` seconds."""
+        if not dt > 0:
+            raise ValueError(f"dt {dt} s: expected above 0")
+        lag = max(1, round(INTERVAL / dt))
+        return cls(lag, max(1, round(WINDOW / (lag * dt))) + 1)
 
     def of(self, signal: Array, ends: ArrayLike) -> Array:
         """The windows that end at rows ``ends``, shape (N, m count): joint by joint, oldest first.

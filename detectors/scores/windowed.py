@@ -13,7 +13,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.noise_model import NoiseModel
-from tauguard.detectors.events import CONFIRMATION, free_rows, undisturbed_rows
+from tauguard.detectors.events import free_rows, undisturbed_rows
 from tauguard.detectors.features.front_end import (
     FrontEnd,
     FrontEndSettings,
@@ -82,7 +82,7 @@ class SrqSvr:
             ValueError: traces that do not fit, or without collisions or collision-free motion.
         """
         front = self.front.fit(traces, arm)
-        shape = WindowShape.at(front.dt, confirmation=CONFIRMATION)
+        shape = WindowShape.at(front.dt)
         targets = self.targets(traces, front)
         scaling = self.scaling(traces, targets, front, shape)
         prepared = self.prepared(traces, targets, front, scaling)

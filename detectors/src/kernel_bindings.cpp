@@ -1,4 +1,6 @@
 // tauguard.detectors._kernel: kernel machines, scalings and windows on arrays.
+#include <nanobind/stl/vector.h>
+
 #include "bindings.hpp"
 #include "kernel.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
@@ -47,14 +49,6 @@ KernelSum* make_kernel(In2 vectors, In1 coef, double intercept, double sigma) {
                        sigma);
 }
 
-Scaling* make_scaling(Ids joints, In2 weights, double units, double factor, bool compress) {
-  require(weights.shape(0) == 0 || weights.shape(1) == noise_terms,
-          "Scaling: a weight for each term of the noise, a joint");
-  return new Scaling({joints.data(), joints.data() + joints.shape(0)},
-                     {weights.data(), weights.data() + weights.shape(0) * weights.shape(1)}, units,
-                     factor, compress);
-}
-
 void scale(const Scaling& scaling, In2 left, In2 qd, In3 motion, Out2 out) {
   const std::size_t n = left.shape(1), m = scaling.columns();
   require(qd.shape(0) == left.shape(0) && motion.shape(0) == left.shape(0) &&
@@ -96,7 +90,8 @@ NB_MODULE(_kernel, m) {
       .def(nb::new_(&make_kernel), "vectors"_a, "coef"_a, "intercept"_a, "sigma"_a)
       .def("rows", &rows, "x"_a, "out"_a.noconvert(), "threads"_a);
   nb::class_<Scaling>(m, "Scaling")
-      .def(nb::new_(&make_scaling), "joints"_a, "weights"_a, "units"_a, "factor"_a, "compress"_a)
+      .def(nb::init<std::vector<std::int64_t>, std::vector<double>, double, double, bool>(),
+           "joints"_a, "weights"_a, "units"_a, "factor"_a, "compress"_a)
       .def("rows", &scale, "left"_a, "qd"_a, "motion"_a, "out"_a.noconvert());
   m.def("gram", &gram, "a"_a, "b"_a, "sigma"_a, "out"_a.noconvert(), "threads"_a);
   m.def("windows", &windows, "signal"_a, "ends"_a, "lag"_a, "count"_a, "out"_a.noconvert());

@@ -70,7 +70,7 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
     assert (container["format"], container["kind"], container["version"]) == (
         "tauguard model",
         "collision-alarm",
-        7,
+        8,
     )
     assert set(container["made_with"]) == {"tauguard", "mujoco", "numpy", "scikit-learn"}
 
@@ -129,13 +129,16 @@ def test_damaged_files_are_one_line(alarm, tmp_path):
         ([1], "not a model file of tauguard"),
         ({"format": "tauguard detector 1"}, "earlier format 'tauguard detector 1'; train"),
         ({"format": "tauguard ranking detector 2"}, "earlier format"),
-        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 7"),
+        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 8"),
         (
-            {"format": "tauguard model", "version": 6},
-            "version 6 .*expected 7; train the detector anew",
+            {"format": "tauguard model", "version": 7},
+            "version 7 .*expected 8; train the detector anew",
         ),
         ({"format": "tauguard model", "version": 1}, "version 1 of the format, .* train the"),
-        ({"format": "tauguard model", "version": 7, "kind": "robot"}, "of the kind 'robot'"),
+        (
+            {"format": "tauguard model", "version": files.VERSION, "kind": "robot"},
+            "of the kind 'robot'",
+        ),
     ],
 )
 def test_foreign_and_earlier_files_are_named(content, says, tmp_path):
