@@ -11,15 +11,7 @@ from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import Index, geom_kinds
 
 #: Native numbers of shapes, by kind of geom.
-_CORES = {
-    "plane": 0,
-    "sphere": 1,
-    "capsule": 2,
-    "ellipsoid": 3,
-    "cylinder": 4,
-    "box": 5,
-    "mesh": 6,
-}
+_CORES = {"plane": 0, "sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 4, "box": 5, "mesh": 6}
 #: Kinds of geoms with a native shape.
 CONVEX = tuple(_CORES)
 _NONE = np.zeros((0, 3))

@@ -54,11 +54,7 @@ class RigidChecker:
     name = "rigid"
 
     def __init__(
-        self,
-        model: Any,
-        threshold: str = "margin",
-        skip: Sequence[str] = (),
-        mesh: str = "hull",
+        self, model: Any, threshold: str = "margin", skip: Sequence[str] = (), mesh: str = "hull"
     ) -> None:
         """Choose the pairs and copy the shapes."""
         if mesh not in ("hull", "surface"):

@@ -147,10 +147,7 @@ def _pairs(model: Any, geom: Any, flex: Any) -> list[Pair]:
 
 
 def _precision(
-    model: Any,
-    run: Run,
-    mine: Sequence[Contacts],
-    touches: Sequence[Touches],
+    model: Any, run: Run, mine: Sequence[Contacts], touches: Sequence[Touches]
 ) -> tuple[int, int, list[tuple[float, Pair, float]]]:
     """Numbers of correct and of all reports, and the false ones as (time, pair, depth)."""
     right = total = 0

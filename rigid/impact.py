@@ -27,11 +27,7 @@ def time_of_impact(
     a: Solid, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
 ) -> MeshImpacts: ...
 def time_of_impact(
-    a: Solid | MeshTree,
-    b: Solid | MeshTree,
-    motion_a: Motion,
-    motion_b: Motion,
-    threads: int = 1,
+    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
 ) -> Impacts:
     """The first contact of moving bodies, t in [0, 1].
 
@@ -68,11 +64,7 @@ def time_of_impact(
         return first_contact(*beside, motion_a, motion_b, threads)
     core_a, radius_a = solid_parts("a", cast(Solid, a))
     core_b, radius_b = solid_parts("b", cast(Solid, b))
-    lengths = {
-        "bodies": rows(core_a, core_b),
-        "motion_a": len(motion_a),
-        "motion_b": len(motion_b),
-    }
+    lengths = {"bodies": rows(core_a, core_b), "motion_a": len(motion_a), "motion_b": len(motion_b)}
     out = np.empty((common_length(lengths), 7))
     _rigid_mesh.time_of_impact(
         *(*native(core_a), radius_a, *native(core_b), radius_b),

@@ -61,12 +61,7 @@ def distance(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshD
 
 
 def first_contact(
-    mesh: MeshTree,
-    solid: Solid,
-    swapped: bool,
-    motion_a: Motion,
-    motion_b: Motion,
-    threads: int,
+    mesh: MeshTree, solid: Solid, swapped: bool, motion_a: Motion, motion_b: Motion, threads: int
 ) -> MeshImpacts:
     """First contact of the surface with each body; the mesh is ``b`` if ``swapped``."""
     motion_mesh, motion_solid = (motion_b, motion_a) if swapped else (motion_a, motion_b)
@@ -75,12 +70,7 @@ def first_contact(
     count = common_length(lengths)
     out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
     mesh._mesh.time_of_impact_of_bodies(
-        *bodies,
-        *motion_mesh.packed,
-        *motion_solid.packed,
-        out,
-        face,
-        thread_count(threads),
+        *bodies, *motion_mesh.packed, *motion_solid.packed, out, face, thread_count(threads)
     )
     if swapped:
         out[:, 4:7] *= -1

@@ -67,11 +67,7 @@ def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> i
 
 
 def sweep(
-    a: Bodies,
-    b: Bodies,
-    displacement: ArrayLike,
-    method: SweepMethod = "auto",
-    threads: int = 1,
+    a: Bodies, b: Bodies, displacement: ArrayLike, method: SweepMethod = "auto", threads: int = 1
 ) -> Impacts:
     """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 

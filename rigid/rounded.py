@@ -8,14 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
-from tauguard.rigid.shapes import (
-    Bodies,
-    Boxes,
-    Hulls,
-    Parallelepipeds,
-    Polygons,
-    Tetrahedra,
-)
+from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 
 #: Largest coordinate and radius; products of larger ones would overflow.
 MOST_COORDINATE = 1e100

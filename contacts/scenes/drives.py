@@ -43,10 +43,7 @@ def sway(home: Array, joints: NDArray[Any], amplitude: Array, period: float) -> 
 
 
 def driven(
-    name: str,
-    model: mujoco.MjModel,
-    seconds: float,
-    moves: list[tuple[tuple[str, ...], Reference]],
+    name: str, model: mujoco.MjModel, seconds: float, moves: list[tuple[tuple[str, ...], Reference]]
 ) -> ContactScene:
     """The contact scene of ``model`` in which the named joints of each arm follow a reference."""
     qpos, qvel, arms = model.qpos0.copy(), np.zeros(model.nv), []

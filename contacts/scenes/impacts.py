@@ -24,11 +24,7 @@ MODES = {
     "ipc": int(mujoco.mjtEnableBit.mjENBL_IPC),
 }
 #: Impact points on the cloth, as weights of the three vertices of a face.
-IMPACT_POINTS = {
-    "vertex": (1.0, 0.0, 0.0),
-    "edge": (0.5, 0.5, 0.0),
-    "face": (1 / 3, 1 / 3, 1 / 3),
-}
+IMPACT_POINTS = {"vertex": (1.0, 0.0, 0.0), "edge": (0.5, 0.5, 0.0), "face": (1 / 3, 1 / 3, 1 / 3)}
 
 
 def ball_cloth(
