@@ -21,8 +21,8 @@ struct EnergyChange {
 };
 
 // Limits the energy that contacts add. The total energy consists of kinetic energy and the
-// potential energy of gravity, springs and stretched flexes. Losses in joints and materials count
-// as contacts'.
+// potential energy of gravity, springs and stretched flexes. Losses in joints and materials are
+// counted as losses of contacts.
 class EnergyBudget {
  public:
   EnergyBudget(const Engine& engine, Mocap& mocap, std::vector<Sheet> sheets, double share)

@@ -89,10 +89,12 @@ def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     for regime, joints in detector.unseen:
         rows |= here[regime][:, [names.index(joint) for joint in joints]].any(axis=1)
+    if not rows.any():
+        return []
     seconds = float(rows.sum() * trace.dt)
     return [
-        f"the training logs do not show {unseen_text(detector.unseen, len(names))}; in "
-        f"{seconds:.1f} s of this log some joint does that, under bounds of other arms"
+        f"the training logs do not show {unseen_text(detector.unseen, len(names))}; this log does "
+        f"for {seconds:.1f} s, in which bounds learned on other arms apply"
     ]
 
 

@@ -165,7 +165,7 @@ class CurrentNetwork:
 
 @dataclass(frozen=True, eq=False)
 class FittedCurrentNetwork(Frozen):
-    """A :class:`~tauguard.detectors.detector.FittedDetector`."""
+    """A :class:`~tauguard.detectors.scores.detector.FittedDetector`."""
 
     name: str
     arm: ArmModel  #: as it was given: nothing of it is used

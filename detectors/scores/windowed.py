@@ -189,7 +189,7 @@ def evaluated(
 
 @dataclass(frozen=True, eq=False)
 class FittedWindowed(OnFrontEnd):
-    """A fitted regressor on windows: a :class:`~tauguard.detectors.detector.FittedDetector`."""
+    """A fitted regressor on windows, a ``FittedDetector``."""
 
     name: str
     front: FrontEnd

@@ -64,7 +64,7 @@ Source kernel_scores(const Estimator& estimator, const std::vector<std::int64_t>
   Scaling plain(joints, floor_weights, 1.0, 1.0, false);
   require(plain.fits(estimator.joints()) &&
               (floor_limits.empty() || floor_limits.size() == joints.size()),
-          "floor: expected four weights a joint, and a limit a joint that is used or none");
+          "floor: expected six weights per joint, and one limit per joint that is used or none");
   return std::make_shared<KernelScores>(
       residual_of(estimator, joints, weights, units, factor, compress),
       Window(joints.size(), lag, count),

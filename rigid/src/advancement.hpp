@@ -10,7 +10,8 @@
 // 3. G is concave. A step ends just before the root of G, so the bodies are apart during the step.
 //
 // Bodies grown by balls, whose radii have the sum R, are apart while s(h) > R |n(h)|. If r is
-// perpendicular to n, |n(h)| <= 1 + (h |r|)^2 / 2. So G is less by R, and K more by R |r|^2.
+// perpendicular to n, |n(h)| <= 1 + (h |r|)^2 / 2. So G is reduced by R, and K is increased by R
+// |r|^2.
 #pragma once
 
 #include <algorithm>

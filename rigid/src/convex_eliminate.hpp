@@ -5,10 +5,11 @@
 // scaled by its determinant. Every vertex gives a row:
 //   sum p_i F_i(b) < 0      for a vertex b of B,
 //   -sum p_i F_i(a) <= 0    for any other vertex a of A.
-// Eliminating p_k, with p_k >= 0, keeps the rows with a positive entry k without this entry, and
-// combines them with the rows of negative entry k. Every row is the difference of a point of B and
-// a point of A. After s eliminations a row is redundant if it is made of more than s + 1
-// inequalities (Chernikov 1960), or if they include those of another row (Kohler 1967).
+// Eliminating p_k, with p_k >= 0, removes entry k from all rows. Each row with a positive entry k
+// is kept, and is also combined with each row that has a negative entry k. Every row is the
+// difference of a point of B and a point of A. After s eliminations a row is redundant if it is
+// made of more than s + 1 inequalities (Chernikov 1960), or if they include those of another row
+// (Kohler 1967).
 //   * If a row has only positive entries, no plane exists, and the bodies share a point.
 //   * Otherwise back-substitution gives a plane, which is then checked against all vertices.
 // Let E bound the error of every entry. Combinations leave 2 E instead of 0 in the eliminated

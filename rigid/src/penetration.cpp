@@ -5,8 +5,8 @@ namespace tauguard::rigid {
 namespace {
 
 constexpr int most_faces = 396;  // a convex polytope with 200 corners has at most this many
-// Largest error of the depth of curved cores, as a fraction of their size. Polytopes end at a
-// facet.
+// Largest error of the depth of curved cores, as a fraction of their size. The search between
+// polytopes usually ends at a facet, whose depth is exact up to rounding.
 constexpr double resolution = 1e-7;
 
 // The set of differences b - a of two shapes, by their support functions.

@@ -39,9 +39,9 @@ struct Distance {
 Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
                      double needed);
 
-// Replaces the fields of an overlapping `d`. `lower` is minus the penetration depth of the cores,
-// `n` the direction of the shortest translation that separates b from a, and both points its
-// middle.
+// Replaces the fields of an overlapping `d`. `lower` becomes minus the penetration depth of the
+// cores, and `n` the direction of the shortest translation that separates b from a. Both points
+// become the middle of the overlap along `n`.
 void penetration(const SupportShape& a, const SupportShape& b, Distance* d);
 
 }  // namespace tauguard::rigid
