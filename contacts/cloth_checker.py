@@ -19,10 +19,9 @@ class ClothChecker:
 
     A flex is the union of its triangles, thickened by its radius, as in MuJoCo. Triangles are
     tested against geoms by conservative advancement on support functions. Cloth against cloth, and
-    against
-    itself: :class:`tauguard.cloth.MeshCCD` finds candidates at the distance of both radii, and then
-    pairs of triangles are tested. Times are never late. At a time of impact the surfaces are at
-    most 1e-10 of the shapes' size apart.
+    against itself: :class:`tauguard.cloth.MeshCCD` finds candidates at the distance of both radii,
+    and then pairs of triangles are tested. Times are never late. At a time of impact the surfaces
+    are at most 1e-10 of the shapes' size apart.
 
     Args:
         model: MjModel.

@@ -118,7 +118,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
 
     Raises:
-        ValueError: names with units of which one map can hold only one.
+        ValueError: names with units of which one map can hold only one, or a time in two columns.
     """
 
     def plain(name: str) -> str:
@@ -146,6 +146,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     scale, clock = 1.0, 0.0
     if time is not None:
         t = numbers([time])[:, 0]
+        _refuse_parts(time, t, header)
         steps = np.diff(t[np.isfinite(t)])
         repair |= {"order"} if (steps < 0).any() else set()
         scale = _time_scale(time, t)
@@ -165,6 +166,17 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
         joint_names=_joints(groups["q"]),
         repair=frozenset(repair),
     )
+
+
+def _refuse_parts(time: str, t: Array, header: Sequence[str]) -> None:
+    """Raise ``ValueError`` for whole seconds that repeat beside a column of nanoseconds."""
+    rest = [name for name in header if (_unit(name, _SECONDS) or 1.0) < 1e-3 and name != time]
+    known = t[np.isfinite(t)]
+    if rest and (known == np.floor(known)).all() and (np.diff(known) == 0).any():
+        raise ValueError(
+            f"columns {time} and {rest[0]}: parts of one time, and auto reads one column; write "
+            "their sum into one column of the file"
+        )
 
 
 def _time_scale(name: str, t: Array) -> float:

@@ -17,8 +17,8 @@ namespace tauguard::rigid {
 class ExactFacets {
  public:
   enum class Answer { together, apart, unknown };
-  Vector3<Dyadic>
-      normal;  // if `together`: b touches a after moving by `height` / |normal|^2 normal
+  // If `together`: b touches a after a motion by `height` / |normal|^2 `normal`.
+  Vector3<Dyadic> normal;
   Dyadic height;
 
   // x, y: the exact vertices; a, b: the vertices in doubles, with errors of at most 4 u `size`.

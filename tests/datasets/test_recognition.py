@@ -132,6 +132,19 @@ def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
     assert f"[{unit}]" in described(found)
 
 
+@pytest.mark.parametrize("parts", [("sec", "nanosec"), ("stamp_s", "stamp_ns"), ("t", "t_usec")])
+def test_a_time_in_two_columns_is_refused(parts):
+    names = [*parts, *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12")]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    t = 100 + 0.03125 * np.arange(50)
+    table[:, 0] = np.floor(t)
+    table[:, 1] = 1e9 * (t % 1)
+    with pytest.raises(ValueError, match=f"columns {parts[0]} and {parts[1]}: parts of one time"):
+        recognised(names, table)
+    table[:, 0] = t  # a second clock is no part
+    assert recognised(names, table).t == parts[0]
+
+
 @pytest.mark.parametrize("unit", ["rpm", "mrad/s", "turns", "rev_per_s"])
 def test_angles_in_other_units_are_refused(unit):
     names = ["t", *(f"{kind}{k}" for kind in ("q", f"velocity_{unit}_", "current") for k in "12")]
