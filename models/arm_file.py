@@ -18,12 +18,13 @@ ARM_BITS, OBSTACLE_BITS = 1, 2
 #: Radius of the capsule that replaces a link without any shape: at most [m], and as a fraction of
 #: the arm's length.
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
-#: Its colour, and the group of collision shapes if visual shapes exist.
+#: Colour of that capsule; group of collision shapes if the file has visual shapes, too.
 STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
-#: Least number of joints in a chain whose end branches may be a gripper, and largest number of
-#: joints of each branch (never more than the chain has).
+#: Branches at the end of a chain are a gripper if the chain has at least the first number of joints
+#: and each branch at most the second, but no more than the chain.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
-#: Below such a chain, a joint with such a name and all joints below it are a gripper, too.
+#: After a chain of at least that many joints, a joint whose name matches is a gripper, with all
+#: joints below it.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)
 #: Usual names of a tool frame, the likeliest first.
 TOOL_FRAMES = (

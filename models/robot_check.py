@@ -16,7 +16,7 @@ from tauguard.untrusted_input import read_text, reading
 #: Largest number of files that include one another.
 MOST_INCLUDES = 100
 
-#: Attributes that name a file; the six are those of a cube's texture.
+#: Attributes that name a file: `file`, and one for each side of a cube's texture.
 FILES = ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
 
 #: The process that compiles files first.

@@ -69,7 +69,10 @@ def force_draws(
 
 
 def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) -> Array:
-    """One standardised force a row: a scale by its evidence, then a Gaussian cut at the surface.
+    """Draw one force for each candidate point, in standardised units.
+
+    A scale of the prior is drawn by its evidence, then the force from the Gaussian posterior of
+    that scale, restricted to forces that push inward.
 
     Args:
         columns: joint torques in units of the noise for a unit force, shape (K, n, 3).

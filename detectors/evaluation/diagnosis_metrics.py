@@ -20,9 +20,10 @@ LAG = 0.015
 
 
 def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, Array]:
-    """True force [N] and point [m] behind an estimate for ``time`` [s].
+    """True force [N] and point [m] with which an estimate for ``time`` [s] is compared.
 
-    The largest force of the last :data:`LAG` seconds; the collision's peak where nothing touched.
+    They are those of the largest force in the last :data:`LAG` seconds. If there was no contact in
+    that time, they are the collision's own force and point.
 
     Raises:
         ValueError: the trace has no truth.

@@ -1,7 +1,8 @@
 // From an arm's samples to each joint's ratio of signal to bound: the free-motion detector.
 //
-// Samples that come faster than `interval` are averaged, because a bound concerns tens of
-// milliseconds. The estimator gets the last sample but one, with the median of three currents.
+// Samples that come faster than `interval` are averaged, because a joint must exceed its bound for
+// tens of milliseconds to count as struck. The estimator gets the last sample but one, with the
+// median of three currents.
 #pragma once
 
 #include <algorithm>
@@ -62,7 +63,7 @@ class FreeMotion {
     std::copy(sum_.begin(), sum_.end(), mean.values.begin());
     mean.dt = time_;
     for (double& x : mean.values) x /= count_;
-    if (!filled_) last_[0] = last_[1] = mean;  // same size: nothing is allocated
+    if (!filled_) last_[0] = last_[1] = mean;  // no allocation: sizes are equal
     filled_ = true;
     count_ = 0;
     time_ = 0.0;

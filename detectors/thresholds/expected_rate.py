@@ -107,10 +107,13 @@ class Tails:
         return cls(*np.array(rows).T)
 
     def above(self, threshold: float) -> Array:
-        """Rates above a threshold that is not below the bases [1/h], shape (D,)."""
+        """Rate of peaks above a threshold in each draw [1/h], shape (D,).
+
+        Valid from the base of a draw's tail on.
+        """
         far = np.maximum(threshold - self.base, 0.0) / np.where(self.scale > 0, self.scale, np.inf)
         steep = np.where(np.abs(self.shape) < 1e-9, 1e-9, self.shape)
-        inside = steep * far > -1  # a negative shape ends at 1 + shape far = 0
+        inside = steep * far > -1  # a tail of negative shape ends at 1 + shape * far = 0
         grown = np.log1p(np.where(inside, steep * far, 0.0)) / steep
         found: Array = np.where(inside, self.per_hour * np.exp(-grown), 0.0)
         return found

@@ -41,7 +41,7 @@ int pair_index(int x, int y, double sx, double sy, double* flip) {
   return geometry::edge_axis(x, y, sx * sy < 0);
 }
 
-// Bounds [lo, hi] of `k` along the direction that `cone` represents.
+// Interval [lo, hi] that holds the projection of `k` on the direction that `cone` represents.
 void bounds(const KDop& k, const KDop::Cone& cone, double* lo, double* hi) {
   *lo = *hi = 0;
   for (int i = 0; i < 3; ++i) {

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 #: Rate of false alarms on the training motions for which the threshold is set [1/h]. An alarm stops
-#: a robot; one false alarm per hour may be acceptable in practice, ten are hardly so.
+#: a robot: one false alarm per hour may be acceptable in practice, ten are too many.
 FALSE_ALARMS_PER_HOUR = 1.0
 
 

@@ -1,4 +1,4 @@
-"""``tauguard train --twin``: contacts learned on a twin, beside what the arm's free logs show."""
+"""``tauguard train --twin``: a detector trained on a twin's contacts and the arm's free logs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
 
-#: Episodes with contacts, each of another individual, and contacts in each.
+#: Number of episodes with contacts, each of a twin with other model errors; contacts in each.
 STRUCK, CONTACTS = 24, 6
 #: Duration of a hand's push [s]; fraction of the strikes that become pushes; fraction of the pushes
 #: that meet a standing arm.
 PUSH, PUSHED, STANDING = (0.1, 1.2), 0.5, 0.5
-#: Percent of the joints' largest speeds, in turn.
+#: Speeds of the episodes in turn, in percent of the joints' largest speeds.
 SPEEDS = (10.0, 30.0, 60.0)
 
 
