@@ -291,9 +291,8 @@ class Guard {
   void refuse_within_step() const {
     if (stepping_ != std::thread::id{})
       throw std::runtime_error(
-          "this guard is in a step, by another thread or around this callback: wait for its end, "
-          "or "
-          "use a guard and an MjData per thread");
+          "this guard is in a step, by another thread or around this callback: wait for "
+          "its end, or use a guard and an MjData per thread");
   }
 
   // Saves MuJoCo's stack pointers and restores them after an error, which does not reset them.

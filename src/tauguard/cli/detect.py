@@ -70,7 +70,7 @@ def command(
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
         at_tool: all contacts are at the tool, which narrows the intervals of the forces.
         quiet: without --model, length of the log's beginning in which nothing touches the arm [s]
-            (default: 20). A collision in it raises the thresholds, so that later ones are missed.
+            (default: 20). A collision in it raises the thresholds, and later ones may be missed.
         gains: without --model, N m per ampere, one number for each joint (known for calibrated
             robot files and for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.
