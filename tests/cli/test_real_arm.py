@@ -1,6 +1,7 @@
 """From a real arm's collision-free logs to a calibrated, working detector."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -36,3 +37,34 @@ def test_calibrate_train_detect(folder, tmp_path, capsys):
     log = str(folder / "free" / TEST)
     main(["detect", log, "--robot", str(robot), *common, "--model", str(model), "--payload", "0"])
     assert "0 alarms in 38" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "alike"), [("ur5", "ur5", {(4, 5)}), ("ur10e", "ur10e", set())]
+)
+def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike):
+    """All columns of the UR5's last two joints may be exchanged: these look alike."""
+    from tauguard.datasets.arm_logs import moving, read_logs
+    from tauguard.datasets.real_arms import initial_arm
+    from tauguard.detectors.calibration.checks import check_order
+    from tauguard.detectors.calibration.recording import Recording
+
+    read = read_logs((data_dir / name / "free",), columns, data_dir / name / f"{name}.urdf")
+    traces, _ = moving(read.traces)
+    own = {log: Recording(trace) for log, trace in traces.items()}
+    arm, _ = initial_arm(read.numbers, list(own.values()), columns, (), "auto")
+    check_order(arm, own)
+    for a, b in ((0, 2), (3, 4), (4, 5)):
+        order = [b if j == a else a if j == b else j for j in range(6)]
+        said = f"of {arm.robot.joint_names[a]} and {arm.robot.joint_names[b]} seem exchanged"
+        for fields in (("current",), ("q", "qd", "current")):
+            if (a, b) in alike and "q" in fields:
+                continue
+            mixed = {
+                log: Recording(
+                    replace(trace, **{key: getattr(trace, key)[:, order].copy() for key in fields})
+                )
+                for log, trace in traces.items()
+            }
+            with pytest.raises(ValueError, match=said):
+                check_order(arm, mixed)

@@ -166,7 +166,7 @@ def test_a_box_that_turns_thousands_of_times_a_step_hits_only_what_it_reaches():
 
 
 def test_a_turn_that_cannot_be_followed_is_refused():
-    with pytest.raises(ValueError, match=r"angular: .* in row 0, at most 10000 rad a step"):
+    with pytest.raises(ValueError, match=r"angular: .* in row 0, expected at most 10000 rad"):
         spinning(1e6, [3.0, 0, 0])
 
 

@@ -33,7 +33,7 @@ def command(
     payload: tuple[str, ...] = (),
     scale: Literal["auto", "gains", "payload", "masses"] = "auto",
     torque: bool = False,
-    accept: tuple[Literal["alarms", "error", "gravity"], ...] = (),
+    accept: tuple[Literal["alarms", "error", "gravity", "order"], ...] = (),
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
@@ -58,7 +58,8 @@ def command(
             JSON file of columns states this by its field "torque" instead.
         accept: write the file although a check fails. alarms: a log has bursts of torque like those
             of contacts. error: the error of a joint's prediction exceeds twice its friction.
-            gravity: the gravity torques differ from those of the robot file.
+            gravity: the gravity torques differ from those of the robot file. order: two joints'
+            columns seem exchanged.
         reading: how logs are read.
         json: write the results here as JSON.
     """
@@ -67,7 +68,7 @@ def command(
     from tauguard.datasets.arm_logs import not_shown
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
-    from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
+    from tauguard.detectors.calibration.checks import check_order, check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import filtered_logs, identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.detectors.evaluation.acceptance import check_held_out
@@ -81,6 +82,7 @@ def command(
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
     names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
     traces = [recording.trace for recording in recordings]
+    hold_to("order", accept, lambda: check_order(arm, given.logs))
     data = filtered_logs(arm, recordings) if given.scale == "gains" else None
     found = identify(arm, recordings, scale=given.scale, data=data)
     if data is not None:

@@ -62,7 +62,7 @@ def free_logs(
 
 
 #: Checks whose errors ``--accept`` turns into notes.
-ACCEPTABLE = ("alarms", "error", "gravity")
+ACCEPTABLE = ("alarms", "error", "gravity", "order")
 
 
 def free_arm(
@@ -96,13 +96,14 @@ def free_detector(
         accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
-        ValueError: too little motion, another arm's gravity torques, much torque that is not
-            explained, or bursts of torque, as contacts cause them.
+        ValueError: too little motion, exchanged joints, another arm's gravity torques, much torque
+            that is not explained, or bursts of torque, as contacts cause them.
     """
-    from tauguard.detectors.calibration.checks import check_weight
+    from tauguard.detectors.calibration.checks import check_order, check_weight
     from tauguard.detectors.scores.free_motion import FreeMotion
 
     logs = list(recordings.values())
+    hold_to("order", accept, lambda: check_order(arm, recordings))
     found = FreeMotion().fit(logs, arm)
     weight = (arm.robot, found.arm.robot, [log.trace for log in logs])
     hold_to("gravity", accept, lambda: check_weight(*weight))

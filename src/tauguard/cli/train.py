@@ -74,7 +74,8 @@ def command(
         accept: with --free, names of logs to keep even if they stand out, and of checks that may
             fail. alarms: more alarms in cross-validation than --false-alarms-per-hour, or bursts
             of torque as of contacts. error: the residual exceeds its bounds half of the time.
-            gravity: the gravity torques differ from those of the robot file.
+            gravity: the gravity torques differ from those of the robot file. order: two joints'
+            columns seem exchanged.
         arm: for a dataset with several arms, the arm of the detector.
         folds: with --traces, number of folds of the cross-validation that sets the threshold; each
             fold is a further training (default: 3). 1 is quicker and keeps a third of the

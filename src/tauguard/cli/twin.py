@@ -32,7 +32,7 @@ def command(
     payload: tuple[str, ...] = (),
     torque: bool = False,
     judge: tuple[Path, ...] = (),
-    accept: tuple[Literal["alarms"], ...] = (),
+    accept: tuple[Literal["alarms", "order"], ...] = (),
     figure: Path | None = None,
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
@@ -52,15 +52,17 @@ def command(
         judge: free logs of other programs, without a load, for the comparison. By default every
             third log of LOGS is compared with a twin of the others, and the written twin is
             identified from all.
-        accept: alarms: make a twin although a log has bursts of torque like those of contacts.
+        accept: make a twin although a check fails. alarms: a log has bursts of torque like those of
+            contacts. order: two joints' columns seem exchanged.
         figure: a PNG of real and simulated residuals with the results.
         reading: how logs are read.
         json: write the results here as JSON.
     """
-    from tauguard.cli.free_logs import explain, free_logs
+    from tauguard.cli.free_logs import explain, free_logs, hold_to
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors.calibration.assessment import left_out
+    from tauguard.detectors.calibration.checks import check_order
     from tauguard.detectors.calibration.recording import each_can_be_left_out, pieces
     from tauguard.models import load_arm
     from tauguard.models.robot import bodies_file
@@ -75,6 +77,7 @@ def command(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
     )
     print_notes(left)
+    hold_to("order", accept, lambda: check_order(given.arm, given.logs))
     recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)

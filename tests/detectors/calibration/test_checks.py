@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel
-from tauguard.detectors.calibration.checks import check_signs, check_weight, drag, torque_per_ampere
+from tauguard.detectors.calibration.checks import (
+    check_order,
+    check_signs,
+    check_weight,
+    drag,
+    torque_per_ampere,
+)
 from tauguard.detectors.calibration.recording import Recording
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
@@ -21,6 +27,26 @@ def test_a_current_of_the_other_sign_is_named(joint):
     # A gain of that sign makes up for it.
     told = replace(arm, drive_gain=GAIN * sign)
     check_signs(told, {"log.csv": Recording(replace(trace, current=trace.current * sign))})
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2)])
+def test_exchanged_joints_are_named(pair):
+    arm, traces = ArmModel(nominal(), GAIN), {f"{seed}": record(seed) for seed in (3, 4)}
+    check_order(arm, {name: Recording(trace) for name, trace in traces.items()})
+    order = [0, 1, 2]
+    order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    said = f"of {'abc'[pair[0]]} and {'abc'[pair[1]]} seem exchanged"
+    for fields in (("current",), ("q", "qd", "current")):
+        mixed = {
+            name: Recording(
+                replace(trace, **{key: getattr(trace, key)[:, order].copy() for key in fields})
+            )
+            for name, trace in traces.items()
+        }
+        with pytest.raises(ValueError, match=said):
+            check_order(arm, mixed)
+        # In one log of 25 s an exchange would be guessed.
+        check_order(arm, {"3": mixed["3"]})
 
 
 def test_joints_that_hardly_move_say_nothing():
