@@ -96,7 +96,8 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
 
     Each joint's current is fitted by the joint's torque in the robot file's arm, the direction of
     motion and the speed, with weights of at least 0, and an offset. The unexplained variances are
-    compared with those after an exchange of two joints' currents, or of all their columns.
+    compared with those after an exchange of two joints' currents, or of all their columns. Only
+    joints that move for :data:`ENOUGH` are checked.
 
     Args:
         arm: of the robot file; its gains' signs count.
@@ -127,10 +128,12 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
     found = []
     for order, its in zip(orders[1:], sums[1:], strict=True):
         a, b = (j for j in same if order[j] != j)
-        currents = _unexplained(sums[0, a, b]) + _unexplained(sums[0, b, a]) - own[a] - own[b]
+        if not np.isfinite(own[a] + own[b]):
+            continue  # one of them hardly moves
+        currents = sum(_unexplained(sums[0, j, order[j]]) - own[j] for j in (a, b))
         whole = [_unexplained(its[j, order[j]]) - own[order[j]] for j in same]
         found += [(currents, a, b, "currents"), (float(np.nansum(whole)), a, b, "columns")]
-    least, a, b, what = min((one for one in found if np.isfinite(one[0])), default=(0.0, 0, 0, ""))
+    least, a, b, what = min(found, default=(0.0, 0, 0, ""))
     if least < -EXCHANGED * math.hypot(1.0, LONG / length):
         names = arm.robot.joint_names
         raise ValueError(
