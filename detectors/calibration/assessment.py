@@ -20,7 +20,7 @@ from tauguard.detectors.calibration.recording import (
 from tauguard.detectors.calibration.regression import Filtered
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.detectors.estimation.observer import intervals, lagged, low_pass
 from tauguard.detectors.events import find_alarms
 from tauguard.traces.trace import Trace
 
@@ -291,13 +291,11 @@ def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
     """
     torque, current = [], []
     for trace in traces:
-        dt, count = intervals(trace.t, len(trace.t)), robot.joints
+        dt = intervals(trace.t, len(trace.t))
         p, beta = momentum_terms(robot, trace.q, trace.qd)
-        rate = np.full(count, RATE)
         rows = moving_span(trace)
-        nothing = np.zeros_like(p)
-        torque.append(low_pass(rate, dt, p, beta)[rows])
-        current.append(-low_pass(rate, dt, nothing, nothing, trace.current)[rows])
+        torque.append(low_pass(RATE, dt, p, beta)[rows])
+        current.append(lagged(RATE, dt, trace.current)[rows])
     a, b = np.concatenate(torque), np.concatenate(current)
     both = (a * b).sum(axis=0)
     alike = both / np.sqrt((a**2).sum(axis=0) * (b**2).sum(axis=0) + 1e-12)

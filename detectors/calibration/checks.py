@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
-from scipy.optimize import nnls
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.calibration.recording import Recording, moves, moving_span
+from tauguard.detectors.calibration.recording import Recording, cut, moves, moving_span
 from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.detectors.estimation.observer import LOG_GAIN, intervals, lagged, low_pass
 from tauguard.traces.trace import Trace
 
 #: Least speed of a checked joint, and speed over which its direction changes [rad/s].
@@ -61,10 +60,9 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     Friction gives a value above 0. NaN for a joint that moves for less than :data:`ENOUGH`.
     """
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
-    rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
-    torque = low_pass(rates, dt, *momentum_terms(robot, trace.q, trace.qd))
-    direction = -low_pass(rates, dt, nothing, nothing, np.tanh(trace.qd / REVERSAL))
-    current = -low_pass(rates, dt, nothing, nothing, np.ascontiguousarray(trace.current * sign))
+    torque = low_pass(rate, dt, *momentum_terms(robot, trace.q, trace.qd))
+    direction = lagged(rate, dt, np.tanh(trace.qd / REVERSAL))
+    current = lagged(rate, dt, trace.current * sign)
     rows, found = moving_span(trace), np.full(n, np.nan)
     for j in range(n):
         on = rows & (np.abs(trace.qd[:, j]) > FAST)
@@ -110,30 +108,7 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
     length = sum(float(trace.t[-1] - trace.t[0]) for trace in traces)
     if length < SHORTEST:
         return
-    n, sign = arm.robot.joints, np.sign(arm.drive_gain)
-    same = list(range(n))
-    orders = [same]
-    for pair in itertools.combinations(same, 2):
-        order = same.copy()
-        order[pair[0]], order[pair[1]] = pair[1], pair[0]
-        orders.append(order)
-    sums = np.zeros((len(orders), n, n, 7, 7))  # by order, joint and column of currents
-    for trace in traces:
-        rows = moving_span(trace)
-        step = max(1, round(THINNED / trace.dt))
-        part = (trace.t[::step], trace.q[::step], trace.qd[::step], trace.current[::step])
-        for k, order in enumerate(orders):
-            sums[k] += _products(arm.robot, *part, order, sign, rows[::step], k == 0)
-    own = np.array([_unexplained(sums[0, j, j]) for j in same])
-    found = []
-    for order, its in zip(orders[1:], sums[1:], strict=True):
-        a, b = (j for j in same if order[j] != j)
-        if not np.isfinite(own[a] + own[b]):
-            continue  # one of them hardly moves
-        currents = sum(_unexplained(sums[0, j, order[j]]) - own[j] for j in (a, b))
-        whole = [_unexplained(its[j, order[j]]) - own[order[j]] for j in same]
-        found += [(currents, a, b, "currents"), (float(np.nansum(whole)), a, b, "columns")]
-    least, a, b, what = min(found, default=(0.0, 0, 0, ""))
+    least, a, b, what = min(_exchanges(arm, traces), default=(0.0, 0, 0, ""))
     if least < -EXCHANGED * math.hypot(1.0, LONG / length):
         names = arm.robot.joint_names
         raise ValueError(
@@ -142,54 +117,62 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
         )
 
 
-def _products(
-    robot: RobotNumbers,
-    t: Array,
-    q: Array,
-    qd: Array,
-    current: Array,
-    order: Sequence[int],
-    sign: Array,
-    rows: Bools,
-    every: bool,
-    rate: float = 20.0,
-) -> Array:
-    """Sums of products of what explains a current, and the current, (n joints, n columns, 7, 7).
+def _exchanges(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
+    """Exchanges of two joints: change of the logarithm of the unexplained variance, both, what."""
+    n, sign = arm.robot.joints, np.sign(arm.drive_gain)
+    steps = [slice(None, None, max(1, round(THINNED / trace.dt))) for trace in traces]
+    span = np.concatenate([moving_span(trace)[s] for trace, s in zip(traces, steps, strict=True)])
+    traces = [cut(trace, s) for trace, s in zip(traces, steps, strict=True)]
+    every = [intervals(trace.t, len(trace.t)) for trace in traces]
 
-    Joint j has the columns of ``order[j]``. The 7 quantities are torque, direction, speed, 1, -1,
-    the current and a column of ones for its mean. Without ``every``, joint j is summed with its own
-    column only.
+    def late(quantity: Callable[[Trace], Array]) -> Array:
+        pairs = zip(traces, every, strict=True)
+        return np.concatenate([lagged(LOG_GAIN, dt, quantity(trace)) for trace, dt in pairs])
+
+    direction = late(lambda trace: np.tanh(trace.qd / REVERSAL))
+    speed, current = late(lambda trace: trace.qd), late(lambda trace: trace.current)
+    fast = span[:, None] & (np.abs(np.concatenate([trace.qd for trace in traces])) > FAST)
+
+    def torque(order: Sequence[int]) -> Array:
+        found = []
+        for trace, dt in zip(traces, every, strict=True):
+            q, qd = (np.ascontiguousarray(x[:, order]) for x in (trace.q, trace.qd))
+            found.append(low_pass(LOG_GAIN, dt, *momentum_terms(arm.robot, q, qd)))
+        return np.concatenate(found)
+
+    def left(torques: Array, joint: int, motion: int, column: int) -> float:
+        on = fast[:, motion]
+        x = (torques[on, joint], direction[on, motion], speed[on, motion])
+        return _unexplained(np.column_stack(x), current[on, column] * sign[joint])
+
+    same = range(n)
+    as_given = torque(same)
+    own = [left(as_given, j, j, j) for j in same]
+    for a, b in itertools.combinations(same, 2):
+        if not math.isfinite(own[a] + own[b]):
+            continue  # one of them hardly moves
+        change = left(as_given, a, a, b) + left(as_given, b, b, a) - own[a] - own[b]
+        yield change, a, b, "currents"
+        order = [b if j == a else a if j == b else j for j in same]
+        exchanged = torque(order)
+        changes = [left(exchanged, j, order[j], order[j]) - own[order[j]] for j in same]
+        yield float(np.nansum(changes)), a, b, "columns"
+
+
+def _unexplained(x: Array, current: Array) -> float:
+    """Logarithm of the fraction of a current's variance that columns x and an offset leave.
+
+    The columns' weights are at least 0. NaN if the joint moves too little.
     """
-    n, dt = robot.joints, intervals(t, len(t))
-    q, qd = (np.ascontiguousarray(x[:, order]) for x in (q, qd))
-    rates, nothing = np.full(n, rate), np.zeros_like(q)
-    torque = low_pass(rates, dt, *momentum_terms(robot, q, qd))
-    direction, speed, given = (
-        -low_pass(rates, dt, nothing, nothing, np.ascontiguousarray(x))
-        for x in (np.tanh(qd / REVERSAL), qd, current[:, order])
-    )
-    sums = np.zeros((n, n, 7, 7))
-    for j in range(n):
-        on = rows & (np.abs(qd[:, j]) > FAST)
-        one = np.ones(int(on.sum()))
-        x = np.column_stack([torque[on, j], direction[on, j], speed[on, j], one, -one, one, one])
-        for c in range(n) if every else (j,):
-            x[:, 5] = given[on, c] * sign[j]
-            sums[j, order[c]] = x.T @ x
-    return sums
+    from scipy.optimize import nnls
 
-
-def _unexplained(sums: Array) -> float:
-    """Logarithm of the unexplained fraction of a current's variance; NaN: too little motion."""
-    count, size = float(sums[6, 6]), np.sqrt(np.maximum(np.diag(sums)[:5], 1e-12))
-    if count * THINNED < ENOUGH:
+    if len(x) * THINNED < ENOUGH:
         return math.nan
-    products = sums[:5, :5] / np.outer(size, size)
-    root = np.linalg.cholesky(products + 1e-7 * np.eye(5))
-    weights, _ = nnls(root.T, np.linalg.solve(root, sums[:5, 5] / size))
-    left = sums[5, 5] - 2 * weights @ (sums[:5, 5] / size) + weights @ products @ weights
-    variance = sums[5, 5] / count - (sums[5, 6] / count) ** 2
-    return float(np.log(max(left / count, 1e-12) / max(variance, 1e-12)))
+    one = np.ones((len(x), 1))
+    columns = np.hstack([x, one, -one])
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-6)
+    left = nnls(columns, current)[1] ** 2 / len(x)
+    return math.log(max(left, 1e-12) / max(float(current.var()), 1e-12))
 
 
 def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
@@ -277,9 +260,8 @@ def check_torques(
     if not rows.any():
         return ()
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
-    rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
-    needed = low_pass(rates, dt, *momentum_terms(robot, trace.q, trace.qd))
-    given = -low_pass(rates, dt, nothing, nothing, np.ascontiguousarray(tau))
+    needed = low_pass(rate, dt, *momentum_terms(robot, trace.q, trace.qd))
+    given = lagged(rate, dt, tau)
     poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (200, n))
     most = STRENGTH * float(np.linalg.norm(np.abs(gravity_torque(robot, poses)).max(axis=0)))
     if most < 1e-6:

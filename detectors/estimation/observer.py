@@ -81,6 +81,12 @@ def low_pass(gain: ArrayLike, dt: Array, p: Array, beta: Array, tau: Array | Non
     return out
 
 
+def lagged(gain: ArrayLike, dt: Array, signal: Array) -> Array:
+    """A signal with the observer's lag, shape (T, c); arguments as for :func:`low_pass`."""
+    nothing = np.zeros(signal.shape)
+    return -low_pass(gain, dt, nothing, nothing, np.ascontiguousarray(signal))
+
+
 def observe(
     robot: RobotNumbers,
     t: ArrayLike,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import _kernel
-from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.detectors.estimation.observer import intervals, lagged
 from tauguard.traces.trace import Trace
 
 #: The dissertation's window [s].
@@ -126,10 +126,8 @@ def _total(trace: Trace, joints: list[int], alike: Array, gain: float) -> Array:
     if trace.truth is None:
         return np.zeros(len(trace.t))
     external = trace.truth.tau_ext[:, joints] / alike
-    nothing = np.zeros_like(external)
-    gains = np.full(external.shape[1], gain)
-    lagged = low_pass(gains, intervals(trace.t, len(trace.t)), nothing, nothing, external)
-    total: Array = np.abs(lagged).sum(axis=1)
+    late = lagged(gain, intervals(trace.t, len(trace.t)), external)
+    total: Array = np.abs(late).sum(axis=1)
     return total
 
 
