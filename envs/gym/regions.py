@@ -43,7 +43,7 @@ class RegionInfo:
         """Mean pressure of a flat surface on the round region [N/cm^2], for an unknown area.
 
         At depth d = F / k a plane touches a sphere in a circle of area pi radius d (Hertz'
-        geometry), so F / area = k / (pi radius). The edge of a robot presses harder.
+        geometry), so F / area = k / (pi radius). A robot's edge exerts a higher pressure.
         """
         return self.stiffness / (np.pi * self.radius) / 1e4
 
