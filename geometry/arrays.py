@@ -32,8 +32,9 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
 
 def all_finite(name: str, array: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ``array``, or raise the error of :func:`finite` if an entry is not finite."""
-    if not np.isfinite(array).all():
-        bad = np.argwhere(~np.isfinite(array))[0]
+    known = np.isfinite(array)  # once: another thread may write the array meanwhile
+    if not known.all():
+        bad = np.argwhere(~known)[0]
         where = f"row {bad[0]}" if array.ndim > 1 else f"index {bad[0]}"
         raise ValueError(f"{name}: {array[tuple(bad)]} in {where}; every entry must be finite")
     return array

@@ -51,3 +51,17 @@ def test_an_array_that_fits_is_not_copied():
 def test_the_first_bad_row_and_the_shape_are_named(value, said):
     with pytest.raises(ValueError, match=said):
         finite("x", value, (None, 2))
+
+
+def test_a_number_that_was_not_finite_when_it_was_looked_at_is_refused(monkeypatch):
+    """Another thread may mend the array between two looks; there must be only one."""
+    array, isfinite = np.array([1.0, np.nan]), np.isfinite
+
+    def mended_after(values):
+        known = isfinite(values)
+        array[:] = 1.0
+        return known
+
+    monkeypatch.setattr(np, "isfinite", mended_after)
+    with pytest.raises(ValueError, match=r"x: .* in index 1; every entry must be finite"):
+        finite("x", array, (2,))
