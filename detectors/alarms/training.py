@@ -15,8 +15,9 @@ import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
+from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.nominal import nominal_arm
-from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.calibration.recording import Load, Recording, pieces
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
@@ -33,6 +34,12 @@ HELD_OUT = 0.34
 
 #: Parts of the training motion that are left out in turn.
 FOLDS = 3
+
+#: Probability that the highest score of a log unlike the others is above the least threshold beside
+#: free motion. The highest of N + 1 logs is the new one with probability 1 / (N + 1). It exceeds
+#: the others' highest k times with 1 / k of that: scores have no scale, and on real arms it was up
+#: to 3.1 times. So the least threshold is 1 / (UNLIKE (N + 1)) times the highest score of N logs.
+UNLIKE = 0.05
 
 
 def held_out(
@@ -111,6 +118,46 @@ def train_and_score(
         fitted = detector.fit(traces, arm)
     alarm, scores = _with_rate(fitted, found, per_hour, CONFIRMATION)
     return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
+
+
+def train_beside(
+    detector: Detector,
+    struck: Sequence[Trace],
+    logs: Sequence[Trace],
+    arm: ArmModel,
+    per_hour: float,
+) -> tuple[CollisionAlarm, list[FreeScores]]:
+    """A learned alarm to run beside free motion, which already has plain thresholds.
+
+    The threshold comes from the logs alone: simulated noise differs. Each log is scored by a
+    detector and an arm model that were made without it. Few logs show little of the scores' tail,
+    so the threshold exceeds all these scores, the more the fewer logs there are (:data:`UNLIKE`).
+
+    Args:
+        detector: settings of a method.
+        struck: simulated traces with truth, with the arm's joint names.
+        logs: collision-free and without a load, of the arm.
+        arm: calibrated from all logs.
+        per_hour: accepted false alarms per hour of motion like the logs'.
+
+    Raises:
+        ValueError: traces that do not fit, or too little motion.
+    """
+    parts = pieces([Recording(log) for log in logs], 2)
+    calibrated, found = Subsets(arm, parts), list[FreeScores]()
+    for fold in range(min(FOLDS, len(parts))):
+        rest = [k for k in range(len(parts)) if k % FOLDS != fold]
+        try:
+            without = calibrated(rest)
+        except ValueError:  # too little motion is left without the fold
+            without = arm
+        fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
+        found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]], CONFIRMATION)
+    found = [replace(scores, floor=None) for scores in found]
+    alarm, scores = _with_rate(detector.fit([*struck, *logs], arm), found, per_hour, CONFIRMATION)
+    beyond = max(1.0, 1 / (UNLIKE * (len(scores) + 1)))
+    least = beyond * max(one.peak for one in scores)
+    return replace(alarm, threshold=max(alarm.threshold, least)), scores
 
 
 def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:

@@ -49,7 +49,7 @@ def twin_contacts(
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors import CollisionAlarm, make_detector, save_model
     from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
-    from tauguard.detectors.alarms.training import train_and_score
+    from tauguard.detectors.alarms.training import train_beside
     from tauguard.detectors.calibration.arm_file import load_arm
     from tauguard.detectors.faults.inputs import UsualInput
     from tauguard.detectors.samples import same_rate
@@ -72,8 +72,7 @@ def twin_contacts(
             )
     names, logs = arm.robot.joint_names, list(read.traces.values())
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]
-    # The threshold comes from the arm's logs alone: its noise is not that of the twin.
-    learned, scores = train_and_score(method, [*struck, *logs], arm, per_hour)
+    learned, scores = train_beside(method, struck, logs, arm, per_hour)
     quiet = FreeMotion().fit(logs, arm)
     both = BesideFreeMotion(quiet, learned)
     usual = UsualInput.of(logs, quiet.arm)
