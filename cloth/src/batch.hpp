@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "ends.hpp"
+#include "start_contact.hpp"
 
 #include "tauguard/geometry/lanes.hpp"
 
@@ -54,6 +55,11 @@ struct BatchKernels {
   // Gathers n queries into (n + width - 1) / width groups. Copies of the last query fill the last
   // group.
   void (*gather)(bool vf, const Ends& x, const std::int32_t* rows, int n, Group* groups);
+  // Whether the features of each of n queries (indices into the rows) touch at the start. The
+  // result is exact, or `unknown` where neither two vertices coincide nor a plane of two axes
+  // decides.
+  void (*at_start)(bool vf, const Ends& x, const std::int32_t* rows, const std::int32_t* queries,
+                   int n, AtStart* found);
   // Cuts the cubics of n queries (indices into the groups) once. Queries that need more cuts are
   // moved to the front of `queries`.
   Cut (*cut)(const Group* groups, std::int32_t* queries, int n, Piece* pieces);

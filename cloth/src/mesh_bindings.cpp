@@ -1,6 +1,7 @@
 // tauguard.cloth._mesh: continuous collision detection of a mesh, one call per frame.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
@@ -59,8 +60,9 @@ std::uint64_t key_of(const std::int32_t* pair) {
 
 // A mesh whose lock allows one call at a time, also with Python threads, signals and forks.
 struct Mesh {
-  Mesh(Faces faces, Ids ids, Table meets, int k, bool moving, int threads)
-      : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving}, threads) {}
+  Mesh(Faces faces, Ids ids, Table meets, int k, std::optional<bool> moving, int threads)
+      : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving.value_or(true)},
+            !moving.has_value(), threads) {}
   MeshCcd ccd;
   CallLock lock;
 };
@@ -264,8 +266,8 @@ NB_MODULE(_mesh, m) {
       "Python.";
   tauguard::geometry::bind_interrupts();
   nb::class_<Mesh>(m, "Mesh")
-      .def(nb::init<Faces, Ids, Table, int, bool, int>(), "faces"_a, "ids"_a, "meets"_a, "k"_a,
-           "moving"_a, "threads"_a)
+      .def(nb::init<Faces, Ids, Table, int, std::optional<bool>, int>(), "faces"_a, "ids"_a,
+           "meets"_a, "k"_a, "moving"_a.none(), "threads"_a)
       .def("edges",
            [](Mesh& mesh) {
              std::vector<std::int32_t> list;

@@ -15,6 +15,11 @@ namespace {
 constexpr std::size_t chunk_pairs = 512;  // number of leaf pairs in a chunk
 // A tree is rebuilt if the sum of its leaves' extents has grown by this factor since the build.
 constexpr double worn = 2;
+// Vertices that move by more than this fraction of an edge in a step get moving volumes, on
+// average. Below it the candidates that these save cost less than their second interval (measured
+// on meshes of 20,000 to 90,000 triangles: equal between 0.28 and 0.34).
+constexpr double fast = 0.28;
+constexpr std::size_t sampled = 1024;  // number of edges that the average is taken over
 // Largest number of leaf pairs of a step, per collision that the limit allows.
 constexpr std::size_t leaf_pairs = 8;
 
@@ -44,8 +49,9 @@ class Clock {
 
 }  // namespace
 
-MeshCcd::MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, int threads)
-    : groups_(std::move(groups)), volume_(volume), threads_(threads) {
+MeshCcd::MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, bool adaptive,
+                 int threads)
+    : groups_(std::move(groups)), volume_(volume), adaptive_(adaptive), threads_(threads) {
   axes_of(volume.k);  // throws if k is not supported
   topology_.set(std::move(faces));
 }
@@ -56,6 +62,7 @@ void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, dou
   stats_ = {};
   try {
     copy(x_t0, x_t1, n);
+    if (adaptive_) volume_.moving = is_fast();
     place(min_distance);
     descend(fresh, limit);
   } catch (...) {
@@ -80,6 +87,18 @@ void MeshCcd::copy(const double* x_t0, const double* x_t1, std::size_t n) {
   }
   if (std::isnan(wild))
     throw std::invalid_argument("x_t0, x_t1: changed during the call, an entry is not finite");
+}
+
+bool MeshCcd::is_fast() const {
+  const Ends x = ends();
+  const std::size_t n = topology_.edges.size(), stride = n / sampled + 1;
+  double way = 0, length = 0;
+  for (std::size_t i = 0; i < n; i += stride) {
+    const std::int32_t* v = topology_.edges.of(i);
+    way += geometry::largest(x(true, v[0]) - x(false, v[0]));
+    length += geometry::largest(x(false, v[1]) - x(false, v[0]));
+  }
+  return !(way < fast * length);
 }
 
 void MeshCcd::place(double min_distance) {

@@ -38,10 +38,13 @@ class MeshCcd {
  public:
   enum class Kind { vf, ee };
 
-  MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, int threads);
+  // adaptive: choose in each step whether the volumes are moving.
+  MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, bool adaptive,
+          int threads);
 
   const Topology& topology() const { return topology_; }
   int threads() const { return threads_; }
+  // The volume of the last prepare.
   VolumeKind volume() const { return volume_; }
 
   // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied. fresh: start
@@ -70,6 +73,7 @@ class MeshCcd {
     double value[Ends::line];
   };
   void copy(const double* x_t0, const double* x_t1, std::size_t n);
+  bool is_fast() const;
   void place(double min_distance);
   void descend(bool fresh, std::size_t limit);
   void forget();
@@ -80,6 +84,7 @@ class MeshCcd {
   Topology topology_;
   Groups groups_;
   VolumeKind volume_;
+  bool adaptive_;
   int threads_;
   Projection points_;
   FeatureTree vertices_, edges_, faces_;

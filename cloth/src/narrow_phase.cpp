@@ -86,6 +86,7 @@ struct Batch {
   Outcome outcome[3 * batch];
   double at[3 * batch];
   std::int32_t open[batch];
+  AtStart start[batch];     // of the open queries
   int count = 0, left = 0;  // number of pieces; number of undecided queries
 };
 
@@ -189,9 +190,12 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
     }
     while (i < b.count && b.pieces[i].query == query) ++i;
   }
+  kernels.at_start(vf, x, rows, b.open, b.left, b.start);
   for (int i = 0; i < b.left; ++i) {
     const std::int32_t query = b.open[i], *row = rows + 4 * query;
-    const bool touching = may_touch_at_start(b, query) && at_start(vf, x, row) == AtStart::touching;
+    if (b.start[i] == AtStart::unknown && may_touch_at_start(b, query))
+      b.start[i] = at_start(vf, x, row);
+    const bool touching = b.start[i] == AtStart::touching;
     stats.at_start += touching;
     toi[query] = touching ? 0 : later<vf>(b, query, x, row, stats);
   }

@@ -1,6 +1,6 @@
 // The features touch at a given time if the hull of their differences contains the origin
-// (exact.cpp). In most pairs that touch, one coordinate is the same in all four vertices. They are
-// decided in two dimensions by signs of differences or a filtered determinant, others in integers.
+// (exact.cpp). Pairs with the same coordinate in all four vertices are decided in two dimensions,
+// others in integers. Most pairs that touch do not come here: batch.cpp decides them.
 #include "start_contact.hpp"
 
 #include <array>
@@ -17,39 +17,22 @@ using geometry::FixedInt;
 
 // The corners in order around the hull; a corner is the first vertex relative to the second.
 constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
-// Neighbouring corners have a common vertex (the first of a row). Their cross product is that of
-// the two other vertices relative to the common one.
-constexpr int sides_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
-constexpr int sides_of_ee[][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
 
 // Decides a query whose vertices differ only in the coordinates i and j, by the sides of the hull's
-// edges on which the origin is. With u = 2^-53 the relative error of a product of two differences
-// is 3 u, and of the difference of two products 4 u = 2^-51. Faces on top of each other often share
-// lines along the axes, where differences are exactly zero. Branches in the loop would be
-// mispredicted.
+// edges on which the origin is.
 template <bool vf>
 AtStart in_plane(const double* const* p, int i, int j) {
   constexpr int corners = vf ? 3 : 4;
   bool left = false, right = false;
-  unsigned unsure = 0;
   for (int c = 0; c < corners; ++c) {
-    const int* side = vf ? sides_of_vf[c] : sides_of_ee[c];
-    const double *o = p[side[0]], *a = p[side[1]], *b = p[side[2]];
-    const double ax = a[i] - o[i], ay = a[j] - o[j], bx = b[i] - o[i], by = b[j] - o[j];
-    const double x = ax * by, y = ay * bx, size = std::fabs(x) + std::fabs(y), cross = x - y;
-    const bool plus = cross > 0x1p-51 * size, minus = cross < -0x1p-51 * size,
-               large = size > 1e-250, on = ((ax == 0) | (by == 0)) & ((ay == 0) | (bx == 0));
-    left |= plus & large;
-    right |= minus & large;
-    unsure |= unsigned(!(on | ((plus | minus) & large))) << c;
-  }
-  if (left & right) return AtStart::apart;
-  for (; unsure; unsure &= unsure - 1) {
-    const int c = __builtin_ctz(unsure), *side = vf ? sides_of_vf[c] : sides_of_ee[c];
     double flat[3][2];
-    for (int v = 0; v < 3; ++v) flat[v][0] = p[side[v]][i], flat[v][1] = p[side[v]][j];
+    for (int v = 0; v < 3; ++v) {
+      const double* of = p[sides_of<vf>[c][v]];
+      flat[v][0] = of[i];
+      flat[v][1] = of[j];
+    }
     const int sign = geometry::orient2d(flat[0], flat[1], flat[2]);
     left |= sign > 0;
     right |= sign < 0;

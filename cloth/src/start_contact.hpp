@@ -9,6 +9,14 @@ namespace tauguard::cloth {
 
 enum class AtStart { apart, touching, unknown };
 
+// Sides of the hull of the differences in a plane (start_contact.cpp). A side joins two corners
+// with a common vertex, the first of a row; the cross product of the corners is that of the two
+// other vertices relative to the common one.
+template <bool vf>
+inline constexpr int sides_of[3][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
+template <>
+inline constexpr int sides_of<false>[4][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
+
 // The result is `unknown` if no coordinate is the same in all vertices and the coordinates on one
 // axis span more than 116 bits. row: 4 vertices.
 AtStart at_start(bool vf, const Ends& x, const std::int32_t* row);

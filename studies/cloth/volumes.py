@@ -15,7 +15,7 @@ from tauguard.report import Row
 #: The kinds of volume; the "aabb" names repeat k = 6.
 KINDS = [name for name in VOLUMES if "aabb" not in name]
 #: The default of ``MeshCCD``.
-DEFAULT = "moving_k_dop14"
+DEFAULT = "auto"
 #: For at least this many triangles a time is the median of at most three repeats.
 LARGE = 300_000
 
