@@ -29,15 +29,13 @@ from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 #: Bounding volumes by name: k, and whether the volume is moving (two intervals per axis, one at
 #: each end of the step) or covers the whole step. ``None``: moving in steps in which vertices move
 #: by more than about a quarter of an edge on average.
-VOLUMES: dict[str, tuple[int, bool | None]] = (
-    {"auto": (14, None)}
-    | {
-        f"{prefix}k_dop{k}": (k, bool(prefix))
-        for prefix in ("", "moving_")
-        for k in (6, 14, 16, 18, 26)
-    }
-    | {"aabb": (6, False), "moving_aabb": (6, True)}
-)
+VOLUMES: dict[str, tuple[int, bool | None]] = {
+    "auto": (14, None),
+    **{f"k_dop{k}": (k, False) for k in (6, 14, 16, 18, 26)},
+    **{f"moving_k_dop{k}": (k, True) for k in (6, 14, 16, 18, 26)},
+    "aabb": (6, False),
+    "moving_aabb": (6, True),
+}
 
 #: Default limits of ``find`` and ``candidates``, for each kind of pair.
 MOST_COLLISIONS, MOST_CANDIDATES = 4_000_000, 50_000_000
