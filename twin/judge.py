@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
@@ -26,6 +27,9 @@ from tauguard.twin.signals import SLOW
 #: Lengths [s] of the classifier's windows, of the spans of peaks, of groups of windows that stay in
 #: one fold, and of the start of a log, in which the estimator settles.
 WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
+#: Windows this near repeat each other's motion, in these units [rad, rad/s], if they are apart by
+#: more than so long [s]. They stay in the group of the first, which lasts so long [s].
+ALIKE, PLACE, SPEED, APART, REPEATED = 2.0, 0.1, 0.2, 1.5, 1.0
 #: Least duration for an rms [s].
 SHORTEST = 1.0
 #: Fewest windows of each kind for an area under a curve.
@@ -97,10 +101,12 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     moves: list[Bools] = []
     still: list[Bools] = []
     others: list[Trace] = []
+    motions: list[Array] = []
     for k, trace in enumerate(traces):
         other = replace(trace, current=played(arm, drive, trace, seed + k))
         dt = float(np.median(np.diff(trace.t)))
         begin = int(BEGIN / dt)
+        motions.append(np.hstack([trace.q / PLACE, trace.qd / SPEED])[begin:])
         real.append(residual_of(arm, trace)[begin:])
         twin.append(residual_of(arm, other)[begin:])
         times.append(trace.t[begin:])
@@ -122,9 +128,9 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         _peaks(twin, stand, times) / _peaks(real, stand, times),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        _auc(real, twin, [~s for s in still], times, seed),
-        _auc(real, twin, still, times, seed),
-        _real_auc(real, [~s for s in still], times, seed),
+        told_apart(real, twin, [~s for s in still], times, motions, seed),
+        told_apart(real, twin, still, times, motions, seed),
+        _real_auc(real, [~s for s in still], times, motions, seed),
         tuple(real),
         tuple(twin),
         tuple(times),
@@ -159,10 +165,13 @@ def _peaks(values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array
 
 
 def _windows(
-    values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array]
-) -> tuple[Array, Array]:
+    values: Sequence[Array],
+    rows: Sequence[Bools],
+    times: Sequence[Array],
+    motions: Sequence[Array],
+) -> tuple[Array, NDArray[np.int64]]:
     """Features of each window, and the group of windows that it belongs to."""
-    table, groups = [], []
+    table, place, logs, starts = [], [], [], []
     for log, (value, wanted, t) in enumerate(zip(values, rows, times, strict=True)):
         for span in _spans(t, WINDOW):
             if wanted[span].all():
@@ -174,32 +183,72 @@ def _windows(
                         np.abs(steps).max(axis=0), np.abs(part).max(axis=0), part[-1] - part[0],
                     ])
                 )  # fmt: skip
-                groups.append(1000 * log + int((t[span.start] - t[0]) / GROUP))
-    return np.array(table), np.array(groups)
+                place.append(motions[log][span].mean(axis=0))
+                logs.append(log)
+                starts.append(t[span.start] - t[0])
+    return np.array(table), _groups(np.array(place), np.array(logs), np.array(starts))
 
 
-def _auc(
+def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.int64]:
+    """Groups of windows that stay in one fold: those of one motion, or of one part of a log.
+
+    Where a program repeats a cycle, a classifier would else be tested on places of the cycle that
+    it was trained on, and tell two draws of one process apart.
+    """
+    groups = np.empty(len(place), dtype=np.int64)
+    for i, here in enumerate(place):
+        far = np.linalg.norm(place - here, axis=1)
+        far[(logs == logs[i]) & (np.abs(starts - starts[i]) <= APART)] = np.inf
+        before = int(np.argmin(far[:i])) if i else 0
+        if i and far[before] < ALIKE:
+            groups[i] = groups[before]
+            continue
+        repeated = bool((far < ALIKE).any())
+        length = REPEATED if repeated else GROUP
+        groups[i] = 2 * (100_000 * logs[i] + int(starts[i] / length)) + repeated
+    return groups
+
+
+def told_apart(
     real: Sequence[Array],
     twin: Sequence[Array],
     rows: Sequence[Bools],
     times: Sequence[Array],
+    motions: Sequence[Array],
     seed: int,
 ) -> tuple[float, float]:
-    a, groups = _windows(real, rows, times)
-    b, _ = _windows(twin, rows, times)
+    """Areas of two classifiers that tell windows of two kinds of residual apart.
+
+    Args:
+        real: residuals of each log, shape (T, n).
+        twin: of the twin along the same motion.
+        rows: the samples that count, shape (T,).
+        times: of the samples [s].
+        motions: positions and velocities in units of :data:`PLACE` and :data:`SPEED`, (T, 2 n).
+        seed: of the classifiers.
+
+    Returns:
+        Of trees with boosting and of logistic regression; NaN with too few windows or groups.
+    """
+    a, groups = _windows(real, rows, times, motions)
+    b, _ = _windows(twin, rows, times, motions)
     labels = np.repeat([0, 1], [len(a), len(b)])
     return _area(np.concatenate([a, b]), labels, np.concatenate([groups, groups]), seed)
 
 
 def _real_auc(
-    real: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array], seed: int
+    real: Sequence[Array],
+    rows: Sequence[Bools],
+    times: Sequence[Array],
+    motions: Sequence[Array],
+    seed: int,
 ) -> tuple[float, float]:
     """Area for windows of like motion, whose labels alternate."""
-    a, groups = _windows(real, rows, times)
+    a, groups = _windows(real, rows, times, motions)
     return _area(a, np.arange(len(a), dtype=np.float64) % 2, groups, seed)
 
 
-def _area(table: Array, labels: Array, groups: Array, seed: int) -> tuple[float, float]:
+def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> tuple[float, float]:
     if len(table) < 2 * FEWEST or len(np.unique(groups)) < 5:
         return (float("nan"),) * 2
     models = (
