@@ -71,6 +71,13 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
                 f"watched in {seconds:.1f} s of this log"
             )
         notes += _prior_knowledge(alarm.detector, trace)
+        seconds, levels = alarm.detector.beyond(trace)
+        if levels:
+            text = ", ".join(f"{name} {level:.0f} N m" for name, level in levels.items())
+            notes.append(
+                f"for {seconds:.1f} s joints are faster, or accelerate harder, than the training "
+                f"logs show: a torque there has to exceed up to {text}, whatever the card says"
+            )
     return LogDetection(
         detection,
         np.asarray(arm.noise),

@@ -110,12 +110,13 @@ def _lines(card: ThresholdCard) -> list[str]:
         "motion, so a shorter impact has to be harder",
         _alarms(card),
     ]
-    speeds = zip(card.joints, card.fast, strict=True)
-    if shown := [f"{joint} {speed:.2g}" for joint, speed in speeds if 0 < speed < ANYWHERE]:
+    speeds = zip(card.joints, card.fast, card.twice, strict=True)
+    if shown := [(f"{j} {v:.2g}", f"{m:.0f}") for j, v, m in speeds if 0 < v < ANYWHERE]:
+        limits, torques = (", ".join(part) for part in zip(*shown, strict=True))
         lines.insert(
             -1,
-            f"moving: up to the speeds of the logs ({', '.join(shown)} rad/s); a joint that is "
-            "faster, or accelerates harder, has to be pushed harder",
+            f"moving: up to the speeds and accelerations of the logs ({limits} rad/s); at twice "
+            f"these from {torques} N m",
         )
     if card.left_out:
         names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)

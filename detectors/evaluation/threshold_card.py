@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from tauguard.arrays import Array
+from tauguard.detectors import _observer
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
 from tauguard.detectors.estimation.observer import LOG_GAIN
@@ -65,6 +66,7 @@ class ThresholdCard:
     """Contacts and collisions that ``moving`` and ``starting``, and :data:`UPPER` times these, as
     constant thresholds of the plain observer's residual would have raised in the logs."""
     fast: Array  #: speeds up to which ``moving`` holds, those of the logs [rad/s], shape (n,)
+    twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
 
     @property
     def franka(self) -> dict[str, list[float]]:
@@ -113,6 +115,9 @@ def threshold_card(
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
     starting = np.maximum(usual, sliding) + bound.start
+    own, slopes = np.stack([bound.fast, bound.hard]), bound.moving[:, 1:4].T
+    faster = (1 + _observer.REGIME_HARDER) * bound.friction + (own * slopes[:2]).sum(axis=0)
+    faster += bound.hard.max() * slopes[2]
     levels = {
         "standing": bound.rest / COUNTS,
         "slowly": bound.rest / COUNTS_SLOWLY,
@@ -136,6 +141,7 @@ def threshold_card(
         dict(detector.unseen),
         replayed(detector, traces, usual, starting),
         np.where(bound.shown, bound.fast, np.nan),
+        usual + TRACKED * faster,
     )
 
 

@@ -13,6 +13,12 @@ from tauguard.traces.trace import Trace
 #: A regime that all logs together show for less than this is unknown [s].
 SEEN = 3.0
 
+#: A speed or an acceleration counts as shown if it was exceeded for so long in all [s].
+SHORTLY = 0.5
+
+#: Time between two rows that are counted [s].
+EVERY = 0.04
+
 #: Regimes and the joints that no log shows in them.
 Unseen = tuple[tuple[str, tuple[str, ...]], ...]
 
@@ -45,6 +51,24 @@ def unseen(traces: Sequence[Trace]) -> Unseen:
         for name, seconds in shown.items()
     )
     return tuple((name, joints) for name, joints in lacking if joints)
+
+
+def exceeded(parts: Sequence[tuple[Array, Array]]) -> Array:
+    """The size that each column exceeds for :data:`SHORTLY` in all, shape (n,).
+
+    Args:
+        parts: times [s], shape (T,), and sizes, shape (T, n), of each log.
+    """
+    steps = [float(np.median(np.diff(t))) for t, _ in parts]
+    strides = [max(1, round(EVERY / dt)) for dt in steps]
+    rows = [sizes[::k] for (_, sizes), k in zip(parts, strides, strict=True)]
+    each = [k * dt for k, dt in zip(strides, steps, strict=True)]
+    sizes, seconds = np.concatenate(rows), np.repeat(each, [len(r) for r in rows])
+    order = np.argsort(-sizes, axis=0, kind="stable")
+    passed = np.cumsum(seconds[order], axis=0)  # for so long a column had this size or a larger one
+    count = (passed <= SHORTLY * (1 + 1e-6)).sum(axis=0)
+    ranked = np.take_along_axis(sizes, order, axis=0)
+    return np.asarray(np.take_along_axis(ranked, np.maximum(count - 1, 0)[None], axis=0)[0])
 
 
 def unseen_text(lacking: Unseen, joints: int) -> str:

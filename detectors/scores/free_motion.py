@@ -44,7 +44,13 @@ from tauguard.detectors.features.free_bound import (
     upper_quantile,
 )
 from tauguard.detectors.features.front_end import NativeStream
-from tauguard.detectors.features.motion_regimes import Unseen, unseen
+from tauguard.detectors.features.motion_regimes import (
+    EVERY,
+    SHORTLY,
+    Unseen,
+    exceeded,
+    unseen,
+)
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_joints
 from tauguard.traces.trace import Trace
@@ -58,12 +64,11 @@ QUANTILE = 0.99
 #: Weight of the prior in seconds of motion at these speeds and accelerations [rad/s, ...].
 WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
 
-#: Time between two rows of the regression [s].
-EVERY = 0.04
+#: The least speed and acceleration that count as shown in any case [rad/s, rad/s^2].
+LEAST_SHOWN = 0.05
 
-#: A speed or an acceleration counts as shown if it was exceeded for so long in all [s]; the least
-#: that does in any case [rad/s, rad/s^2].
-SHORTLY, LEAST_SHOWN = 0.5, 0.05
+#: Motion counts as beyond the logs where it adds this to the bound, in friction levels.
+FURTHER = 0.25
 
 #: Largest number of calibrations with held-out logs.
 FOLDS = 5
@@ -140,6 +145,22 @@ class FittedFreeMotion(Frozen):
         np.add.at(blind, after, -1)
         steps = np.diff(trace.t, append=trace.t[-1])
         return float(steps[np.cumsum(blind)[:-1] > 0].sum()), names
+
+    def beyond(self, trace: Trace) -> tuple[float, dict[str, float]]:
+        """Seconds in which joints are faster than the logs show, or accelerate harder, and their
+        names with the bound that nine tenths of these seconds stay below [N m]."""
+        judged, bound = self.judge(trace), self.bound
+        times = np.abs(judged.qd) / bound.fast - 1, judged.qdd / bound.hard - 1
+        more = np.maximum(times[0], 0) + _observer.REGIME_HARDER * np.maximum(times[1], 0)
+        rows = ~judged.rest & bound.shown & (more > FURTHER)
+        rows &= (judged.t - judged.t[0] > self.settle)[:, None]
+        rows &= rows.sum(axis=0) * trace.dt > SHORTLY
+        found = {
+            name: float(np.quantile(judged.bound[rows[:, j], j], 0.9))
+            for j, name in enumerate(trace.joint_names)
+            if rows[:, j].any()
+        }
+        return float(rows.any(axis=1).sum() * trace.dt), found
 
     def judge(self, trace: Trace) -> Judged:
         """Ratios, bounds and residuals of a trace.
@@ -276,22 +297,11 @@ def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
     """The prior bounds moved by what left-out logs show."""
     quantile = _quantiles(judged, prior.friction)
     bound = replace(prior, noise=_noise(judged, prior.noise), quantile=quantile)
-    fast, hard = (_shown(judged, name) for name in ("qd", "qdd"))
+    fast, hard = (
+        np.maximum(exceeded([(p.t, np.abs(getattr(p, name))) for p in judged]), LEAST_SHOWN)
+        for name in ("qd", "qdd")
+    )
     return replace(bound, scale=_scale(prior, bound, judged), fast=fast, hard=hard)
-
-
-def _shown(judged: Sequence[Judged], name: str) -> Array:
-    """The size of qd or qdd that each joint exceeds for :data:`SHORTLY` in all, shape (n,)."""
-    rows = [np.abs(getattr(p, name))[:: _stride(p)] for p in judged]
-    each = [_stride(p) * float(np.median(np.diff(p.t))) for p in judged]
-    sizes, seconds = np.concatenate(rows), np.repeat(each, [len(r) for r in rows])
-    order = np.argsort(-sizes, axis=0, kind="stable")
-    passed = np.cumsum(seconds[order], axis=0)  # for so long a joint had this size or a larger one
-    count = (passed <= SHORTLY * (1 + 1e-6)).sum(axis=0)
-    ranked = np.take_along_axis(sizes, order, axis=0)
-    last = np.take_along_axis(ranked, np.maximum(count - 1, 0)[None], axis=0)[0]
-    shown: Array = np.maximum(last, LEAST_SHOWN)
-    return shown
 
 
 def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:

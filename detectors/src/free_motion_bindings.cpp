@@ -60,6 +60,7 @@ void bind_free_motion(nb::module_& m) {
   m.attr("REGIME_SLOW") = slow;
   m.attr("REGIME_CREEP") = Regimes::creep;
   m.attr("REGIME_SETTLES") = Regimes::settles;
+  m.attr("REGIME_HARDER") = Regimes::harder;
   m.attr("REGIME_FULL_SPEED") = Regimes::full_speed;
 }
 

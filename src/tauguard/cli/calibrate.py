@@ -63,6 +63,8 @@ def command(
         reading: how logs are read.
         json: write the results here as JSON.
     """
+    import numpy as np
+
     from tauguard.cli.free_logs import explain, free_logs, hold_to
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown
@@ -72,6 +74,7 @@ def command(
     from tauguard.detectors.calibration.identification import filtered_logs, identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.detectors.evaluation.acceptance import check_held_out
+    from tauguard.detectors.features.motion_regimes import exceeded
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
@@ -107,6 +110,7 @@ def command(
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=names)
     result = summary(names, found, held, target) | {"scale": given.source}
+    result["speed_rad_s"] = exceeded([(t.t, np.abs(t.qd)) for t in traces]).tolist()
     report(result, found)
     if json is not None:
         write_json(json, result)
@@ -148,6 +152,7 @@ def report(result: dict[str, Any], found: Identified) -> None:
                 "mass kg": f"{result['mass'][k]:.2f}",
                 "rotor kg m2": f"{result['armature'][k]:.3f}",
                 "rms N m": f"{result['rms_nm'][k]:.2f}",
+                "up to rad/s": f"{result['speed_rad_s'][k]:.2f}",
             }
         )
     print(table(rows))

@@ -14,7 +14,8 @@ from tauguard.detectors.evaluation.cross_validation import CrossValidation, judg
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
-from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion, Judged, _shown
+from tauguard.detectors.features.motion_regimes import exceeded
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 from tests.oracles.added_contact import Added, add_contact
 
@@ -52,20 +53,52 @@ def test_speeds_that_training_exceeds_for_half_a_second_count_as_shown(fitted):
 
 
 def ramp(dt, seconds=10.0):
-    """Speeds that rise by 1 rad/s a second."""
+    """Speeds that rise by 1 and 2 rad/s a second."""
     t = dt * np.arange(round(seconds / dt))
-    same = np.column_stack([t, t])
-    return Judged(t, same, 2 * same, same, same, same, same > 0)
+    return t, np.column_stack([t, 2 * t])
 
 
 @pytest.mark.parametrize("dt", [1e-3, 2e-3, 8e-3, 0.01, 0.02, 0.03, 0.05, 0.1])
 def test_half_a_second_is_meant_at_every_rate(dt):
-    assert _shown([ramp(dt)], "qd") == pytest.approx(9.5, abs=0.06)
-    assert _shown([ramp(dt)], "qdd") == pytest.approx(19, abs=0.12)
-    assert _shown([ramp(dt), ramp(0.01)], "qd") == pytest.approx(9.75, abs=0.08)
+    assert exceeded([ramp(dt)]) == pytest.approx([9.5, 19], abs=0.12)
+    assert exceeded([ramp(dt), ramp(0.01)])[0] == pytest.approx(9.75, abs=0.08)
     if dt in (1e-3, 8e-3, 0.01):  # twelve rows of 40 ms
-        rows = ramp(dt).qd[:: round(0.04 / dt)]
-        assert (_shown([ramp(dt)], "qd") == rows[-12]).all()
+        assert (exceeded([ramp(dt)]) == ramp(dt)[1][:: round(0.04 / dt)][-12]).all()
+
+
+def test_motion_beyond_the_logs_is_told_with_the_torque_that_it_hides(fitted):
+    trace = record(7)
+    assert fitted.beyond(trace) == (0.0, {})
+    slow = replace(fitted, bound=replace(fitted.bound, fast=fitted.bound.fast * [0.4, 1.0, 1.0]))
+    seconds, levels = slow.beyond(trace)
+    judged = slow.judge(trace)
+    over = (np.abs(trace.qd[:, 0]) > 1.25 * slow.bound.fast[0]) & (trace.t > 0.5)
+    assert list(levels) == ["a"]
+    assert seconds == pytest.approx(0.01 * over.sum(), rel=0.2)
+    assert (judged.bound[over, 0] < levels["a"]).mean() > 0.85
+    assert levels["a"] > 1.2 * np.quantile(fitted.judge(trace).bound[over, 0], 0.9)
+
+
+def test_what_the_card_says_at_twice_the_speed_is_found_there(fitted):
+    """Trained on slow motion, judged on motion that is up to twice as fast."""
+    arm, load = ArmModel(nominal(), GAIN), Load()
+    slow = FreeMotion().fit([record(1, seconds=30.0)], arm).carrying(load)
+    bound = replace(slow.bound, fast=0.6 * slow.bound.fast, hard=0.6 * slow.bound.hard)
+    slow = replace(slow, bound=bound)
+    card = threshold_card(slow, [record(1, seconds=30.0)], CrossValidation((), (), ()))
+    assert (card.twice > card.moving + 1.5 * bound.friction).all()
+    trace = record(7)
+    beyond = (np.abs(trace.qd) > bound.fast) & (np.abs(trace.qd) < 2 * bound.fast)
+    for joint in range(3):
+        places = [k for k in range(200, len(trace.t) - 60, 20) if beyond[k : k + 30, joint].all()]
+        assert len(places) > 2
+        torque = np.zeros(3)
+        torque[joint] = card.twice[joint]
+        found = 0
+        for k in places:
+            struck = add_contact(trace, GAIN, Added(trace.t[k], 0.3, tuple(torque), "impact"))
+            found += (slow.scores(struck)[k : k + 35] > 1).any()
+        assert found >= 0.9 * len(places)
 
 
 @pytest.mark.parametrize(("field", "part"), [("fast", 1.0), ("hard", 0.5)])
@@ -301,8 +334,8 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert set(card.unseen["moving alone"]) == {"a", "b", "c"}
     fast = np.array([0.51, np.nan, 2.0])
     assert (card.fast == fitted.bound.fast).all()
-    said = " ".join(text(replace(card, fast=fast)).split())
-    assert "the speeds of the logs (a 0.51, c 2 rad/s); a joint" in said
+    said = " ".join(text(replace(card, fast=fast, twice=np.array([7.4, 8.0, 9.6]))).split())
+    assert "of the logs (a 0.51, c 2 rad/s); at twice these from 7, 10 N m" in said
     assert card.franka == {}  # libfranka speaks to arms of seven joints
     seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
