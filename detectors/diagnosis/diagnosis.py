@@ -181,10 +181,11 @@ class Diagnoser:
             robot, self.surface, after.q[peak], after.residual[peak], self._noise(after)[peak]
         )
         force, point = at_peak.weighted(belief.probability).on(link)
-        sized = severity(robot, self.surface, whole, belief, len(rows), self.trust)
         if self.at_tool:
             sized, force = tool_severity(self.arm, whole, self.surface)
             point = link_poses(robot, after.q[peak]).origin[-1]
+        else:
+            sized = severity(robot, self.surface, whole, belief, len(rows), self.trust)
         kinds = signs(after, force, self._velocity(link, point, after, peak))
         fractions = kinds.probabilities(self.load_known)
         return Diagnosis(

@@ -151,9 +151,10 @@ class Interval90:
         return self.high <= IDENTIFIABLE * self.low
 
     def text(self, unit: str) -> str:
-        """``120 N [90, 180]``; without the median if the size is not identifiable."""
-        ends = f"[{two_digits(self.low)}, {two_digits(self.high)}]"
-        return f"{two_digits(self.value)} {unit} {ends}" if self.identifiable else f"{ends} {unit}"
+        """``120 N [90, 180]``, or ``at least 7 N`` if the size is not identifiable."""
+        if not self.identifiable:
+            return f"at least {two_digits(self.low)} {unit}"
+        return f"{two_digits(self.value)} {unit} [{two_digits(self.low)}, {two_digits(self.high)}]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +216,8 @@ class Severity:
     def text(self, kind: str, names: Sequence[str]) -> str:
         """The severity in a few words, with the impulse of an impact.
 
+        If the force has no useful upper bound, the joint torque, which is measured, comes first.
+
         Args:
             kind: kind of the contact.
             names: names of the joints.
@@ -224,7 +227,7 @@ class Severity:
             force = f"impulse {self.impulse.text('N s')}, {force}"
         if self.peak.identifiable:
             return force
-        return f"{force} (not identifiable; {self.torque.text(names)})"
+        return f"{self.torque.text(names)}, {force} (more if it acts where joints hardly feel it)"
 
 
 def severity(
