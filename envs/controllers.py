@@ -9,7 +9,8 @@ from tauguard.models import Friction
 
 __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "friction_torque"]
 
-#: Scale of the speed over which the Coulomb friction changes its sign [rad/s].
+#: Scale of the speed over which the Coulomb friction changes its sign [rad/s]; as of the native
+#: servo.
 SMOOTHING = 0.02
 #: A direction is nearly singular if its mobility (an eigenvalue of J M^-1 J^T) is below this
 #: fraction of the largest one. The tool's force is reduced in such directions only, so that torques

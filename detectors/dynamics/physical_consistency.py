@@ -64,12 +64,6 @@ _UNIT = np.zeros((10, 4, 4))
 _UNIT[np.arange(10), _LOWER[0], _LOWER[1]] = 1.0
 
 
-def is_physically_consistent(inertial: Array) -> bool:
-    """Whether every link's numbers, shape (..., 10), are those of a body of positive density."""
-    flat = np.asarray(inertial, dtype=np.float64).reshape(-1, 10)
-    return all(float(np.linalg.eigvalsh(pseudo_inertia(row))[0]) > 0 for row in flat)
-
-
 def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
     """Log-Cholesky coordinates of ten numbers, shape (10,).
 

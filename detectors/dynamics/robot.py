@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.physical_consistency import inertial_numbers, pseudo_inertia
+from tauguard.detectors.frozen import Frozen
 
 #: Inertial numbers per link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
 INERTIAL = 10
 
 
 @dataclass(frozen=True, eq=False)
-class RobotNumbers:
+class RobotNumbers(Frozen):
     """A fixed-base tree of revolute and prismatic joints; link i moves with joint i.
 
     All arrays are read-only. The frame of link i is Pinocchio's joint frame.
@@ -86,13 +87,6 @@ class RobotNumbers:
             self.armature,
             self.gravity,
         )
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: the native form is built again on demand."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
 
     def __deepcopy__(self, memo: object) -> RobotNumbers:
         """Itself: it cannot change."""

@@ -253,9 +253,3 @@ class Estimator:
             raise ValueError(
                 f"q, qd, current: expected float64 arrays of shape ({joints},)"
             ) from None
-
-    def tracked(self) -> Array:
-        """The unknowns now, shape (4 + 3 n,): payload mass and moment, then three a joint."""
-        out = np.empty(PAYLOAD + PER_JOINT * self.arm.robot.joints)
-        self.native.theta(out)
-        return out

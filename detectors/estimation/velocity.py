@@ -62,28 +62,27 @@ class SensorNoise:
 
         return cls(level("q", 1e-9), level("qd", 1e-6))
 
-    def fusion_gains(self, dt: float, agility: float = AGILITY) -> list[float]:
+    def fusion_gains(self, dt: float) -> list[float]:
         """Steady Kalman gains, six a joint: of q, qd and qdd by each of the two innovations.
 
         Args:
             dt: sample interval [s].
-            agility: see :data:`AGILITY`.
         """
         return [
             gain
             for position, velocity in zip(self.position, self.velocity, strict=True)
-            for gain in _joint_gains(float(position), float(velocity), dt, agility)
+            for gain in _joint_gains(float(position), float(velocity), dt)
         ]
 
 
 @lru_cache(maxsize=1024)  # a Riccati equation, asked again at every reset of a detector
-def _joint_gains(position: float, velocity: float, dt: float, agility: float) -> tuple[float, ...]:
+def _joint_gains(position: float, velocity: float, dt: float) -> tuple[float, ...]:
     """The six gains of a joint whose encoder and tachometer have this noise [rad], [rad/s]."""
     from scipy.linalg import solve_discrete_are
 
     move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
     see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
-    push = agility * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
+    push = AGILITY * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
     # In units of the noise, so that the equation is well scaled.
     scale = np.diag([1 / position, 1 / velocity, dt / velocity])
     back = np.linalg.inv(scale)

@@ -33,7 +33,6 @@ class Network(Frozen):
         *,
         seed: int = 0,
         epochs: int = 60,
-        decay: float = 1e-4,
     ) -> Network:
         """Least squares by Adam; a tenth of the rows decides when to stop.
 
@@ -43,7 +42,6 @@ class Network(Frozen):
             hidden: widths of the hidden layers.
             seed: seed of the start, the order and the held-out tenth.
             epochs: at most.
-            decay: weight of the squared weights.
         """
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
@@ -53,7 +51,6 @@ class Network(Frozen):
         mean, spread = outputs.mean(axis=0), np.maximum(outputs.std(axis=0), 1e-9)
         model = MLPRegressor(
             hidden_layer_sizes=tuple(hidden),
-            alpha=decay,
             max_iter=epochs,
             early_stopping=True,
             n_iter_no_change=6,

@@ -115,13 +115,6 @@ void bind_estimator(nb::module_& m) {
           "persistence"_a, "noise"_a, "clip"_a, "every"_a, "inflation"_a, "transition"_a,
           "started"_a, "weighted"_a, "fusion"_a, "plain_gain"_a, "sampled"_a)
       .def_prop_ro("started", &Estimator::started)
-      .def(
-          "theta",
-          [](const Estimator& estimator, Out1 out) {
-            require(out.shape(0) == estimator.unknowns(), "theta: wrong length");
-            std::copy(estimator.theta().begin(), estimator.theta().end(), out.data());
-          },
-          "out"_a.noconvert())
       .def("reset", &Estimator::reset)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "residual"_a.noconvert(),
            "unexplained"_a.noconvert(), "motion"_a.noconvert(), "plain"_a.noconvert(),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors import find_alarms
-from tauguard.envs.episodes.labels import Wrenches, collisions
+from tauguard.envs.episodes.labels import Wrenches, collisions, homogeneous
 from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.traces import TARGETS, Detection, Trace, Truth, write_mcap
 
@@ -148,8 +148,6 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def _truth(
         self, t: Array, tau: Array, contact: NDArray[np.void], region: NDArray[np.void]
     ) -> Truth:
-        from scipy.spatial.transform import Rotation
-
         compiled = self._arm.compiled
         links = len(compiled.scene.link_bodies)
         wrenches = Wrenches.empty(len(t), links)
@@ -157,11 +155,6 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         link = contact["link"][touched].astype(int) - 1
         wrenches.force[touched, link] = contact["force"][touched]
         wrenches.point[touched, link] = contact["point"][touched]
-        poses = np.tile(np.eye(4), (*region.shape[:2], 1, 1))
-        if region.size:
-            turns = Rotation.from_quat(region["quat_wxyz"].reshape(-1, 4), scalar_first=True)
-            poses[:, :, :3, :3] = turns.as_matrix().reshape(*region.shape[:2], 3, 3)
-        poses[:, :, :3, 3] = region["position"]
         return Truth(
             tau_ext=tau,
             contact_force=contact["net_force"].copy(),
@@ -171,5 +164,5 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             contact_point=contact["point"].copy(),
             contact_vector=contact["force"].copy(),
             obstacle_names=tuple(r.name for r in compiled.regions),
-            obstacle_poses=poses,
+            obstacle_poses=homogeneous(region["position"], region["quat_wxyz"]),
         )

@@ -10,6 +10,7 @@ from gymnasium.utils import RecordConstructorArgs
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.envs.gym.batch import Override
+from tauguard.envs.gym.placing import carried
 from tauguard.envs.gym.settings import positive
 
 #: Largest distance that is computed [m].
@@ -128,7 +129,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         for joint, dof, link in zip(
             compiled.ids(), compiled.scene.dof_adr, compiled.scene.link_bodies, strict=True
         ):
-            if link > body or not _same_arm(model, int(link), body):
+            if not carried(model, body, int(link)):
                 continue
             axis, rate = data.xaxis[joint], data.qvel[dof]
             slide = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
@@ -140,10 +141,3 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         data, dofs = self._arm.batch.datas[0], self._arm.compiled.scene.dof_adr
         stopping = float((np.abs(data.qvel[dofs]) / self._deceleration).max())
         return approach * (reaction + stopping) + speed * (reaction + stopping / 2) + fixed
-
-
-def _same_arm(model: mujoco.MjModel, link: int, body: int) -> bool:
-    """Whether ``body`` is carried by ``link``."""
-    while body > link:
-        body = int(model.body_parentid[body])
-    return body == link

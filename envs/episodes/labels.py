@@ -40,6 +40,21 @@ class Wrenches:
         return np.flatnonzero(pushed)
 
 
+def homogeneous(positions: Array, quaternions: Array) -> Array:
+    """Matrices (T, k, 4, 4) of positions, shape (T, k, 3), and quaternions (wxyz), (T, k, 4)."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    out = np.zeros((*w.shape, 4, 4))
+    out[..., :3, :3] = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    out[..., :3, 3] = positions
+    out[..., 3, 3] = 1
+    return out
+
+
 def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
     """``tau_ext``: the sum of J^T w over the links [N m], shape (T, n).
 

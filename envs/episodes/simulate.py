@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
+from tauguard.envs.controllers import friction_torque
 from tauguard.envs.episodes import labels
 from tauguard.envs.episodes.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.episodes.loop import AlongMotion, Rollout, SimulationLoop
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
 
 #: Range of drawn poses around the CURA6-like arm's home [rad].
 OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)
-#: Scale of the speed over which the compensated Coulomb friction changes its sign [rad/s]; equal to
-#: that of the native servo.
-FRICTION_SMOOTHING = 0.02
 #: Least height of links above the floor, and least distance of links from the base's axis [m].
 CLEARANCE = (0.15, 0.22)
 
@@ -154,7 +152,9 @@ class Simulation:
         )
         self.robot = RobotNumbers.from_pin(pin_model(self.scene.arm_model))
         needed = inverse_dynamics(self.robot, self.motion.q, self.motion.qd, self.motion.qdd)
-        self._feed_forward = needed + self._known_friction()
+        # The friction that the servo compensates.
+        known = friction_torque(self.nominal.friction, self.motion.qd)
+        self._feed_forward = needed + self.scene.facts.compensation * known
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
         self._rollout = self.loop.room_for(len(self.motion.t))
@@ -190,15 +190,6 @@ class Simulation:
             row = start
         self._follow(row, len(payload))
         return self._trace(self._rollout, payload, injected)
-
-    def _known_friction(self) -> Array:
-        """The torque by which the servo compensates the nominal friction [N m], (T, n)."""
-        friction, fraction = self.nominal.friction, self.scene.facts.compensation
-        if friction is None or fraction == 0:
-            return np.zeros_like(self.motion.qd)
-        qd = self.motion.qd
-        level = friction.coulomb * np.tanh(qd / FRICTION_SMOOTHING)
-        return np.asarray(fraction * (level + friction.viscous * qd))
 
     def _row(self, time: float) -> int:
         return round(time / self.episode.timestep)
@@ -296,7 +287,7 @@ def _truth(
         contact_point=where,
         contact_vector=vector,
         obstacle_names=tuple(scene.obstacle_names),
-        obstacle_poses=_matrices(rollout.poses),
+        obstacle_poses=labels.homogeneous(rollout.poses[..., :3], rollout.poses[..., 3:]),
     )
 
 
@@ -316,30 +307,6 @@ def _rows_of(values: Trace | Truth, rows: NDArray[np.intp], count: int) -> dict[
         for name, value in vars(values).items()
         if isinstance(value, np.ndarray) and len(value) == count
     }
-
-
-def _matrices(poses: Array) -> Array:
-    """Positions and quaternions (wxyz), shape (T, k, 7), as homogeneous matrices (T, k, 4, 4)."""
-    w, x, y, z = np.moveaxis(poses[..., 3:], -1, 0)
-    out = np.zeros((*poses.shape[:2], 4, 4))
-    out[..., 0, 0], out[..., 0, 1], out[..., 0, 2] = (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - w * z),
-        2 * (x * z + w * y),
-    )
-    out[..., 1, 0], out[..., 1, 1], out[..., 1, 2] = (
-        2 * (x * y + w * z),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - w * x),
-    )
-    out[..., 2, 0], out[..., 2, 1], out[..., 2, 2] = (
-        2 * (x * z - w * y),
-        2 * (y * z + w * x),
-        1 - 2 * (x * x + y * y),
-    )
-    out[..., :3, 3] = poses[..., :3]
-    out[..., 3, 3] = 1
-    return out
 
 
 def simulate(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
-from tauguard.envs.gym.placing import Layout, Usual, blocked_ground
+from tauguard.envs.gym.placing import Layout, Usual, blocked_ground, carried
 from tauguard.envs.gym.randomization import check_names
 from tauguard.envs.gym.regions import RegionInfo, fastest, regions_of
 from tauguard.envs.gym.second_arm import APART, add_second_arm, both_drives
@@ -244,17 +244,10 @@ def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
     for a in range(arms):
         body = int(scene.link_bodies[(a + 1) * each - 1])
         names = (scene.facts.tool,)
-        sites = [s for s in range(model.nsite) if _carried(model, int(model.site_bodyid[s]), body)]
+        sites = [s for s in range(model.nsite) if carried(model, int(model.site_bodyid[s]), body)]
         named = [s for s in sites if model.site(s).name.removeprefix("arm2_") in names]
         found.append((named[0] if named else -1, body, a * each))
     return tuple(found)
-
-
-def _carried(model: mujoco.MjModel, body: int, by: int) -> bool:
-    """Whether ``body`` is ``by`` or something that it carries."""
-    while body > by:
-        body = int(model.body_parentid[body])
-    return body == by
 
 
 def tool_position(compiled: CompiledScene, data: mujoco.MjData, arm: int = 0) -> Array:

@@ -238,10 +238,9 @@ def things_around(scene: Scene, model: mujoco.MjModel) -> list[int]:
     """The geoms of the table and of objects. People do not collide with them in the simulation."""
     spec = scene.spec
     around = [model.geom("table").id] if spec.table is not None else []
-    bodies = {model.body(obj.name).id for obj in spec.objects if obj.touchable}
-    return around + [
-        g for g in range(model.ngeom) if _within(model, int(model.geom_bodyid[g]), bodies)
-    ]
+    bodies = [model.body(obj.name).id for obj in spec.objects if obj.touchable]
+    on = enumerate(model.geom_bodyid.tolist())
+    return around + [g for g, body in on if any(carried(model, body, by) for by in bodies)]
 
 
 def blocked_ground(scene: Scene) -> Array:
@@ -293,7 +292,8 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
     return str(model.body(body).name if body else model.geom(geom).name)
 
 
-def _within(model: mujoco.MjModel, body: int, of: set[int]) -> bool:
-    while body and body not in of:
+def carried(model: mujoco.MjModel, body: int, by: int) -> bool:
+    """Whether ``body`` is ``by`` or is carried by it."""
+    while body > by:
         body = int(model.body_parentid[body])
-    return body in of
+    return body == by

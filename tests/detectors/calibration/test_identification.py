@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from oracles.physical_bodies import is_physically_consistent
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
 from tauguard.detectors.calibration.arm_file import load_arm, save_arm
 from tauguard.detectors.calibration.assessment import (
@@ -18,7 +19,6 @@ from tauguard.detectors.calibration.assessment import (
 )
 from tauguard.detectors.calibration.identification import RATE, identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
-from tauguard.detectors.dynamics.physical_consistency import is_physically_consistent
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tests.detectors.synthetic_arm import (

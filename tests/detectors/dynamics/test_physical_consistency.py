@@ -5,11 +5,11 @@ import pinocchio as pin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from oracles.physical_bodies import is_physically_consistent
 from tauguard.detectors.dynamics.physical_consistency import (
     coordinates,
     from_coordinates,
     inertial_numbers,
-    is_physically_consistent,
     pseudo_inertia,
     solve_physically_consistent,
 )
