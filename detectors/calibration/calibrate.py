@@ -83,7 +83,8 @@ def calibrate(
 
     Args:
         arm: what is believed; its friction model, if any, gives only the columns.
-        traces: motion of at least 20 s in all; rows of known collisions are left out.
+        traces: motion of at least 4 s in all (200 rows of 0.02 s), better minutes; rows of known
+            collisions are left out.
         friction: columns to use (default: those of ``arm.friction``, or the default model).
         priors: how far to trust what is believed.
         rate: rate of the filter that residual and columns pass through [1/s].
@@ -104,7 +105,9 @@ def calibrate(
             raise ValueError(f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}")
     data = [_columns(trace, arm, model, rate) for trace in kept]
     if sum(len(one.current) for one in data) < 200:
-        raise ValueError("calibrate: fewer than 200 collision-free rows; give 20 s of motion")
+        raise ValueError(
+            "calibrate: fewer than 200 collision-free rows; give 4 s of motion or more"
+        )
     system, solution, level = _solved(data, robot, model, priors, rounds)
     inertial = solution[: INERTIAL * robot.joints].reshape(-1, INERTIAL)
     weights: Array = solution[system.friction : system.gain].reshape(robot.joints, -1)

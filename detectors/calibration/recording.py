@@ -17,8 +17,8 @@ MOVING = 0.01
 SHIFTED = 0.01
 #: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
-#: Least motion for an identification [s].
-LEAST = 10.0
+#: Least motion for an identification, and least length of logs of an arm that only stands [s].
+LEAST, LEAST_STANDING = 10.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -141,16 +141,18 @@ def laden(arm: ArmModel, load: Load | None) -> tuple[ArmModel, LoadDeviation]:
     return replace(arm, robot=robot), LoadDeviation(0.02 * load.mass, moment)
 
 
-def pieces(recordings: Sequence[Recording], count: int) -> list[Recording]:
+def pieces(
+    recordings: Sequence[Recording], count: int, shortest: float = SHORTEST
+) -> list[Recording]:
     """Cut recordings until there are at least ``count``.
 
-    The longest are halved first, none below 8 s.
+    The longest are halved first, none below ``shortest`` [s].
     """
     parts = list(recordings)
     while len(parts) < count:
         k = int(np.argmax([r.trace.t[-1] - r.trace.t[0] for r in parts]))
         trace = parts[k].trace
-        if trace.t[-1] - trace.t[0] < 2 * SHORTEST:
+        if trace.t[-1] - trace.t[0] < 2 * shortest:
             break
         middle = len(trace.t) // 2
         halves = [cut(trace, slice(None, middle)), cut(trace, slice(middle, None))]

@@ -139,7 +139,9 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
     whole = [name for name, r in parts.items() if moves(r.trace)]
     owner = {name: name for name in parts}
     if len(whole) == 1:
-        cuts = pieces([parts.pop(whole[0])], FOLDS)
+        only = [parts.pop(whole[0])]
+        cuts = only if parts else pieces(only, 2, 0.0)  # at least one other part
+        cuts = pieces(cuts, FOLDS)
         parts |= {f"{whole[0]} {k}": part for k, part in enumerate(cuts)}
         owner = {part: whole[0] if part not in recordings else part for part in parts}
     seen, found = _seen(list(parts.values()), arm), []

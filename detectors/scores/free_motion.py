@@ -22,6 +22,7 @@ from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, Subsets
 from tauguard.detectors.calibration.recording import (
+    LEAST_STANDING,
     UNKNOWN_LOAD,
     Load,
     LoadDeviation,
@@ -230,6 +231,11 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     Raises:
         ValueError: logs that are too short.
     """
+    if (length := sum(float(r.trace.t[-1] - r.trace.t[0]) for r in recordings)) < LEAST_STANDING:
+        raise ValueError(
+            f"no joint moves in these logs, and they are too short, {length:.1f} s in all: "
+            f"{LEAST_STANDING:g} s are the least, ten are good"
+        )
     n, dt = arm.robot.joints, max(r.trace.dt for r in recordings)
     bare = replace(REAL_FRICTION, weights=np.zeros((n, REAL_FRICTION.columns)))
     arm = replace(arm, friction=bare, noise=np.ones(n))
@@ -238,7 +244,9 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     judged = [with_load_of(r, prior).judge(r.trace) for r in recordings]
     noise = np.fmin(_noise(judged, np.full(n, np.nan)), CALM * _calmest(judged, n))
     if not np.isfinite(noise).all():
-        raise ValueError("no joint moves in these logs, and they are too short: give 5 s or more")
+        raise ValueError(
+            "no log is free of motion for long enough: give one of two seconds or more"
+        )
     noise = np.maximum(noise, max(QUIETEST * float(noise.max()), 1e-6))
     bound = replace(bound, noise=noise, static=KEEPS * noise, friction=KEEPS * noise)
     seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)

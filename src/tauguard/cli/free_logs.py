@@ -46,6 +46,7 @@ def free_logs(
     from tauguard.datasets.arm_logs import moving, read_logs, with_loads
     from tauguard.datasets.real_arms import check_named, initial_arm
     from tauguard.detectors.calibration.checks import check_signs
+    from tauguard.detectors.calibration.recording import check_length
 
     read = read_logs(logs, columns, robot, torque, reading)
     print_notes(read.notes)
@@ -55,6 +56,7 @@ def free_logs(
     if not gains:
         check_named(robot, columns, list(traces.values()))
     recordings = {name: known[name] for name in traces}
+    check_length(list(recordings.values()))
     arm, source = initial_arm(read.numbers, list(recordings.values()), columns, gains, scale)
     check_signs(arm, recordings)
     chosen = "gains" if source in ("preset", "torques") else source

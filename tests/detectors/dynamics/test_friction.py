@@ -131,5 +131,5 @@ def test_bad_models():
 
 
 def test_calibration_needs_motion(robot, drive_gain):
-    with pytest.raises(ValueError, match="give 20 s of motion"):
+    with pytest.raises(ValueError, match="give 4 s of motion or more"):
         calibrate(ArmModel(robot, drive_gain), [])
