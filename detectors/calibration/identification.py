@@ -24,6 +24,8 @@ from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import (
+    LEAST,
+    MOVING,
     Recording,
     check_length,
     is_known,
@@ -63,7 +65,8 @@ class Beliefs:
     turns."""
     gain: float = 0.5  #: relative, where gains are identified
     friction: float = 0.3
-    """Deviation of most friction weights, relative to the joint's largest median torque of any log.
+    """Deviation of most friction weights, relative to the joint's largest median torque of any log,
+    over the log or over the joint's own motion in it.
     With this prior, columns that are alike at the logged speeds share the torque that they explain.
     Without it they could cancel there and be large at other speeds."""
     loaded: float = 0.3  #: of friction per load [1]
@@ -77,6 +80,9 @@ class Beliefs:
 
 
 BELIEFS = Beliefs()
+
+#: Motion of a joint in a log from which the joint's median torque in motion counts [s].
+TURNS = 1.0
 
 #: Rate of the filter that everything passes through [1/s].
 RATE = 20.0
@@ -137,8 +143,13 @@ def _friction_beliefs(
 ) -> Array:
     """Standard deviations of the friction weights, shape (n, columns)."""
     sizes = [np.abs(r.trace.current * gain) for r in recordings]
-    moving = [size[moving_span(r.trace)] for size, r in zip(sizes, recordings, strict=True)]
-    usual = np.max([np.median(size, axis=0) for size in moving], axis=0)
+    usual = np.zeros(len(gain))
+    for size, r in zip(sizes, recordings, strict=True):
+        span, turns = moving_span(r.trace), np.abs(r.trace.qd) > MOVING
+        usual = np.maximum(usual, np.median(size[span], axis=0))
+        for j, own in enumerate((turns & span[:, None]).T):  # torque may be 0 while it stands
+            if own.sum() * r.trace.dt >= TURNS:
+                usual[j] = max(usual[j], float(np.median(size[own, j])))
     out = np.repeat(np.maximum(BELIEFS.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
     out[:, friction.load_columns] = BELIEFS.loaded
     if friction.saturation:
@@ -154,6 +165,7 @@ def identify(
     scale: str = "gains",
     friction: FrictionModel = REAL_FRICTION,
     data: Sequence[Filtered] | None = None,
+    least: float = LEAST,
 ) -> Identified:
     """Identify inertia, friction and, if something fixes their scale, the drive gains.
 
@@ -164,11 +176,13 @@ def identify(
             recording with a known load above 0 does) or "masses" (those of ``arm`` do).
         friction: its columns.
         data: of each recording, from :func:`filtered` (default: made here); only for "gains".
+        least: least motion [s]; less where longer logs were cut into these recordings.
 
     Raises:
         ValueError: another scale, no load to take it from, too little motion, or another arm's log.
     """
     _check(recordings, arm.robot, scale)
+    check_length(recordings, least)
     # With a hundred unknowns, threads of the linear algebra cost more time than they save.
     with threadpool_limits(1, "blas"):
         if scale == "gains":
@@ -202,14 +216,14 @@ class Subsets:
         self._friction = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
         self._data = data or filtered_logs(arm, recordings, self._friction)
 
-    def __call__(self, use: Sequence[int]) -> ArmModel:
+    def __call__(self, use: Sequence[int], least: float = LEAST) -> ArmModel:
         """The arm that the recordings of these numbers show.
 
         Raises:
             ValueError: as of :func:`identify`.
         """
         own, data = [self._recordings[k] for k in use], [self._data[k] for k in use]
-        return identify(self._arm, own, friction=self._friction, data=data).arm
+        return identify(self._arm, own, friction=self._friction, data=data, least=least).arm
 
 
 def _identify_scale(
@@ -315,7 +329,6 @@ def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> 
         joints = len(recording.trace.joint_names)
         if joints != robot.joints:
             raise ValueError(f"a log of {joints} joints, the robot has {robot.joints}")
-    check_length(recordings)
 
 
 def _result(

@@ -96,17 +96,17 @@ def motion_length(recordings: Sequence[Recording]) -> float:
     return sum(float(moving_span(trace, 0.0).sum()) * trace.dt for trace in moving)
 
 
-def check_length(recordings: Sequence[Recording]) -> None:
-    """Refuse less motion than :data:`LEAST`.
+def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
+    """Refuse less motion than ``least`` [s].
 
     Raises:
         ValueError: says how much there is.
     """
-    if (seconds := motion_length(recordings)) < LEAST:
+    if (seconds := motion_length(recordings)) < least:
         still = "" if seconds else "no joint moves: "
         raise ValueError(
             f"{still}{int(10 * seconds) / 10:g} s of motion, from each log's first to its last, in "
-            f"all: {LEAST:g} s are the least, two minutes are good"
+            f"all: {least:g} s are the least, two minutes are good"
         )
 
 

@@ -16,8 +16,10 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import (
+    LEAST,
     UNKNOWN_LOAD,
     Recording,
+    check_length,
     motion_length,
     moves,
     pieces,
@@ -138,6 +140,8 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
     parts = dict(recordings)
     whole = [name for name, r in parts.items() if moves(r.trace)]
     owner = {name: name for name in parts}
+    if whole:
+        check_length([recordings[name] for name in whole])
     if len(whole) == 1:
         only = [parts.pop(whole[0])]
         cuts = only if parts else pieces(only, 2, 0.0)  # at least one other part
@@ -169,7 +173,7 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
     def without(left: int) -> FittedFreeMotion:
         use = [place for place in range(len(moving)) if place % TURNS != left]
         try:
-            found = calibrated(use)
+            found = calibrated(use, 0.0 if left < 0 else LEAST)
         except ValueError:  # too little motion is left without the turn
             if left < 0:
                 raise

@@ -27,6 +27,7 @@ from tauguard.detectors.calibration.recording import (
     Load,
     LoadDeviation,
     Recording,
+    check_length,
     laden,
     moves,
     pieces,
@@ -210,6 +211,7 @@ class FreeMotion:
         standing = [r for r in parts if not moves(r.trace)]
         if not moving:
             return standing_detector(arm, standing)
+        check_length(recordings)
         models, whole = _calibrations(arm, moving)
         bound = Bound.prior(*friction_levels(whole, moving), *standing_positions(parts))
         dt = max(r.trace.dt for r in recordings)
@@ -284,7 +286,7 @@ def _has_collisions(trace: Trace) -> bool:
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
     """For each part the calibration from the parts of other folds, and that from all."""
     calibrated, everything = Subsets(arm, parts), range(len(parts))
-    whole = calibrated(everything)
+    whole = calibrated(everything, 0.0)  # the uncut logs have enough
     models = [whole] * len(parts)
     turns = range(min(FOLDS, len(parts)))
     for fold in tqdm(turns, desc="leave out", unit="part", disable=None, leave=False):
