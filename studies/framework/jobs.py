@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
+import io
 import multiprocessing
 import os
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ from tauguard.report import versions
 
 #: Packages whose data classes a cached result may contain.
 OURS = ("tauguard", "studies")
+#: What pickled arrays and numbers of numpy consist of.
+ARRAYS = ("_reconstruct", "_frombuffer", "ndarray", "dtype", "scalar")
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
@@ -91,7 +94,7 @@ class JobCache:
     ) -> Iterator[Any]:
         if self.folder is None:
             return each(call, jobs)
-        paths = [self.folder / f"{name}-{k:03d}.skops" for k in range(len(jobs))]
+        paths = [self.folder / f"{name}-{k:03d}.pickle" for k in range(len(jobs))]
         known = [path.exists() for path in paths]
         every = zip(jobs, paths, known, strict=True)
         missing = [(call, job, path) for job, path, done in every if not done]
@@ -115,44 +118,31 @@ class _InOrder:
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
     """Run a job and write its result to a file."""
-    from skops.io import dumps
-
     call, own, path = job
     result = call(own)
-    write_atomic(path, dumps(_stored(result)))
+    write_atomic(path, pickle.dumps(result))
     return result
 
 
-def _stored(result: Any) -> Any:
-    """Dictionaries as pairs of lists, also in a list: skops cannot store keys that are tuples."""
-    if isinstance(result, list):
-        return [_stored(one) for one in result]
-    return ([*result], [*result.values()]) if isinstance(result, dict) else result
+class _Results(pickle.Unpickler):
+    """Reads results: arrays, plain values, and data classes of ours or of the user's module."""
 
+    def find_class(self, module: str, name: str) -> Any:
+        package = module.partition(".")[0]
+        if package in OURS:
+            kind = super().find_class(module, name)
+            if is_dataclass(kind):
+                return kind
+        if package == "numpy" and name in ARRAYS:
+            return super().find_class(module, name)
+        from tauguard.detectors.registry import file_type
 
-def _restored(kept: Any) -> Any:
-    if isinstance(kept, list):
-        return [_restored(one) for one in kept]
-    return dict(zip(*kept, strict=True)) if isinstance(kept, tuple) else kept
+        return file_type(f"{module}:{name}")
 
 
 def read(path: Path) -> Any:
     """Read a cached result; ``ValueError`` names a damaged file."""
-    from skops.io import get_untrusted_types, loads
-
     try:
-        data = path.read_bytes()
-        kept = loads(data, trusted=[t for t in get_untrusted_types(data=data) if _is_result(t)])
+        return _Results(io.BytesIO(path.read_bytes())).load()
     except Exception as error:  # a damaged file can make the reader raise anything
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
-    return _restored(kept)
-
-
-def _is_result(name: str) -> bool:
-    """Whether a class may be in a result: a data class of ours, or of a module the user named."""
-    from tauguard.detectors.registry import file_type
-
-    module, _, own = name.rpartition(".")
-    if module.partition(".")[0] in OURS:
-        return is_dataclass(getattr(importlib.import_module(module), own))
-    return isinstance(file_type(f"{module}:{own}"), type)
