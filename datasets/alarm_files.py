@@ -1,7 +1,7 @@
-"""Alarms of a detector that runs elsewhere, in any language, judged on a dataset.
+"""Judge the alarms of an external detector on a dataset.
 
-The file is CSV with the columns ``episode`` (SPLIT/NUMBER, from 0), ``start`` and ``end`` [s of the
-episode's clock], and one line for each alarm. An episode without a line had no alarm.
+The alarms are in a CSV file with one line per alarm. Its columns are ``episode`` (SPLIT/NUMBER,
+from 0), ``start`` and ``end`` [s since the episode's start].
 """
 
 import csv
@@ -48,16 +48,15 @@ def judged_alarms(
 ) -> Iterator[tuple[str, list[Matching]]]:
     """Match the alarms of a file with the true collisions of each split's episodes.
 
-    The first 3 s of an episode do not count: no collision is planned there, and detectors settle.
+    The first 3 s of an episode are not judged: detectors start up, and no collision is planned.
 
     Args:
         folder: a dataset.
         path: the file of alarms.
-        splits: by name (default: those whose name begins with "test"); all arms.
+        splits: names of splits (default: all whose name begins with "test").
 
     Raises:
-        ValueError: a file that cannot be read, or that names an episode which the splits do not
-            have.
+        ValueError: not such a CSV file, or an episode that the splits do not have.
         OSError: no such file or folder.
     """
     alarms = read_alarm_file(path)

@@ -34,7 +34,7 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     """The given files; a folder stands for all ``.csv`` and ``.mcap`` files below it.
 
     Raises:
-        ValueError: there are none, or two have one name.
+        ValueError: there are no files, or two have the same name.
     """
     files: list[Path] = []
     for path in logs:
@@ -58,8 +58,8 @@ def read_one(
     Args:
         log: CSV or MCAP.
         columns: preset or JSON file of a column map.
-        torque: its currents, or efforts, are joint torques [N m].
-        reading: mends and rate (default: none).
+        torque: the log's currents or efforts are joint torques [N m].
+        reading: repairs and sample rate (default: the log unchanged).
 
     Raises:
         ValueError: as :func:`~tauguard.datasets.logs.read_log`.
@@ -77,7 +77,7 @@ def read_one(
 
 
 def reduced(log: Log, hz: float) -> Log:
-    """The log at ``hz`` samples a second, with a note on what that costs.
+    """Average the log down to ``hz`` samples per second, and note the delay.
 
     Raises:
         ValueError: a rate above the log's own.
@@ -108,11 +108,11 @@ def read_logs(
         columns: preset or JSON file of a column map.
         robot: URDF or MJCF file of the arm.
         torque: the logs hold joint torques [N m] in place of currents.
-        reading: mends and rate (default: none).
+        reading: repairs and sample rate (default: the logs unchanged).
 
     Raises:
         ValueError: labelled contacts, a saturated current, currents in one log and torques in
-            another, joints that the robot does not have, or what reading raises.
+            another, joints that the robot does not have, or an error of :func:`read_one`.
     """
     read = {path.name: read_one(path, columns, torque, reading) for path in log_files(logs)}
     for name, log in read.items():
@@ -174,9 +174,9 @@ def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
 
 
 def moving(traces: dict[str, Trace]) -> tuple[dict[str, Trace], list[str]]:
-    """The logs in which some joint moves, and a note on each of the others.
+    """The logs in which some joint moves, and a note on each log without motion.
 
-    If no joint moves in any log, all logs are returned: calibration then says so.
+    If no joint moves in any log, all logs are returned; calibration then raises an error.
     """
     still = [name for name, trace in traces.items() if not moves(trace)]
     notes = [f"{name}: no joint moves in it; calibration leaves it out" for name in still]
@@ -201,7 +201,7 @@ def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recordi
 
     Args:
         traces: by file name.
-        payload: LOG=KG, LOG=KG,X,Y,Z or LOG=unknown, one each; other logs carried nothing.
+        payload: one of LOG=KG, LOG=KG,X,Y,Z and LOG=unknown per log; other logs have no load.
 
     Raises:
         ValueError: a payload that cannot be read or belongs to no log.
@@ -243,15 +243,15 @@ def _load(text: str, value: str, form: str) -> Load:
 
 
 def not_shown(traces: Sequence[Trace]) -> list[str]:
-    """Notes on the joints that hardly move in any log, and on regimes that no log shows."""
+    """Notes on joints that hardly move in any log, and on kinds of motion that no log shows."""
     seconds = motion_seconds([Recording(trace) for trace in traces])
     names = traces[0].joint_names
     still = [name for name, s in zip(names, seconds, strict=True) if s < SHOWN_SECONDS]
     notes = []
     if still:
         notes.append(
-            f"{', '.join(still)}: moves in none of the logs, so its friction is not known: while "
-            "it moves nothing is watched, and at rest its bound is prior knowledge; add a log in "
+            f"{', '.join(still)}: moves in none of the logs, so its friction is not known. No "
+            "collision is detected while it moves, and its bound at rest is assumed; add a log in "
             "which it moves"
         )
     if lacking := unseen(traces):

@@ -50,33 +50,33 @@ was recorded.
 |---|---|---|---|---|---|
 {splits}
 
-An episode is a run of one arm.{pairs} No motion occurs in two splits; `unseen` in
-`dataset.json` lists the properties of which a split has no value in common with the first split.
+An episode is a run of one arm.{pairs} No motion occurs in two splits. `unseen` in
+`dataset.json` lists the properties whose values in a split do not occur in the first split.
 
 ## Files
 
-* `data/SPLIT-NNNNNN.parquet`: one row a sample, one row group an episode.
-* `manifest/SPLIT-NNNNNN.jsonl`: one line an episode (arm, speed, payload, seed, collisions,
+* `data/SPLIT-NNNNNN.parquet`: one row per sample, one row group per episode.
+* `manifest/SPLIT-NNNNNN.jsonl`: one line per episode (arm, speed, payload, seed, collisions,
   outcome, everything needed to simulate it again); the last line is a checksum of the others.
-* `arms/NAME.xml`: the nominal arm, whose numbers an observer may use; simulated arms differ.
-  `arms/NAME.drive.json`: the numbers of its drive, for an arm that is not part of tauguard.
+* `arms/NAME.xml`: the nominal arm, whose numbers an observer may use; the simulated arms differ.
+  `arms/NAME.drive.json`: the nominal drive, for an arm that is not part of tauguard.
 * `dataset.json`: configuration, versions, planned counts.
 
 ## Columns
 
 {columns}
 
-Joint signals have one column a joint, `q_1` to `q_{joints}`.
+Joint signals have one column per joint, `q_1` to `q_{joints}`.
 
 ## Labels
 
 A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
-ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, point, force and peak
-torque are in the manifest; the column `collision` gives its index. Episodes with other collisions
-than planned are kept, and their `outcome` says so.
+ends at the last one; contacts less than 0.5 s apart are one collision. The manifest gives kind,
+link, point, force and peak torque of each collision; the column `collision` is its index there.
+Episodes whose collisions differ from the plan are kept, and their `outcome` says so.
 
-`tau_ext` is the sum over all contacts of the instant, `contact_x` and `force_x` are those of the
-largest one. Where several act at once, J^T f of the largest one is not the whole `tau_ext`.
+`tau_ext` is the sum over all contacts at that time; `contact_x` and `force_x` are those of the
+contact with the largest force. With several contacts, J^T f of that one is not all of `tau_ext`.
 
 ## Load it
 
@@ -103,9 +103,9 @@ for trace in read(".", splits=["{first}"]):
 ## What it is for, and what not
 
 For training and comparing detectors of collisions, and estimators of contact force, from joint
-signals. Report figures of the splits whose names begin with "test"; train a detector for each arm.
-It does not show how a detector does on a real arm: drives, sensors and contacts are models. It is
-no evidence for the safety of a workplace.
+signals. Report results on the splits whose names begin with "test"; train a detector for each arm.
+The dataset does not show how well a detector works on a real arm: drives, sensors and contacts are
+models. It is no evidence for the safety of a workplace.
 
 ## Cite
 
@@ -123,7 +123,7 @@ By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-2
 `{sha256}`. The same configuration and versions give the same bytes.
 """
 
-#: What the card of a dataset of pairs adds.
+#: Sentence that the card of a dataset of pairs adds.
 PAIRS = """ Episodes 2k and 2k + 1 of a split are a pair: the same arm, load, temperature, noise and
 commanded motion, first without and then with collisions."""
 
@@ -238,7 +238,7 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
 
 
 def shards(split: str) -> str:
-    """Pattern of a split's files; that of "test" does not match the files of "test-arm"."""
+    """Pattern of a split's files; the pattern of "test" does not match files of "test-arm"."""
     return f"data/{split}-[0-9]*.parquet"
 
 

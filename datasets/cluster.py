@@ -1,4 +1,4 @@
-"""Compute shards on a Ray cluster (extra ``distributed``): a task computes a shard on a core."""
+"""Compute shards on a Ray cluster (extra ``distributed``): one task per shard, one core each."""
 
 import itertools
 import logging
@@ -17,16 +17,15 @@ WAITING = 2
 def on_cluster(
     work: Callable[[Task], Result], tasks: Iterable[Task], address: str
 ) -> Generator[Result]:
-    """The results of ``work`` in the order in which they are ready.
+    """Yield the results of ``work`` in the order in which they are ready.
 
-    A task whose node or process is lost is repeated on another. All nodes must see the folder that
-    the tasks write, under the same path, and must have the same version of tauguard.
+    A task whose node or process is lost is repeated on another. The folder that the tasks write
+    must have the same path on all nodes. All nodes must have the same version of tauguard.
 
     Args:
         work: function of one task.
         tasks: taken one by one.
-        address: the cluster's; "auto" for the one that this machine belongs to, "local" to start
-            one here.
+        address: of the cluster; "auto": the cluster of this machine; "local": start one here.
 
     Raises:
         ValueError: Ray is not installed.

@@ -1,4 +1,4 @@
-"""Identity of the code that computes a dataset: versions, sources, and bits of a short episode."""
+"""Identity of the code that computes a dataset: versions, sources and a short episode's bits."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def sources() -> str:
 
 
 def detection_sources() -> tuple[str, str]:
-    """SHA-256 of the sources of the simulation, and of those of the detectors."""
+    """SHA-256 of the simulation's sources, and of the detectors' sources."""
     return sources(), tree_digest("detectors")
 
 

@@ -16,7 +16,7 @@ Column = str | int
 
 #: Fields of a map that name one column per joint.
 SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
-#: What :attr:`ColumnMap.repair` may name.
+#: Kinds of repair, see :attr:`ColumnMap.repair`.
 REPAIRS = ("repeat", "tail", "nan", "state", "order")
 #: Seconds in one unit of a time column, by the unit's name.
 CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -26,7 +26,7 @@ CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 class ColumnMap:
     """Columns by name (of the header line) or by 0-based index; one column per joint, in order.
 
-    A map with indices only reads files without a header line as well as those with one.
+    A map without names reads files with and without a header line.
     """
 
     t: Column | None  #: time; None: there is none, see ``clock``
@@ -41,18 +41,18 @@ class ColumnMap:
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
     current_scale: float | tuple[float, ...] = 1.0  #: A in one unit; may be per joint
     torque_scale: float | tuple[float, ...] = 1.0
-    """N m in one unit, a number or one per joint; -1 if the log's sign is not the robot's."""
+    """N m in one unit; may be per joint; -1 if the log's sign is opposite to the robot's."""
     clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
-    decimal: str = "."  #: mark of decimals
+    decimal: str = "."  #: decimal mark
     joint_names: tuple[str, ...] = ()  #: empty: unknown
     width: int | None = None  #: number of columns of every row; None: not known
     headerless: bool = False  #: files have no header line; one with a header is refused
     repair: frozenset[str] = field(default_factory=frozenset)
-    """Faults that may be mended, of "repeat" (a row with the time of the one before is dropped),
-    "tail" (a last row that is cut off), "nan" (a row with a number that is missing or not finite),
-    "state" (a row that repeats the whole state of the one before, as a recorder does that is faster
-    than its robot) and "order" (rows are sorted by time)."""
+    """Allowed repairs. "order" sorts rows by time. Each other word drops rows: "repeat" a row with
+    the time of the previous row, "tail" a last row that is cut off, "nan" a row with a number that
+    is missing or not finite, "state" a row with the whole state of the previous row (written by
+    recorders that are faster than their robot)."""
 
     def __post_init__(self) -> None:
         """Check that all joints have their columns.
@@ -102,7 +102,7 @@ class ColumnMap:
             raise ValueError(f"columns.decimal: {self.decimal!r}, expected . or , as no separator")
 
     def groups(self) -> dict[str, tuple[Column, ...]]:
-        """The columns of the signals that have any, by the trace's field."""
+        """The columns of each signal that the map has, by the name of the trace's field."""
         return {n: getattr(self, n) for n in SIGNALS if n == "q" or getattr(self, n)}
 
     @property
@@ -142,12 +142,12 @@ class Reading:
     """How logs are read: flags of every command that takes logs of a real arm."""
 
     mend: tuple[str, ...] = ()
-    """what CSV files need: deg (angles in degrees), mA, ms, us or ns (time), order (rows are
-    sorted by time), repeat, state, nan or tail (rows that repeat a time or the whole state, that
-    lack numbers, that are cut off at the end are left out), clock=HZ (no time column)"""
+    """units and repairs of CSV files: deg (angles in degrees), mA (currents), ms, us or ns (time),
+    clock=HZ (no time column), order (sort rows by time); drop rows that repeat a time (repeat) or
+    the whole state (state), rows that lack numbers (nan), a last row that is cut off (tail)"""
     resample: float = 0.0
-    """samples a second [Hz] that logs are reduced to, by means over the interval that ends at each
-    sample: half an interval late, and blurred to an interval; 0: as they are"""
+    """reduce logs to this sample rate [Hz]: each sample is the mean of the interval before it,
+    which delays signals by half an interval; 0: unchanged"""
 
 
 #: Reads logs unchanged.
@@ -172,7 +172,7 @@ PRESETS = {
         headerless=True,
         repair=frozenset({"repeat", "tail"}),
     ),
-    # What the recorder of Universal Robots' real-time data exchange (RTDE) writes.
+    # Files of the recorder of Universal Robots' real-time data exchange (RTDE).
     "ur_rtde": ColumnMap(
         t="timestamp",
         q=numbered("actual_q_"),
@@ -181,7 +181,7 @@ PRESETS = {
         joint_names=UR_JOINTS,
         repair=frozenset({"repeat", "tail"}),
     ),
-    # A UR5's log of Kufieta 2014 as shared files: t, q1..6, qd1..6, i1..6 and more.
+    # Published logs of a UR5 (Kufieta 2014): t, q1..6, qd1..6, i1..6 and more.
     "ur5": ColumnMap(
         t="t",
         q=numbered("q", first=1),
@@ -190,7 +190,7 @@ PRESETS = {
         joint_names=UR_JOINTS,
         repair=frozenset({"repeat", "tail"}),
     ),
-    # A UR3's: t, q1..6, qd1..6, tau1..6 [N m].
+    # Published logs of a UR3: t, q1..6, qd1..6, tau1..6 [N m].
     "ur3": ColumnMap(
         t="t",
         q=numbered("q", first=1),
@@ -207,7 +207,7 @@ PRESETS = {
         torque=numbered("tau_J", 7),
         repair=frozenset({"repeat", "tail", "state"}),
     ),
-    # What libfranka's logToCSV writes; tau_ext_hat_filtered beside it is Franka's own estimate.
+    # Files of libfranka's logToCSV; their tau_ext_hat_filtered, Franka's own estimate, is not read.
     "libfranka": ColumnMap(
         t="time",
         q=numbered("state.q[", 7, end="]"),
@@ -225,8 +225,8 @@ PRESETS = {
         degrees=True,
         repair=frozenset({"repeat", "tail", "state"}),
     ),
-    # A KUKA LBR by sensor_msgs/JointState, with joint torque sensors [N m]. Its efforts are the
-    # torques that hold the arm with the other sign: gravity's share is -0.8 to -0.95 in a Med 7's.
+    # A KUKA LBR by sensor_msgs/JointState, with joint torque sensors [N m]. Its efforts have the
+    # opposite sign of the robot's torques: gravity fits a Med 7's logs with -0.8 to -0.95.
     "lbr": ColumnMap(
         t="t",
         q=numbered("q", 7, 1),
@@ -239,7 +239,7 @@ PRESETS = {
 
 
 def preset_of(columns: ColumnMap) -> str | None:
-    """The preset that a map is, units, repairs and form of a row apart."""
+    """Name of the preset that a map equals in all fields but :data:`_FORM`; None: no preset."""
     for name, known in PRESETS.items():
         own = {n: getattr(known, n) for n in _FORM}
         if dataclasses.replace(columns, **own) == known:
@@ -247,7 +247,7 @@ def preset_of(columns: ColumnMap) -> str | None:
     return None
 
 
-#: Fields in which a file of a preset's columns may differ from it.
+#: Units, repairs and format of a row; maps of the same columns may differ in these fields.
 _FORM = ("separator", "decimal", "degrees", "time_scale", "current_scale", "repair")
 
 

@@ -14,9 +14,9 @@ from tauguard.traces import Collision, Trace, Truth
 JOINT_SIGNALS = ("q", "qd", "current", "q_des", "qd_des", "qdd_des", "tau_ext")
 #: The momentum observer's estimate, where the configuration asks for it.
 RESIDUAL = "residual"
-#: Step to which a signal is rounded. It is a power of two, so float32 holds it exactly, and far
-#: below the resolution of the sensors (2e-6 rad, 5e-4 rad/s, 2.24 mA); files get a third smaller.
-#: Other signals are stored in single precision without rounding.
+#: Step to which a signal is rounded; this makes files a third smaller. A step is a power of two, so
+#: that float32 represents multiples exactly, and is below the resolution of the sensors (2e-6 rad,
+#: 5e-4 rad/s, 2.24 mA). Other signals are stored in single precision without rounding.
 RESOLUTION = {
     "q": 2.0**-22,
     "qd": 2.0**-18,
@@ -42,8 +42,8 @@ MEANING = {
     "residual": "momentum observer's estimate of tau_ext with nominal numbers [N m]",
     "contact_force": "norm of the net external contact force on the arm [N]",
     "contact_link": "link of the largest contact force, 1-based, 0 for none",
-    "contact_x": "its point, world frame [m], null where there is none (also _y, _z)",
-    "force_x": "its force on the arm, world frame [N] (also _y, _z)",
+    "contact_x": "point of that contact, world frame [m], null without contact (also _y, _z)",
+    "force_x": "force of that contact on the arm, world frame [N] (also _y, _z)",
     "payload": "mass carried, not known to the observer [kg]",
     "collision": "index into the episode's collisions in the manifest, -1 for none",
 }
@@ -156,7 +156,7 @@ def trace_of(rows: pa.Table, line: Mapping[str, Any], attachments: Mapping[str, 
     Args:
         rows: rows of one episode.
         line: the episode's line of the manifest.
-        attachments: the nominal arm and what else belongs to it.
+        attachments: the texts of :func:`tauguard.datasets.dataset_folder.arm_texts`.
     """
     names = tuple(line["joints"])
 
@@ -189,7 +189,7 @@ def trace_of(rows: pa.Table, line: Mapping[str, Any], attachments: Mapping[str, 
 
 
 def collision_index(t: Array, collisions: tuple[Collision, ...]) -> NDArray[np.int16]:
-    """Which collision a sample belongs to, -1 for none, shape (T,)."""
+    """Index of the collision at each sample, -1 for none, shape (T,)."""
     found = np.full(len(t), -1, np.int16)
     for i, one in enumerate(collisions):
         found[(t >= one.onset) & (t <= one.end)] = i

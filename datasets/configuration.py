@@ -24,7 +24,7 @@ from tauguard.datasets.plans import CLAMP_SECONDS, SLOT
 from tauguard.datasets.robots import RobotSource, find_robot
 from tauguard.models import ROBOTS, SceneObject, cura6, load_objects
 
-#: The configurations that ship, by name.
+#: Names of this package's configurations.
 NAMED = ("tauguard-collisions-v2", "tauguard-collisions-v1", "cura6-twin")
 #: Keys of a split that were added after the first datasets were published.
 LATER_KEYS = ("clamp_seconds", "paired")
@@ -36,21 +36,21 @@ class Split:
 
     name: str
     episodes: int  #: number of episodes
-    quick_episodes: int  #: number with ``--quick``, counted from the first episode
+    quick_episodes: int  #: number of episodes (the first ones) that ``--quick`` generates
     seconds: float  #: length of an episode [s]
     arms: tuple[str, ...]  #: names of arm models; this list and each list below is cycled
     individuals: tuple[int, ...]  #: seeds of the model mismatch; -1: none
     speeds: tuple[float, ...]  #: percent of the largest joint speeds
     payloads_g: tuple[float, ...]  #: carried masses, unknown to the observer [g]
     struck: float  #: fraction of the episodes that have collisions
-    collisions: int  #: planned in each episode that has collisions
+    collisions: int  #: number planned in each episode that has collisions
     kinds: tuple[str, ...]  #: kinds of collisions; a kind listed twice occurs twice as often
     links: tuple[int, ...]  #: links that collisions act on, 1-based
-    severities: tuple[tuple[float, float], ...]  #: wanted peak ``|tau_ext|`` of joints 1-4 [N m]
+    severities: tuple[tuple[float, float], ...]  #: ranges of peak ``|tau_ext|``, joints 1-4 [N m]
     temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
     picks: float  #: fraction of collision-free episodes with a payload picked up
-    unseen: tuple[str, ...]  #: properties ("arm", ...) that share no value with the first split
-    clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: drawn duration [s]
+    unseen: tuple[str, ...]  #: properties ("arm", ...) whose values the first split does not have
+    clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: range of a clamp's duration [s]
     paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
 
 
@@ -60,7 +60,7 @@ class Configuration:
 
     name: str
     seed: int  #: seed of every random draw
-    rate: int  #: rows a second [Hz]; the physics runs at 1000
+    rate: int  #: rows per second [Hz]; the physics runs at 1000 Hz
     episodes_per_shard: int
     residual: bool  #: whether the momentum observer's estimate of tau_ext is stored
     mismatch: tuple[tuple[str, float], ...]  #: half-widths, see :class:`tauguard.models.Mismatch`
@@ -69,12 +69,12 @@ class Configuration:
     objects: tuple[SceneObject, ...] = ()  #: objects around the arm in every episode
 
     def to_json(self) -> str:
-        """The configuration as JSON text with sorted keys: equal configurations give equal text."""
+        """The configuration as JSON; equal configurations give equal text."""
         values = asdict(self)
         for name in ("robots", "objects"):
             if not values[name]:
                 del values[name]
-        for split in values["splits"]:  # later keys, left out at their defaults: hashes stay
+        for split in values["splits"]:  # without defaults of later keys: hashes do not change
             for name in LATER_KEYS:
                 if split[name] == SPLIT[name].default:
                     del split[name]
@@ -122,7 +122,7 @@ class Configuration:
         return max(len(self.joints_of(arm)) for split in self.splits for arm in split.arms)
 
     def quick(self) -> Configuration:
-        """The first episodes of every split; their bytes are those in the full dataset."""
+        """The first episodes of every split, which are byte-equal to the full dataset's."""
         return replace(
             self, splits=tuple(replace(s, episodes=s.quick_episodes) for s in self.splits)
         )
@@ -139,11 +139,11 @@ class Configuration:
 
 
 def load(source: str | Path) -> Configuration:
-    """The configuration in a TOML file, or the one that ships under that name.
+    """The configuration in a TOML file, or this package's configuration of that name.
 
     Raises:
-        ValueError: not TOML, an unknown key, a value out of range, or a split that shares a value
-            declared as unseen; the message names key, value and what would work.
+        ValueError: not TOML, an unknown key, a value out of range, or an ``unseen`` value that the
+            first split has; the message names key, value and what would work.
         OSError: no such file.
     """
     path = Path(source)
@@ -174,7 +174,7 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
     Args:
         values: the tables.
-        folder: where files of arms are looked for.
+        folder: base of relative paths of arms and objects.
     """
     top = checked_table("", {k: v for k, v in values.items() if k not in TABLES}, KEYS["top"])
     if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", top["name"]):
@@ -206,7 +206,7 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
 
 TABLES = ("mismatch", "episodes", "splits")
-#: Time before the first slot of a collision plus time after the last one [s].
+#: Time before the first collision's slot plus time after the last slot [s].
 MARGIN = 3.5
 
 
@@ -234,7 +234,7 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
     if values["links"] is None:
         values["links"] = tuple(range(min(2, joints), joints + 1))
     elif max(values["links"]) > joints:
-        refuse(f"{where}.links", values["links"], f"1 to {joints}, which every arm of it has")
+        refuse(f"{where}.links", values["links"], f"1 to {joints}, links of every arm")
     quick = values["quick_episodes"]
     if quick is None:
         quick = max(1, round(0.02 * values["episodes"]))
@@ -254,7 +254,7 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
     if values["paired"]:
         if values["struck"] != 0.5 or values["picks"] > 0:
             raise ValueError(
-                f"{where}.paired: one episode of each pair has collisions, and none a pick; "
+                f"{where}.paired: one episode of each pair has collisions, none picks up a load; "
                 f"expected struck = 0.5 and picks = 0, found {values['struck']:g} and "
                 f"{values['picks']:g}"
             )

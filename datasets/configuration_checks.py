@@ -123,7 +123,7 @@ def one_of(*words: str) -> Read:
 
 
 def span(low: float, high: float, equal: bool) -> Read:
-    """Two numbers in order, both in [low, high]."""
+    """Two increasing numbers in [low, high]; they may be equal with ``equal``."""
     inner = number(low, high)
 
     def read(value: Any) -> tuple[float, float]:
@@ -168,7 +168,7 @@ def rows_a_second(value: Any) -> int:
 
 _LARGEST = {f.name: 0.09 if f.name == "com" else 0.5 for f in fields(Mismatch) if f.name != "seed"}
 _DEFAULT = Mismatch(seed=0)
-#: A clamp ends half a second before its slot [s].
+#: Longest clamp [s]: it ends at least 0.5 s before the end of its slot.
 LONGEST_CLAMP = round(SLOT - OFFSET - SPREAD - 0.5, 6)
 SPLIT = {
     "name": Key(split_name, "letters, digits, - and _, at most 40"),

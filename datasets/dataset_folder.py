@@ -45,7 +45,7 @@ def read_head(folder: Path) -> dict[str, Any]:
         if isinstance(version, int) and version > FORMAT:
             raise ValueError(
                 f"{folder}: a dataset of format {version}; this tauguard reads up to {FORMAT}: "
-                "install a newer one"
+                "install a newer version"
             )
         Configuration.from_json(json.dumps(head["configuration"]))
     except (
@@ -107,7 +107,7 @@ def checksums(folder: Path) -> str:
 def changed(folder: Path) -> list[tuple[str, str]]:
     """Names of the files that have changed, among head, card, metadata and checksums.
 
-    A dataset without checksums, which is incomplete or of an earlier version, gives no names.
+    Empty for a dataset without checksums, which is incomplete or of an earlier version.
     """
     if not (folder / SUMS).exists():
         return []
@@ -129,7 +129,7 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
     """Context in which ``folder`` holds this dataset and this process is its only writer.
 
-    The head file, the arms and the subfolders are written first where they are missing.
+    Missing subfolders, arm files and the head file are written on entry.
 
     Raises:
         ValueError: the folder holds something else.
@@ -184,7 +184,7 @@ def arm_xml(folder: Path, arm: str) -> str:
 def arm_checksums(head: dict[str, Any]) -> dict[str, str]:
     """SHA-256 of each file of ``arms``, by its name, as ``dataset.json`` states it."""
     wanted: dict[str, str] = head.get("arms_sha256", {})
-    if head["format"] == 1:  # had no drives of arms that are not the package's own
+    if head["format"] == 1:  # names of arms without ending; no drive files
         wanted = {f"{name}.xml": digest for name, digest in wanted.items()}
     return wanted
 
@@ -212,7 +212,7 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
             )
         found[name] = text
     if head["format"] == 1:
-        with contextlib.suppress(ValueError, OSError):  # it can be read, but not be trained on
+        with contextlib.suppress(ValueError, OSError):  # readable without the drive, not trainable
             robots = configuration_in(folder).robots
             check_unchanged(arm, robots)
             found = nominal_texts(arm, robots) | found
@@ -239,7 +239,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
         _write_once(folder / "arms" / name, text)
     text = json.dumps(head, indent=1, sort_keys=True) + "\n"
     if not _holds(folder / HEAD, text):
-        (folder / SUMS).unlink(missing_ok=True)  # of another head; the end writes new ones
+        (folder / SUMS).unlink(missing_ok=True)  # of another head; write_cards makes new ones
         write_atomic(folder / HEAD, text)
 
 
@@ -263,7 +263,7 @@ def _check_same(folder: Path, head: dict[str, Any]) -> None:
     if there["code"] != head["code"]:
         differ = [k for k in head["code"] if there["code"].get(k) != head["code"][k]]
         named = [f"{k} {there['code'].get(k)}" for k in differ if k in versions()]
-        why = ", ".join(named) or "other sources, or a machine that rounds otherwise"
+        why = ", ".join(named) or "other sources, or a machine that rounds differently"
         raise ValueError(
             f"{folder}: was begun with {why}: new shards would not have the same bytes; "
             "name another folder"

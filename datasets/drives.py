@@ -1,4 +1,4 @@
-"""From currents to joint torques for the arms of the presets: published drive numbers."""
+"""Drive gains (joint torque per motor current) of the arms of the column presets."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,16 +21,16 @@ class DriveNumbers:
 
 
 # Mamedov et al. 2020 (doi 10.3389/frobt.2020.571574), identified on one arm. Another source gives
-# gains up to 50 % higher: scale your own if you can.
+# gains up to 50 % higher: identify your own arm's gains if you can.
 UR10E = DriveNumbers(gain=(10.0, 10.70, 8.46, 9.00, 9.48, 10.12))
-# The ratio of a UR5 controller's own target torques to its target currents, by least squares over
-# its logs. The last joint's is not identifiable; it has the drive of the one before.
+# Ratio of the target torques to the target currents of a UR5's controller, by least squares over
+# its logs. The last joint's gain is not identifiable; its drive is that of the joint before.
 UR5 = DriveNumbers(gain=(12.0, 10.6, 11.1, 9.9, 10.3, 10.3))
 DRIVES = {"ur10e": UR10E, "ur5": UR5}
 
 
 def preset_drive(columns: str | None, logs: Sequence[Trace]) -> tuple[str, DriveNumbers] | None:
-    """Name and drive of the preset that the logs' columns are of, or else of the one named.
+    """Name and drive of the preset of the logs' columns, else of ``columns``; None: not known.
 
     Raises:
         ValueError: the logs have columns of different presets, and the drive of one is known.

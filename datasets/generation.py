@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from tauguard.atomic_write import remove_parts
 from tauguard.datasets.card import write_cards
 from tauguard.datasets.code_identity import code
 from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.dataset_folder import claimed
+from tauguard.datasets.dataset_folder import claimed, shards
 from tauguard.datasets.shard import Done, ShardTask, make_shard
 from tauguard.datasets.workers import terminable, writing
 
@@ -24,7 +23,7 @@ from tauguard.datasets.workers import terminable, writing
 class Built:
     """Counts of one run."""
 
-    made: int = 0  #: shards
+    made: int = 0  #: shards written
     kept: int = 0  #: shards that were intact already
     episodes: int = 0  #: episodes in all shards
     seconds: float = 0.0  #: simulated in this run [s]
@@ -36,9 +35,9 @@ def generate_dataset(
     workers: int | None = None,
     ray: str | None = None,
 ) -> Built:
-    """Write the dataset, or the shards of it that are missing or damaged.
+    """Write the shards of a dataset that are missing or damaged.
 
-    The bytes are the same for any number of workers and for a cluster.
+    The bytes do not depend on the number of workers or on the use of a cluster.
 
     Args:
         configuration: description of the dataset.
@@ -71,9 +70,8 @@ def generate_dataset(
 def tasks(configuration: Configuration, folder: Path) -> Iterator[ShardTask]:
     """Every shard's task, split by split."""
     text, code_hash = configuration.to_json(), code()
-    for split in configuration.splits:
-        for number in range(math.ceil(split.episodes / configuration.episodes_per_shard)):
-            yield ShardTask(str(folder.resolve()), text, split.name, number, code_hash)
+    for split, number in shards(configuration):
+        yield ShardTask(str(folder.resolve()), text, split, number, code_hash)
 
 
 def _progress(configuration: Configuration) -> tqdm[None]:

@@ -64,7 +64,7 @@ class SplitSummary:
 
 
 def summarised(folder: Path) -> dict[str, SplitSummary]:
-    """Counts from the manifest, split by split; planned counts are of existing episodes.
+    """Counts from the manifest, split by split; planned counts cover only existing episodes.
 
     Raises:
         ValueError: no dataset, one of a newer version, or a damaged manifest.
@@ -177,7 +177,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def foreign(folder: Path) -> list[str]:
-    """Foreign files among shards and arms; who reads all of ``data`` would read them, too."""
+    """Files among shards and arms that are not the dataset's (a reader of all files reads them)."""
     known = {
         path(split, number)
         for split, number in shards(configuration_in(folder))
@@ -197,11 +197,11 @@ def unchecked(folder: Path) -> list[str]:
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
-    """Classes whose planned count is not as stated, or whose achieved count differs much."""
+    """Properties whose planned counts are not as stated; classes that are off balance (SLACK)."""
     lines = []
     for name, classes in stated.items():
         if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):
-            lines.append(f"{name}: planned other than stated")
+            lines.append(f"{name}: planned counts differ from those in {HEAD}")
     for name in ACHIEVED:
         for value, wanted in stated[name].items():
             there = one.achieved.get(name, Counter())[value]

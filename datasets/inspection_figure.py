@@ -53,11 +53,11 @@ def _classes(axes: Axes, report: Mapping[str, Any]) -> None:
             there.append(achieved.get(value, 0))
             wanted.append(planned.get(value, 0))
     rows = np.arange(len(labels))
-    axes.barh(rows, there, color="#2a788e", label="there")
+    axes.barh(rows, there, color="#2a788e", label="simulated")
     axes.plot(wanted, rows, "|", color="black", markersize=14, markeredgewidth=2, label="planned")
     axes.set_yticks(rows, labels)
     axes.invert_yaxis()
-    axes.set(xlabel="collisions", title="Classes, as planned and as they came out")
+    axes.set(xlabel="collisions", title="Collisions of each class")
     axes.legend(loc="lower right")
 
 

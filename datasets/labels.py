@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array, runs
 
-#: Columns, in any case, that say whether something touches the arm, if each cell is a LABEL.
+#: Names of columns that label contact, in upper or lower case; every cell must be in LABEL.
 LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
 LABEL = {"0": False, "false": False, "1": True, "true": True}
 
@@ -18,17 +18,17 @@ def labelled(
     lines: NDArray[np.int64],
     t: Array,
 ) -> tuple[tuple[float, float], ...] | None:
-    """The times at which a label column says that something touches the arm.
+    """Times of the contacts that a label column of a log states.
 
     Args:
         header: names of the columns.
         rows: lines of the file, each with its cells.
         lines: line of each sample, shape (T,).
-        t: its time [s], shape (T,).
+        t: time of each sample [s], shape (T,).
 
     Returns:
-        Times of the first and last sample of each contact; None without a column in LABELS, or
-        if it holds values other than 0 and 1, or false and true.
+        Times of the first and last sample of each contact; None without a column in LABELS whose
+        values are all 0 and 1, or false and true.
     """
     columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
     cells = dict(rows) if columns else {}

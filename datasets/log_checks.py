@@ -16,19 +16,19 @@ from tauguard.traces.trace import Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
-#: No joint position is beyond two turns [rad]; positions in degrees exceed this.
+#: Largest joint position, two turns [rad]; larger numbers are probably degrees.
 FURTHEST = 4 * np.pi
 #: Velocities are integrated over this time and compared with the change of position [s].
 SPAN = 0.1
-#: No arm's motor draws more [A].
+#: Largest motor current [A]; larger numbers are probably milliamperes or torques.
 AMPERES = 100.0
-#: A current is saturated if it stays at its largest value for this many samples in a row, and that
-#: value is at least this multiple of the median.
+#: A current is saturated if its magnitude stays at the maximum for this many samples in a row, and
+#: the maximum is at least this multiple of the magnitude's median.
 PLATEAU, ABOVE = 5, 3.0
-#: A clock that was set back has fewer backward steps than this, and more rows after each.
+#: The clock was set back if time steps back fewer times than this, and more rows than this follow.
 FEW = 5
-#: Rows that repeat the state are left out if they are at least this fraction of all rows: then the
-#: recorder is faster than its robot. Below it, a standing arm may repeat its values by chance.
+#: Rows that repeat the previous state are left out if they are at least this fraction of all rows:
+#: the recorder is then faster than its robot. A standing arm repeats some values by chance.
 REPEATED = 0.2
 
 Where = Callable[[int], str]
@@ -38,7 +38,7 @@ def checked(trace: Trace, where: Where) -> tuple[str, ...]:
     """Check a log and return notes on faults that a detector tolerates.
 
     Args:
-        trace: as read.
+        trace: the log.
         where: text for a row's number, such as "line 12".
 
     Raises:
@@ -56,7 +56,7 @@ def checked(trace: Trace, where: Where) -> tuple[str, ...]:
     for name, row, count, peak in saturated(trace):
         notes.append(
             f"{where(row)}: the current of {name} stays at {peak:g} A for {count} samples: "
-            "saturated; an alarm or none there means nothing"
+            "saturated; neither an alarm nor its absence there means anything"
         )
     return tuple(notes)
 
@@ -95,7 +95,7 @@ def _refuse_degrees(trace: Trace, where: Where) -> None:
 
 
 def travelled(trace: Trace) -> tuple[Array, Array]:
-    """Change of position, and integrated velocity, over pieces of ``SPAN``, each (pieces, n)."""
+    """Change of position, and integrated velocity, in each interval of ``SPAN``, shape (K, n)."""
     count = max(1, round(SPAN / trace.dt))
     steps = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     whole = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
@@ -110,7 +110,7 @@ def _refuse_strange_velocities(trace: Trace) -> None:
     for j in np.flatnonzero(moves):
         name = trace.joint_names[j]
         alike = [_alike(change[:, k], summed[:, j]) for k in range(change.shape[1])]
-        if abs(alike[j]) < 0.7:  # a sign is named below
+        if abs(alike[j]) < 0.7:  # a wrong sign is reported below
             best = int(np.argmax(alike))
             other = trace.joint_names[best]
             raise ValueError(
@@ -119,7 +119,9 @@ def _refuse_strange_velocities(trace: Trace) -> None:
             )
         ratio = float(change[:, j] @ summed[:, j] / (summed[:, j] @ summed[:, j]))
         if not 0.7 < ratio < 1.4:
-            raise ValueError(f"{_meaning(ratio, name)}: positions change {ratio:.3g} times as fast")
+            raise ValueError(
+                f"{_meaning(ratio, name)}: change of position is {ratio:.3g} times the velocity"
+            )
 
 
 def _meaning(ratio: float, name: str) -> str:
@@ -158,7 +160,7 @@ def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
 
 
 def refuse_set_back(t: Array, lines: NDArray[np.int64]) -> None:
-    """Refuse to sort rows of a clock that was set back: two times would be mixed."""
+    """Refuse to sort rows if the clock was set back: rows of two periods would be mixed."""
     back = np.flatnonzero(np.diff(t) < 0) + 1
     for begin, row, end in zip([0, *back[:-1]], back, [*back[1:], len(t)], strict=True):
         over = float(min(t[row - 1], t[end - 1]) - max(t[row], t[begin]))
@@ -195,10 +197,10 @@ def increasing(
 
 
 def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
-    """Rows to keep so that a recorder's copies of one state are not taken for samples.
+    """Rows to keep: all but copies of the previous state that a fast recorder wrote.
 
-    A difference quotient is 0 over a copy and twice the speed after it. A state that really stays
-    is kept at the usual interval of new ones.
+    At a copy, a difference quotient would be 0, and after it twice the speed. While the state does
+    not change, rows are kept at the usual interval of new states.
 
     Args:
         t: times [s], shape (T,).
@@ -217,7 +219,7 @@ def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> 
         if is_new or t[row] - last > 1.4 * usual:
             kept[row], last = True, t[row]
     notes.append(
-        f"{100 * share:.0f} % of the rows repeat the state before: left out, a state comes every "
-        f"{1e3 * usual:.3g} ms"
+        f"{100 * share:.0f} % of the rows repeat the previous state and are left out; new states "
+        f"come every {1e3 * usual:.3g} ms"
     )
     return kept

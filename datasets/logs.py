@@ -33,7 +33,7 @@ LOOKED_AT = 5000
 
 @dataclass(frozen=True)
 class Log:
-    """A log as a trace, and the repairs that reading it took."""
+    """A log as a trace, with notes on repairs."""
 
     trace: Trace
     notes: tuple[str, ...]  #: one line for each repair, empty if there was none
@@ -53,20 +53,20 @@ def read_log(
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
             system whose ``JointState`` messages hold the motor currents in ``effort``.
             If they are joint torques, set ``meta["effort"]`` of the trace to "torque".
-        columns: for CSV, a map, the name of a preset (see ``PRESETS``), or "auto" for what names
-            and numbers suggest; without it the header line must be that of a preset.
-        joint_names: what the joints are called, in the order of the columns (default: the map's
-            names, the messages' names, or joint_1, joint_2, ...); for MCAP also which joints.
+        columns: for CSV: a map, the name of a preset (see ``PRESETS``), or "auto" to recognise
+            columns by names and values. By default the header line must be that of a preset.
+        joint_names: names of the joints in the order of the columns (default: the map's names, the
+            messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
         mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
 
     Returns:
-        The trace, without truth and with the log's own times, and notes on repairs.
+        The trace, without truth and with the log's own times, and notes on repairs. Only faults
+        that the map's ``repair`` names are repaired.
 
     Raises:
         ValueError: a missing column, a bad number, a cut-off row, time that does not increase, a
-            gap, angles in degrees, or velocities that do not fit the positions: one line with the
-            file, the row or line, and what would work. Only what a map's ``repair`` names is
-            repaired, and a note says so.
+            gap, angles in degrees, or velocities that do not fit the positions. The message names
+            file, row or line, and what would work.
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
@@ -110,8 +110,8 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
         )
     if found is None:
         raise ValueError(
-            "no column map, and no positions, efforts and time (or velocities that tell the clock) "
-            f"found among the columns: {known}"
+            "no column map, and no positions, efforts and time (or velocities that tell the sample "
+            f"rate) found among the columns: {known}"
         )
     raise ValueError(
         f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
@@ -119,7 +119,7 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
 
 
 def _form(path: Path) -> dict[str, Any]:
-    """Separator and mark of decimals, as the first two lines show them."""
+    """Separator and decimal mark, found from the first two lines."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         first, second = stream.readline(), stream.readline()
     separator = max(",;\t", key=first.count)
@@ -128,7 +128,7 @@ def _form(path: Path) -> dict[str, Any]:
 
 
 def _rows(path: Path, separator: str, decimal: str) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and cells of all rows that are not empty, with points in numbers."""
+    """Line numbers and cells of all rows that are not empty; decimal marks become points."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         for n, row in enumerate(csv.reader(stream, delimiter=separator), 1):
             if row:
@@ -150,7 +150,7 @@ def _beginning(path: Path, separator: str, decimal: str) -> tuple[list[str], Arr
 def read_csv(
     path: Path, columns: ColumnMap, joint_names: Sequence[str] | None, auto: bool = False
 ) -> Log:
-    """A CSV file as a trace; see :func:`read_log`. ``auto``: a note says what the columns are."""
+    """A CSV file as a trace, see :func:`read_log`; with ``auto``, a note describes the columns."""
     rows = list(_rows(path, columns.separator, columns.decimal))
     if not rows:
         raise ValueError("empty file")
@@ -171,7 +171,7 @@ def read_csv(
     if "order" in columns.repair and (np.diff(t) < 0).any():
         refuse_set_back(t, lines)
         order = np.argsort(t, kind="stable")
-        notes.append(f"{int((np.diff(t) < 0).sum())} times a row is earlier than the last: sorted")
+        notes.append(f"rows sorted by time; {int((np.diff(t) < 0).sum())} were out of order")
         t, lines = t[order], lines[order]
         parts = {name: value[order] for name, value in parts.items()}
     keep = increasing(t, lines, columns, notes)
@@ -197,7 +197,7 @@ def read_csv(
 
 
 def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:
-    """The header, empty if the first line is numbers, and the column numbers of each signal.
+    """The header (empty if the first line has numbers) and the column indices of each signal.
 
     Raises:
         ValueError: columns that this file does not have; the presets that fit it are named.
@@ -222,7 +222,7 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
 
 
 def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array]:
-    """Signals in rad, rad/s and A, or N m; joint torques stand in the place of currents."""
+    """Signals in rad, rad/s and A; ``current`` holds the joint torques [N m] of a torque log."""
     signals = dict(parts)
     if not columns.torque:
         signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
@@ -253,7 +253,7 @@ def header_of(first: Sequence[str]) -> list[str]:
     """The names in a first line, empty if it is a line of numbers.
 
     Raises:
-        ValueError: mostly numbers, but not all: a line that is damaged.
+        ValueError: most cells are numbers, but not all: the line is damaged.
     """
     cells = [cell.strip() for cell in first]
     names = [cell for cell in cells if cell and number(cell) is None]
@@ -307,7 +307,7 @@ def parse(
     columns: ColumnMap,
     header: Sequence[str] = (),
 ) -> tuple[Array, NDArray[np.int64], list[str]]:
-    """The wanted columns of all good rows, shape (R, columns), their line numbers, and notes."""
+    """The wanted columns of all rows that are kept, shape (R, columns), line numbers, and notes."""
     if max(wanted) >= width:
         raise ValueError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
     values: list[list[float]] = []
@@ -343,7 +343,7 @@ def parse(
 def _lacking(
     row: Sequence[str], wanted: Sequence[int], line: int, columns: ColumnMap, header: Sequence[str]
 ) -> None:
-    """Refuse a row with a cell that is no finite number, unless "nan" mends it."""
+    """Refuse a row with a cell that is no finite number, unless "nan" is an allowed repair."""
     for i in wanted:
         cell, value = row[i].strip(), number(row[i])
         if value is not None and isfinite(value):

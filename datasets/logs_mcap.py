@@ -52,8 +52,8 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
 def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
     """Name, log times and messages of the first topic of the type.
 
-    Messages are read from the data, not through the index at the file's end: those that a damaged
-    index omits would be lost without an error.
+    Messages are read in the order of the file, not through the index at its end: a damaged index
+    could omit messages without an error.
     """
     from mcap.reader import NonSeekingReader, make_reader
 
@@ -81,7 +81,7 @@ def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
 def assemble(
     topic: str, messages: Sequence[tuple[int, bytes]], joint_names: Sequence[str] | None
 ) -> Trace:
-    """Make a trace of the messages; times are stamps, or log times if there are no stamps."""
+    """Make a trace of the messages; times are header stamps, or log times where a stamp is 0."""
     if len(messages) < 2:
         raise ValueError(f"{topic}: {len(messages)} messages, expected at least 2")
     rows = [joint_state(f"{topic}, message {k}", data) for k, (_, data) in enumerate(messages)]

@@ -14,7 +14,7 @@ from tauguard.traces import STRATA
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
 #: Half are strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
-#: No collision begins before this time, because a detector settles first [s].
+#: No collision begins before this time [s], because a detector starts up first.
 BEGIN = 3.0
 #: Length of a collision's slot, its earliest onset in it, and how much later it may begin [s].
 SLOT, OFFSET, SPREAD = 3.0, 0.9, 0.2
@@ -37,7 +37,7 @@ def collision_plans(
         rng: shuffles the combinations of kind, link and stratum.
         count: number of collisions.
         begin: start of the first slot [s].
-        strata: severities, cycled [N m].
+        strata: ranges of severity (peak torque), cycled [N m].
         kinds: cycled.
         links: cycled, 1-based.
         clamp_seconds: shortest and longest clamp [s].
@@ -71,8 +71,8 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
 def torque_scale(robot: str) -> float:
     """Factor on severities and loads for this robot, at most 1.
 
-    Multiplied by it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA` is at
-    most the robot's largest torque limit.
+    It scales the lower end of the highest range of :data:`~tauguard.traces.STRATA` to at most the
+    robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -85,7 +85,7 @@ def pairing(i: int, speeds: Sequence[float], payloads: Sequence[float]) -> tuple
     """Speed and payload of episode ``i``: both lists are cycled, and every pair occurs.
 
     If the two lengths have a common factor, the payloads shift by one each time the pairs would
-    repeat; otherwise a speed would always occur with the same payloads.
+    repeat. Without the shift a speed would always occur with the same payloads.
     """
     pairs = math.lcm(len(speeds), len(payloads))
     moved = i // pairs % math.gcd(len(speeds), len(payloads))
@@ -169,7 +169,7 @@ TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
 
 @dataclass(frozen=True)
 class DemoPlan:
-    """Every episode of a demo: one arm; no seed is used twice."""
+    """All episodes of a demo; they have one arm and different seeds."""
 
     train: list[Episode]
     judge_struck: list[Episode]  #: test episodes with collisions
@@ -183,9 +183,9 @@ class DemoPlan:
 
 
 def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
-    """75 collisions to train on; 72 collisions and 10 collision-free minutes to test on.
+    """Plan 75 collisions for training; 72 collisions and 10 collision-free minutes for the test.
 
-    The showcase has nine collisions of all kinds, then a payload that is unknown to the observer.
+    In the showcase nine collisions of all kinds occur, then the arm picks up a payload.
     """
     arm, scale = Mismatch(seed=seed), torque_scale(robot)
     base = 4 * seed

@@ -102,7 +102,7 @@ def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> 
 
 
 def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trace]:
-    """The traces of the episodes that some manifest lines of one shard describe."""
+    """The traces of episodes of one shard; ``wanted`` has their lines of the manifest."""
     if not wanted:
         return
     path = folder / wanted[0]["shard"]
@@ -132,8 +132,8 @@ def training_episodes(folder: Path, arm: str | None) -> list[Trace]:
     arms = arms_of(folder, first)
     if arm is None and len(arms) > 1:
         raise ValueError(
-            f"{folder}: its split {first[0]!r} has {len(arms)} arms and a detector knows one: "
-            f"choose with --arm {{{','.join(arms)}}}"
+            f"{folder}: its split {first[0]!r} has {len(arms)} arms, and a detector is trained for "
+            f"one: choose with --arm {{{','.join(arms)}}}"
         )
     return list(read(folder, first, arm))
 
@@ -146,7 +146,7 @@ def episodes_of_splits(
     Args:
         folder: folder of the dataset.
         robot: the detector's numbers of its arm.
-        splits: by name (default: those whose name begins with "test").
+        splits: names of splits (default: all whose name begins with "test").
 
     Raises:
         ValueError: no split has that arm.
@@ -165,7 +165,7 @@ def episodes_of_splits(
 
 
 def same_arm(folder: Path, robot: RobotNumbers) -> str | None:
-    """The arm of the dataset that has the detector's geometry and rotor inertias, if one has."""
+    """The dataset's arm with the detector's geometry and rotor inertias; None if there is none."""
     from tauguard.detectors import RobotNumbers
     from tauguard.models import pin_model
 

@@ -1,4 +1,4 @@
-"""The numbers of a real arm, from its robot file, its published drive gains and a user's flags."""
+"""A real arm's numbers, from its robot file, published drive gains and the command's flags."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -24,15 +24,15 @@ from tauguard.detectors.dynamics.robot import holding
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 
-#: Two files describe one arm if its joints differ by at most this in position [m] and in every
-#: entry of the rotation matrix.
+#: Two files describe the same arm if each joint's position [m], and each entry of its rotation
+#: matrix, differ by at most this.
 SAME_PLACE = 1e-3
 
 
 def robot_numbers(
     robot: Path, given: tuple[str, ...] | None = None
 ) -> tuple[RobotNumbers, tuple[str, ...]]:
-    """The numbers of a robot file, and a note if joints that the log lacks are held at zero.
+    """The numbers of a robot file, and a note on joints that the log lacks (they are held at 0).
 
     Args:
         robot: URDF or MJCF.
@@ -67,10 +67,9 @@ def is_torque(trace: Trace) -> bool:
 
 
 def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
-    """Refuse a robot file that cannot be read, or that is not of the arm of a trained model.
+    """Refuse a robot file that cannot be read, or that describes another arm than a trained model.
 
-    Names and placements of the joints must agree; masses may differ, because calibration changes
-    them.
+    Names and placements of the joints must agree. Masses may differ: calibration changes them.
 
     Raises:
         ValueError: one line that names both files.
@@ -93,19 +92,19 @@ def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
         joint = int(np.argmax(np.maximum(moved, turned)))
         raise ValueError(
             f"{robot} is not the arm that {model} was trained on: {names[joint]} is "
-            f"{1e3 * moved[joint]:.0f} mm from its place there; give the robot file of that "
-            "training"
+            f"{1e3 * moved[joint]:.0f} mm from its place there; give the robot file that the model "
+            "was trained with"
         )
 
 
 def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> None:
-    """Refuse the robot file of one UR beside the columns of another UR.
+    """Refuse a robot file of one UR model with a column preset of another UR model.
 
-    The preset of the columns would supply the gains of the wrong arm. Files and columns of other
-    names are accepted.
+    The preset would supply the gains of the wrong arm. Files and presets of other names are
+    accepted.
 
     Raises:
-        ValueError: one line that names both.
+        ValueError: one line that names both models.
     """
     known = r"ur(?:3|5|10|16|20|30)e?"
     name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', robot.read_text())
@@ -131,27 +130,28 @@ def initial_arm(
     gains: tuple[float, ...],
     scale: str,
 ) -> tuple[ArmModel, str]:
-    """The arm that a calibration begins with, and what fixes the scale of its torques.
+    """The initial arm of a calibration, and what fixes the scale of its torques.
 
     Args:
         numbers: of the robot file.
         recordings: logs with their loads.
-        columns: preset or column map that was given.
-        gains: that were given [N m/A], one per joint; empty for none.
-        scale: "gains", "payload", "masses", or "auto" for the first of these that is known.
+        columns: the given preset or column map.
+        gains: the given drive gains [N m/A], one per joint; empty: none.
+        scale: "gains", "payload", "masses", or "auto": given gains, else a known payload, else the
+            preset's gains, else masses.
 
     Returns:
         The arm, and "torques", "gains", "preset", "payload" or "masses".
 
     Raises:
-        ValueError: not one gain a joint, or logs of different presets.
+        ValueError: not one gain per joint, or logs of different presets.
     """
     if is_torque(recordings[0].trace):
         if gains:
             raise ValueError(
-                "--gains: the logs hold joint torques by their columns' names, which need none; if "
-                "they are motor currents, say so with a JSON file for --columns whose `current` "
-                "lists these columns"
+                "--gains: by their columns' names the logs hold joint torques, which need none; if "
+                "they are motor currents, give --columns a JSON file whose `current` lists these "
+                "columns"
             )
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     traces = [r.trace for r in recordings]
@@ -177,7 +177,7 @@ def known_arm(
     columns: str | None,
     gains: tuple[float, ...],
 ) -> tuple[ArmModel, str]:
-    """The initial arm for the method free-motion, and a text that says where its gains come from.
+    """The initial arm for the method free-motion, and the source of its gains as text.
 
     The gains are the given ones, else those of a calibrated robot file, else those of
     :func:`initial_arm`.
@@ -217,12 +217,12 @@ def calibration_notes(
 
     Args:
         joints: names.
-        left: what the calibration leaves of each log in which some joint moves, by file name.
+        left: unexplained torque of each log in which some joint moves, by file name.
         logs: by file name, with their loads.
-        held: held-out residual of each [N m], (n,) each; empty: not known.
+        held: held-out residual of each log in ``logs`` [N m], (n,) each; empty: not known.
 
     Raises:
-        ValueError: so much torque is unexplained that the logs cannot be the arm's as given.
+        ValueError: so much torque is unexplained that arm, loads or logs do not fit together.
     """
     names, refused = list(logs), ""
     bare = [k for k, n in enumerate(names) if n in left and logs[n].load == Load()]
@@ -240,9 +240,9 @@ def calibration_notes(
     if found is not None:
         log = names[bare[found[0]]]
         asked.append(
-            f"{log} is {found[1]:.1f} times as far from what the other logs predict as they are: "
-            f"did {log} carry something (then give --payload {log}=KG or =unknown), or did "
-            "something touch the arm (then leave the log out)?"
+            f"the torques of {log} are {found[1]:.1f} times as far from their prediction as those "
+            f"of the other logs: did {log} carry something (then give --payload {log}=KG or "
+            "=unknown), or did something touch the arm (then leave the log out)?"
         )
     given = [
         f"{r.load.mass:g} kg in {n}"

@@ -1,10 +1,10 @@
 """Propose a column map for a CSV file from the names and values of its columns.
 
-Names come in groups that differ by a joint's number, such as ``q0`` to ``q6``, ``actual_q_0`` or
-``/joint_states/position[0]``. The last word of its name identifies a group. Commands are ignored.
-A unit in a name counts: "timestamp_us", "angle (deg)". Without one, values decide: angles beyond
-two turns are degrees, currents above 100 are mA, and sample intervals of more than half a second
-are milliseconds or less.
+A group of columns has names that differ by a joint's number, such as ``q0`` to ``q6``,
+``actual_q_0`` or ``/joint_states/position[0]``. The last word of the name tells the signal.
+Commands are ignored. A unit in a name is used: "timestamp_us", "angle (deg)". Without units, values
+decide: angles beyond two turns are degrees, currents above 100 are mA, and times with sample
+intervals of more than 0.5 are in milliseconds or a smaller unit.
 """
 
 import re
@@ -26,9 +26,9 @@ WORDS = {
     "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
 }
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
-#: Units of the time column, by the shortest usual step that they give.
+#: Smallest usual step of a time column, and its unit [s] then.
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
-#: A name with such a word is of a command, an estimate or the tool, not of a joint's sensor.
+#: Words in names of commands, of estimates and of the tool's signals, which are not joint sensors.
 _OTHER = re.compile(
     r"(^|_)(target|desired|des|command|commanded|cmd|goal|ref|reference|control|ext|external|"
     r"gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
@@ -37,14 +37,14 @@ _OTHER = re.compile(
 _NAMED = re.compile(
     r"^(.*?)(?:([^/.]+)[/.]|(\w+_joint)[_ ])(position|velocity|effort|current|torque)$"
 )
-#: The torques of KUKA's FRI have the opposite sign.
+#: Name of the torques of KUKA's FRI, which have the opposite sign.
 _FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
-#: The same with the kind of signal behind the number: "joint_1_position", "J1 angle (rad)".
+#: The same, followed by the kind of signal: "joint_1_position", "J1 angle (rad)".
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
-#: A unit behind a name: "time [ms]", "angle (rad)".
+#: A unit in brackets: "time [ms]", "angle (rad)".
 _UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
-#: Units that names may have, as :func:`_unit` compares them: seconds, amperes and N m in one unit.
+#: Units in names, in the form that :func:`_unit` compares, and their value in s, A or N m.
 _SECONDS = {
     **dict.fromkeys(("nanoseconds", "nanosec", "nsec", "ns"), 1e-9),
     **dict.fromkeys(("microseconds", "usec", "us"), 1e-6),
@@ -60,7 +60,7 @@ _NEWTON_METRES = {
     **dict.fromkeys(("ncm", "n_cm"), 1e-2),
     **dict.fromkeys(("nm", "n_m"), 1.0),
 }
-#: Units of angles and of their speeds: whether they are degrees. A map takes no other unit.
+#: Units of angles and of angular speeds that a map can hold, and whether they are degrees.
 _PER_SECOND = ("", "_s", "_per_s", "_sec")
 _ANGLES = {
     unit + per: unit.startswith("deg")
@@ -111,14 +111,14 @@ def _field(prefix: str) -> str | None:
 
 
 def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
-    """The map that names and values suggest; None if positions, efforts or the time are not found.
+    """The map that names and values suggest; None if positions, efforts or a clock are not found.
 
     Args:
         header: names of all columns.
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
 
     Raises:
-        ValueError: names with units of which one map can hold only one, or a time in two columns.
+        ValueError: columns of one kind in different units, or a time in two columns.
     """
 
     def plain(name: str) -> str:
@@ -174,14 +174,14 @@ def _refuse_parts(time: str, t: Array, header: Sequence[str]) -> None:
     known = t[np.isfinite(t)]
     if rest and (known == np.floor(known)).all() and (np.diff(known) == 0).any():
         raise ValueError(
-            f"columns {time} and {rest[0]}: parts of one time, and auto reads one column; write "
+            f"columns {time} and {rest[0]}: parts of one time, but auto reads one column; write "
             "their sum into one column of the file"
         )
 
 
 def _time_scale(name: str, t: Array) -> float:
-    """Seconds in one unit of the time: as its name says, else as its usual step does."""
-    steps = np.diff(np.unique(t[np.isfinite(t)]))  # of rows in order
+    """Seconds in one unit of the time column, by its name, else by its usual step."""
+    steps = np.diff(np.unique(t[np.isfinite(t)]))  # of the sorted times
     usual = float(np.median(steps)) if len(steps) else 0.0
     return _unit(name, _SECONDS) or next(scale for least, scale in CLOCKS if usual >= least)
 
@@ -189,9 +189,7 @@ def _time_scale(name: str, t: Array) -> float:
 def _units(
     groups: Mapping[str, Sequence[str]], numbers: Callable[[Sequence[str]], Array]
 ) -> tuple[bool, float, float]:
-    """Whether angles are degrees, amperes in one unit of currents, N m in one of torques.
-
-    Names decide, else values.
+    """Units by names, else by values: whether angles are degrees; currents [A]; torques [N m].
 
     Raises:
         ValueError: columns in different units, or angles neither in radians nor in degrees.
@@ -229,20 +227,20 @@ def _units(
 
 
 def _one(said: Mapping[str, Any], remedy: str) -> Any:
-    """What all names with a unit say, None if there are none."""
+    """The unit that the names of some columns give, None if no name has one."""
     named = {name: value for name, value in said.items() if value is not None}
     first = next(iter(named), "")
     for name, value in named.items():
         if value != named[first]:
             raise ValueError(
-                f"columns {first} and {name} are in different units, and auto takes one for both: "
-                f"{remedy}"
+                f"columns {first} and {name} are in different units, but auto needs the same for "
+                f"both: {remedy}"
             )
     return named.get(first)
 
 
 def _unit(name: str, units: Mapping[str, Any]) -> Any:
-    """What the unit at the end of a column's name says, a joint's number apart; None: no unit."""
+    """Value in ``units`` of the unit at the end of a name (before a joint's number); None: none."""
     told = name.lower().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u")
     words = re.sub(r"[^a-z0-9]+", "_", told).strip("_")
     words = re.sub(r"_?\d+$", "", words)
@@ -250,7 +248,7 @@ def _unit(name: str, units: Mapping[str, Any]) -> Any:
 
 
 def in_units_of(preset: ColumnMap, found: ColumnMap) -> ColumnMap:
-    """A preset with degrees, milliseconds or milliamperes where its columns hold such numbers."""
+    """The preset in the recognised units: degrees, milliseconds, milliamperes."""
     milli = bool(preset.current) and found.current_scale != 1.0
     return replace(
         preset,
@@ -262,7 +260,7 @@ def in_units_of(preset: ColumnMap, found: ColumnMap) -> ColumnMap:
 
 
 def _joints(columns: Sequence[str]) -> tuple[str, ...]:
-    """Joint names, where the columns' names hold them."""
+    """Joint names, if the names of all columns contain them."""
     found = [m.group(2) or m.group(3) for n in columns if (m := _NAMED.match(_UNIT.sub("", n)))]
     return tuple(found) if len(found) == len(columns) else ()
 
@@ -272,7 +270,7 @@ def rate_of(q: Array, qd: Array) -> float:
 
     Args:
         q: shape (rows, n).
-        qd: in the same unit a second, shape (rows, n).
+        qd: in the same unit per second, shape (rows, n).
     """
     change, speed = np.diff(q, axis=0), (qd[1:] + qd[:-1]) / 2
     good = np.isfinite(change) & np.isfinite(speed)
@@ -288,11 +286,11 @@ def described(columns: ColumnMap) -> str:
     ampere = "mA" if columns.current_scale == 1e-3 else "A"
     time = f"time {columns.t} [{unit}]"
     if columns.t is None:
-        time = f"no time, {columns.clock:g} rows a second as velocities say"
+        time = f"no time, {columns.clock:g} rows per second by the velocities"
     scale = columns.torque_scale
-    assert isinstance(scale, float)  # one unit for all joints, as recognised
+    assert isinstance(scale, float)  # `recognised` makes no scale per joint
     torque = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m"}[abs(scale)]
-    torque += ", other sign" if scale < 0 else ""
+    torque += ", opposite sign" if scale < 0 else ""
     parts = [time, f"positions {_span(columns.q)} [{angle}]"]
     parts.append(f"velocities {_span(columns.qd)} [{angle}/s]" if columns.qd else "no velocities")
     parts.append(

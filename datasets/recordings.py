@@ -24,14 +24,14 @@ def simulate_all(
     label: str = "simulate",
     checkers: Sequence[str] = (),
 ) -> Generator[Trace]:
-    """The traces of ``episodes``, in their order for any number of workers.
+    """Simulate episodes and yield their traces in the given order.
 
     Args:
-        episodes: what to simulate.
-        workers: processes (default: the processors there are); 1 stays in this process.
+        episodes: to simulate.
+        workers: number of processes (default: one per processor); 1 computes in this process.
         label: of the progress bar.
         checkers: names of contact checkers that fill ``Trace.contacts``. A checker of your own
-            must be registered where a worker process imports it, or ``workers`` must be 1.
+            must be registered in a module that worker processes import, or ``workers`` must be 1.
     """
     workers = min(workers or os.cpu_count() or 1, max(len(episodes), 1))
     bar = tqdm(total=len(episodes), desc=label, unit="episode", disable=None, leave=False)
@@ -59,18 +59,18 @@ def write_dataset(
     workers: int | None = None,
     checkers: Sequence[str] = (),
 ) -> list[Path]:
-    """Write one MCAP file an episode into ``folder``; files of the same episodes are kept.
+    """Write one MCAP file per episode into ``folder``; existing files of the episodes are kept.
 
     Args:
-        episodes: what to simulate.
-        folder: made if it does not exist.
-        workers: processes (default: the processors there are); 1 stays in this process.
+        episodes: to simulate.
+        folder: created if it does not exist.
+        workers: number of processes (default: one per processor); 1 computes in this process.
         checkers: as for :func:`simulate_all`.
 
     Raises:
-        OSError: the folder cannot be made or written, or a worker died.
-        ValueError: an unknown checker; a file holds the episode with other checkers (nothing is
-            overwritten).
+        OSError: the folder cannot be created or written, or a worker died.
+        ValueError: an unknown checker, or a file of the episode with contacts of other checkers
+            (nothing is overwritten).
     """
     from tauguard.contacts import registered  # here, as it takes long to import
 
@@ -89,7 +89,7 @@ def write_dataset(
 
 
 def _place(folder: Path, number: int, episode: Episode) -> Path:
-    """The file of an episode; another run's settings give another name."""
+    """The path of an episode; its name contains a hash of the episode's settings."""
     kind = "episode" if episode.collisions or episode.objects else "free"
     old = folder / f"episode-{number:05d}.mcap"  # the name in earlier versions
     if old.exists() and read_mcap(old).meta.get("config_sha256") == episode.config_hash:
@@ -139,7 +139,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         trace = read_mcap(path)
         if trace.truth is None:
             raise ValueError(f"{path}: no truth in it; simulated recordings have one")
-        with reading(path):  # as for logs: a gap is not counted as time without an alarm
+        with reading(path):  # refuses gaps, which would count as time without an alarm
             checked(trace, lambda row: f"sample {row}")
         traces.append(replace(trace, meta={**trace.meta, "log": str(path.relative_to(folder))}))
     return traces

@@ -20,12 +20,12 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 
 @dataclass(frozen=True)
 class RobotSource:
-    """An arm by name or file, and its identity when the dataset was described."""
+    """An arm by name or file, and the hash of its model when the dataset was described."""
 
     name: str  #: name in the dataset: the given name, or the file's without extension
     source: str
-    """A name that :func:`tauguard.models.load_arm` knows, or a file's whole path; in a dataset's
-    folder the file's name alone."""
+    """A name that :func:`tauguard.models.load_arm` accepts, or the absolute path of a file. In
+    ``dataset.json`` it is the file's name without folder."""
     joints: tuple[str, ...]
     sha256: str  #: hash of everything that its simulation depends on
 
@@ -38,7 +38,7 @@ def find_robot(asked: str, folder: Path) -> RobotSource:
     """The arm that a configuration in ``folder`` asks for.
 
     Raises:
-        ValueError: no such arm, one that cannot be used, or an unfit file name.
+        ValueError: no such arm, one that cannot be used, or a file name that is not allowed.
     """
     file = next((p.resolve() for p in (folder / asked, Path(asked)) if p.is_file()), None)
     source, name = (str(file), file.stem) if file else (asked, asked)
@@ -95,12 +95,12 @@ def _scene(source: str) -> Scene:
 
 @functools.lru_cache(maxsize=16)
 def _composed(source: str, changed: tuple[int, ...]) -> Scene:
-    """The nominal scene; its text takes seconds to write where there are detailed meshes."""
+    """The nominal scene, cached: with detailed meshes its text takes seconds to write."""
     return compose(SceneSpec(arm=source), visuals=False)
 
 
 def _digest(scene: Scene) -> str:
-    """SHA-256 of the nominal arm with its shapes, and of the numbers that are not in its file."""
+    """SHA-256 of the nominal arm with its shapes, and of the facts that are not in its file."""
     facts = scene.facts
     rest = {key: value for key, value in asdict(facts).items() if key not in ("name", "sources")}
     text = json.dumps(rest, sort_keys=True, default=_plain)

@@ -1,8 +1,9 @@
 """The episodes of a configuration, each a pure function of the configuration and its number.
 
 Each property of an episode (arm, individual, speed, payload, collisions or none) and of a
-collision (kind, link, severity) is dealt from its own deck of cards, which is shuffled in every
-round. So any part of a split is balanced to within one round, and properties are not correlated.
+collision (kind, link, severity) has its own list of values. The list is used up in a random order,
+then again in a new order, and so on. So each part of a split is balanced to within one pass through
+the list, and properties are not correlated.
 """
 
 import hashlib
@@ -42,7 +43,7 @@ class Planned:
         return f"{self.split}/{self.number}"
 
     def key(self, configuration: Configuration, code: str) -> str:
-        """SHA-256 of what decides the episode's bytes: configuration, number and code."""
+        """SHA-256 of configuration, number and code, which decide the episode's bytes."""
         text = "\n".join((configuration.identity, self.name, self.episode.config_hash, code))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -64,7 +65,7 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
     picked = not struck and payload > 0 and dealt(_fraction(split.picks), [*seed, 6], draw)
     picks = (PayloadPick(split.seconds / 2, payload),) if picked else ()
     widths = dict(configuration.mismatch)
-    # A pair has one temperature, so its collisions are drawn by a generator of their own.
+    # Drawing collisions must not change the temperature, which both episodes of a pair have.
     hits = np.random.default_rng([*seed, 10, draw]) if split.paired else rng
     episode = Episode(
         seed=int(rng.integers(2**62)),
@@ -83,9 +84,9 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
 
 
 def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
-    """The number that seeds an episode's draw, and whether the episode has collisions.
+    """The number that an episode is drawn with, and whether the episode has collisions.
 
-    The number of the pair seeds both of its episodes; the second one has the collisions.
+    Both episodes of a pair are drawn with the pair's number; the second one has collisions.
     """
     if split.paired:
         return number // 2, bool(number % 2)
@@ -93,14 +94,14 @@ def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
 
 
 def dealt(values: Sequence[T], seed: list[int], number: int) -> T:
-    """Card ``number`` of a deck of ``values`` that is shuffled anew in every round."""
+    """Value ``number`` of the sequence that repeats ``values``, each time in a new random order."""
     round_, place = divmod(number, len(values))
     order = np.random.default_rng([*seed, round_]).permutation(len(values))
     return values[int(order[place])]
 
 
 def _fraction(fraction: float) -> tuple[bool, ...]:
-    """A deck of at most 20 cards with this fraction of True."""
+    """At most 20 values for :func:`dealt`, of which this fraction is True."""
     part = Fraction(fraction).limit_denominator(20)
     yes, no = part.numerator, part.denominator - part.numerator
     return (True,) * yes + (False,) * no
@@ -109,7 +110,7 @@ def _fraction(fraction: float) -> tuple[bool, ...]:
 def _collisions(
     split: Split, seed: list[int], draw: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
-    """The collisions of an episode; dealing continues from the episode with collisions before."""
+    """The collisions of an episode; :func:`dealt` goes on where the last such episode ended."""
     before = (
         draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
     )
@@ -124,12 +125,12 @@ def _collisions(
     )
 
 
-#: Counts by class (arm, speed, payload; kind, link and severity of collisions) and its value.
+#: Counts by property (arm, speed, payload; kind, link and severity of collisions) and value.
 Balance = dict[str, dict[str, int]]
 
 
 def stated_balance(configuration: Configuration) -> dict[str, Balance]:
-    """Planned counts by class in each split, computed without drawing every episode."""
+    """Planned counts of each split, computed without drawing every episode."""
     return {split.name: _stated(configuration, split) for split in configuration.splits}
 
 
@@ -162,7 +163,7 @@ def _stated(configuration: Configuration, split: Split) -> Balance:
 
 
 def _dealt_counts(values: Sequence[T], seed: list[int], count: int) -> Counter[T]:
-    """How often each value is dealt to the first ``count`` episodes."""
+    """How often each value is among the first ``count`` values of :func:`dealt`."""
     rounds, rest = divmod(count, len(values))
     found: Counter[T] = Counter()
     for value in values:

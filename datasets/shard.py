@@ -31,11 +31,13 @@ from tauguard.envs import Simulation, SimulationDiverged
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 
-#: Gain of the momentum observer [1/s]; width of the sign change of nominal friction [rad/s].
-OBSERVER_GAIN, STANDSTILL = 50.0, 0.05
+#: Gain of the momentum observer [1/s].
+OBSERVER_GAIN = 50.0
+#: Nominal Coulomb friction is multiplied by tanh of the velocity over this [rad/s].
+STANDSTILL = 0.05
 #: Rate of the physics [Hz].
 PHYSICS_RATE = 1000
-#: zstd's level; the levels above cost much time for a few percent.
+#: Compression level of zstd; higher levels take much longer and save a few percent.
 ZSTD_LEVEL = 3
 
 
@@ -81,12 +83,13 @@ def make_shard(task: ShardTask) -> Done:
     """Simulate and write a shard, unless it exists and is intact.
 
     Raises:
-        ValueError: this machine or this installation computes other bytes than the dataset's.
-        OSError: it cannot be written.
+        ValueError: this machine or installation computes other bytes than the command's, or an
+            arm's file has changed.
+        OSError: the shard cannot be written.
     """
     if code() != task.code:
         raise ValueError(
-            "a worker has other code, or computes other bits, than the command that sent it work: "
+            "a worker has other code, or rounds differently, than the command that started it: "
             "install the same versions on all machines, and use one kind of processor"
         )
     configuration = Configuration.from_json(task.configuration)

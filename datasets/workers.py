@@ -1,4 +1,4 @@
-"""Worker processes; no process outlives the command, and the death of one is an error."""
+"""Worker processes. They end with the command; if one dies, the command fails."""
 
 import contextlib
 import multiprocessing
@@ -71,7 +71,7 @@ def in_processes(
     Args:
         work: a function of a module; workers import it by its name.
         tasks: taken one by one, when a worker is free.
-        workers: processes; 1 stays in this process.
+        workers: number of processes; 1 computes in this process.
 
     Raises:
         WorkerDied: a worker was killed.
@@ -106,7 +106,7 @@ def in_processes(
 
 
 def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Connection:
-    """Start a worker and enter it in ``crew``; a stop signal is handled after both are done."""
+    """Start a worker and put it into ``crew``; a stop signal is handled only after both."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
@@ -120,9 +120,9 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
 
 @contextlib.contextmanager
 def _stop_signals_deferred() -> Iterator[None]:
-    """Context that defers signals to stop until its end.
+    """Context that defers SIGINT and SIGTERM until its end.
 
-    Masking them in this thread is not enough: they would reach another thread of the process.
+    Masking the signals in this thread is not enough: another thread would receive them.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -156,9 +156,9 @@ def _ctrl_c_blocked() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _without_opengl() -> Iterator[None]:
-    """Let MuJoCo load no OpenGL in processes started here; workers draw nothing.
+    """Context in which started processes do not load OpenGL, because workers draw nothing.
 
-    GLFW asks for its version in one more process, which reports a stop as a broken pipe.
+    GLFW finds its version by a further process, which would print an error if it is stopped.
     """
     before = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = "disable"
@@ -189,7 +189,7 @@ def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Stop at once if the parent was killed, because another run may begin soon."""
+    """End this worker as soon as the parent has died, so that it does not disturb a new run."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])
@@ -200,7 +200,7 @@ def _receive(pipe: Connection, process: BaseProcess) -> Any:
     try:
         result, error, trace = pipe.recv()
     except (EOFError, ConnectionError):
-        process.join(1)  # its pipe is closed: the worker is about to end, and so is the command
+        process.join(1)  # the worker closed its pipe, so it is about to end
         code = process.exitcode or 0
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         raise WorkerDied(f"a worker process died ({how})") from None

@@ -1,7 +1,7 @@
-"""LeRobotDataset v3.0, written with pyarrow alone (LeRobot's own pins exclude ours).
+"""Write LeRobotDataset v3.0 with pyarrow, because LeRobot requires other versions of packages.
 
-Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. A dataset that is put on the hub
-must carry the git tag ``v3.0``, or LeRobot's loader refuses it.
+Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. A dataset on the hub needs the git
+tag ``v3.0``; otherwise LeRobot's loader refuses it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = NDArray[Any]
 
 VERSION = "v3.0"
 TASK = "move between random poses; collisions are labelled"
-#: Rows of a data file: about LeRobot's 100 MB at six joints.
+#: Rows of a data file: about 100 MB (LeRobot's default) with six joints.
 ROWS_A_FILE = 1_000_000
 CHUNK = 1000
 
@@ -32,14 +32,14 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
     """Write traces with truth as one LeRobot dataset; returns the number of episodes.
 
     Args:
-        traces: one per episode, all of equally many joints.
-        folder: a new or empty one.
-        rate: rate of their rows [Hz].
-        robot: what LeRobot calls the robot type.
+        traces: one per episode, all with the same number of joints.
+        folder: new or empty.
+        rate: sample rate of the traces [Hz].
+        robot: LeRobot's ``robot_type``.
 
     Raises:
         ValueError: the folder is not empty, no traces, or traces without truth.
-        OSError: it cannot be written.
+        OSError: the folder cannot be written.
     """
     if folder.exists() and any(folder.iterdir()):
         raise ValueError(f"{folder}: not empty; name a new folder")
@@ -111,7 +111,7 @@ class Moments:
     """Minimum, maximum, mean and standard deviation of columns, accumulated part by part."""
 
     def __init__(self, values: Array) -> None:
-        """Of rows (T,) or (T, c)."""
+        """Moments of ``values``, shape (T,) or (T, c)."""
         wide = values.reshape(len(values), -1).astype(np.float64)
         self.count = len(wide)
         self.low, self.high, self.mean = wide.min(axis=0), wide.max(axis=0), wide.mean(axis=0)
@@ -233,7 +233,7 @@ def _write_meta(
 
 
 def _tasks() -> pa.Table:
-    """The only task as a data frame that has the task as its index, as LeRobot reads it."""
+    """The only task, as a pandas table with the task as index (LeRobot's form)."""
     index = "__index_level_0__"
     columns: list[dict[str, Any]] = [
         {"name": "task_index", "field_name": "task_index", "pandas_type": "int64"},

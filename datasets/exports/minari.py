@@ -9,24 +9,24 @@ import numpy as np
 from tauguard.extras import extra
 from tauguard.traces import Trace
 
-#: Minari's warnings of an author, code and environments that are not given.
+#: Minari's warnings that author, code and environments are not given.
 NOT_GIVEN = r"`(code_permalink|author|author_email|eval_env)` is set to None|env_spec is None"
 
 
 def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
     """Write traces with truth as a Minari dataset into Minari's own folder of datasets.
 
-    The observation is (q, qd, current), the action the references (q_des, qd_des), the reward 0;
-    ``infos`` has the truth: ``tau_ext``, ``contact_force`` (x, y, z) and ``contact_link``. An
-    episode is one trace; it is truncated at its end.
+    The observation is (q, qd, current), the action is the references (q_des, qd_des), the reward
+    is 0. ``infos`` has the truth: ``tau_ext``, ``contact_force`` (x, y, z) and ``contact_link``.
+    Each trace is one episode, truncated at its last step.
 
     Args:
-        traces: one per episode, all of equally many joints.
+        traces: one per episode, all with the same number of joints.
         name: Minari's id, ``namespace/name-v0``.
-        rate: rate of their rows [Hz], put into the description.
+        rate: sample rate of the traces [Hz], for the description.
 
     Returns:
-        How many episodes there were.
+        Number of episodes.
 
     Raises:
         ValueError: Minari is not installed, there is such a dataset already, no traces, or traces

@@ -329,7 +329,7 @@ def test_what_reading_a_played_log_mended_is_said(alarm, struck, tmp_path, capsy
     names = ["t", *(f"{what}_{i}" for what in ("q", "qd", "current") for i in range(1, 7))]
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(names), comments="")
     opened(None, 1, tmp_path / "a.csv", "auto", False, None, 0.0, alarm).close()
-    assert "note: a.csv: 1 times a row is earlier than the last: sorted" in capsys.readouterr().out
+    assert "note: a.csv: rows sorted by time; 1 were out of order" in capsys.readouterr().out
 
 
 @pytest.mark.slow

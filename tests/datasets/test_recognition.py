@@ -128,7 +128,7 @@ def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
     found = recognised(names, table)
     assert (found.t, found.torque) == (time, tuple(names[5:]))
     assert (found.time_scale, found.torque_scale) == scales
-    unit = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m", -1e-3: "mN m, other sign"}[scales[1]]
+    unit = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m", -1e-3: "mN m, opposite sign"}[scales[1]]
     assert f"[{unit}]" in described(found)
 
 
@@ -277,7 +277,7 @@ def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp
     assert np.diff(log.trace.t).max() <= 0.015 + 1e-9
     moving = log.trace.t < 1.5
     np.testing.assert_allclose(log.trace.t[moving], 0.01 * np.arange(moving.sum()), atol=1e-9)
-    assert "58 % of the rows repeat the state before" in log.notes[0]
+    assert "58 % of the rows repeat the previous state" in log.notes[0]
 
 
 def test_a_fast_log_of_an_arm_that_rarely_repeats_keeps_all_rows(tmp_path):
@@ -319,7 +319,7 @@ def test_real_logs_of_arms_with_torque_sensors_are_recognised(data_dir, file, pr
     log = read_log(data_dir / file)
     assert log.trace.meta["columns"] == preset
     assert log.trace.meta["effort"] == "torque"
-    assert any(f"{share} of the rows repeat the state before" in note for note in log.notes)
+    assert any(f"{share} of the rows repeat the previous state" in note for note in log.notes)
     assert log.trace.dt == pytest.approx(0.01, rel=0.05)
 
 
@@ -340,7 +340,7 @@ def test_torques_of_kuka_s_fri_have_the_other_sign_and_estimates_are_not_taken(t
     groups = {"external_torque": 0 * i, "measured_joint_position": q, "measured_torque": -i}
     names = [f"/lbr/state/{name}[{k}]" for name in groups for k in range(2)]
     path = written(tmp_path / "log.csv", ["time", *names], t, *groups.values())
-    with pytest.raises(ValueError, match=r"measured_torque\[1\] \[N m, other sign\]"):
+    with pytest.raises(ValueError, match=r"measured_torque\[1\] \[N m, opposite sign\]"):
         read_log(path)
     np.testing.assert_allclose(read_log(path, "auto").trace.current, i)
 
@@ -361,7 +361,7 @@ def test_presets_of_makers_formats(tmp_path, preset):
 def test_a_log_without_a_clock_gets_the_one_that_velocities_tell(tmp_path):
     t, q, qd, i = motion(dt=0.008)
     path = written(tmp_path / "log.csv", pairs("q#", "qd#", "current#"), q, qd, i)
-    with pytest.raises(ValueError, match="no time, 125 rows a second as velocities say"):
+    with pytest.raises(ValueError, match="no time, 125 rows per second by the velocities"):
         read_log(path)
     np.testing.assert_allclose(read_log(path, "auto").trace.t, t, rtol=1e-3)
     columns = ColumnMap("t", ("q0", "q1"), ("qd0", "qd1"), ("current0", "current1"))
