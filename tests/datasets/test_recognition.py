@@ -253,7 +253,7 @@ def test_units_and_order_are_proposed_and_read_when_accepted(tmp_path, accepted)
     np.testing.assert_allclose(log.trace.qd, qd, atol=1e-8)
     np.testing.assert_allclose(log.trace.current, current, atol=1e-8)
     assert log.notes[0].startswith("read as time stamp [ms]")
-    assert "times a row is earlier" in log.notes[1]
+    assert "were out of order" in log.notes[1]
 
 
 def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp_path):
