@@ -149,9 +149,9 @@ def initial_arm(
     if is_torque(recordings[0].trace):
         if gains:
             raise ValueError(
-                "--gains: by their columns' names the logs hold joint torques, which need none; if "
-                "they are motor currents, give --columns a JSON file whose `current` lists these "
-                "columns"
+                "--gains: the logs hold joint torques, by the names of their columns, and torques "
+                "need no gains; if they are motor currents, give --columns a JSON file whose "
+                "`current` lists these columns"
             )
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     traces = [r.trace for r in recordings]
