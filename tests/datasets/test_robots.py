@@ -157,7 +157,7 @@ def test_a_split_strikes_links_that_its_arms_have(described):
     (described.parent / "robots" / "other.toml").write_text(few)
     assert load(described).splits[0].links == (2, 3)
     described.write_text(described.read_text() + "links = [5]\n")
-    with pytest.raises(ValueError, match=r"links = \(5,\): expected 1 to 3, which every arm"):
+    with pytest.raises(ValueError, match=r"links = \(5,\): expected 1 to 3, links of every arm"):
         load(described)
 
 
