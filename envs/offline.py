@@ -1,4 +1,4 @@
-"""Datasets for offline learning, the extra ``export``; see :mod:`tauguard.envs.adapters`."""
+"""Datasets for offline learning (extra ``export``), from :mod:`tauguard.envs.adapters`."""
 
 from tauguard.envs.adapters.offline import record_policy
 

@@ -1,4 +1,4 @@
-"""The native plant of a scene: MuJoCo's step, the drives and the servo in one."""
+"""The native plant of a scene: MuJoCo's step, drives and servo."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Gains:
     def for_scene(cls, scene: Scene) -> Gains:
         """Critically damped gains for the largest inertia that each joint has over its range.
 
-        The natural frequency is the arm's ``bandwidth``; a default one is lowered if the time
-        step is too long for it. (The CURA6-like arm's gains are those of its home pose.)
+        The natural frequency is the arm's ``bandwidth``. A default bandwidth is lowered if the time
+        step is too long for it. (For the CURA6-like arm, the inertia is that of the home pose.)
 
         Raises:
             ValueError: the time step is too long for the stated bandwidth; the message names the
-                joint and what would hold.
+                joint and what would work.
         """
         facts, model = scene.facts, scene.model
         inertia = facts.servo_inertia
@@ -61,18 +61,18 @@ def _home_inertia(scene: Scene) -> Array:
     return np.asarray(np.diag(mass)[scene.dof_adr])
 
 
-# Native code does not let MuJoCo read the clock while it steps.
+# Native code replaces this clock while it steps, because reading it takes time.
 _plant.set_clock(variable_address("mjcb_time"))
 
 
 def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) -> _plant.Plant:
-    """The plant that steps ``data``, which it keeps alive, as well as the scene's model.
+    """The plant that steps ``data``; it keeps ``data`` and the scene's model alive.
 
     Args:
-        scene: the composed scene; ``scene.drive`` is what is simulated.
-        nominal: drive that the controller assumes (its gains).
+        scene: the composed scene; ``scene.drive`` is simulated.
+        nominal: drive that the controller assumes: its gains, and the friction that is compensated.
         gains: of the servo.
-        data: of the scene's model.
+        data: data of the scene's model.
     """
     model = scene.model
     dt, constant = float(model.opt.timestep), scene.drive.electrical_time_constant
@@ -90,7 +90,7 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
 
 
 def make_physics(model: mujoco.MjModel, data: mujoco.MjData) -> _plant.Physics:
-    """MuJoCo's functions on ``data`` for native code, which keeps both alive."""
+    """MuJoCo's functions on ``data`` for native code, which keeps model and data alive."""
     return _plant.Physics(
         model,
         data,

@@ -1,4 +1,4 @@
-"""Trained policies as plain files: a small network in NumPy, without pickle and without PyTorch."""
+"""Trained policies as NumPy archives: small networks, without pickle and without PyTorch."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from tauguard.untrusted_input import reading
 
 #: Observations are normalised and clipped to this many standard deviations, as VecNormalize does.
 CLIP = 10.0
-#: Number of observations that a loaded policy's statistics stand for when training continues.
+#: Weight of a loaded policy's normalisation when training continues, as a number of observations.
 SEEN = 1e5
 
 
 @dataclass(frozen=True, eq=False)
 class MlpPolicy:
-    """Layers with tanh between them, after a normalisation of the observation.
+    """A perceptron with tanh between its layers, on the normalised observation.
 
-    ``policy(observation)`` is the action, shape (m,); of observations (N, size) it is (N, m).
+    ``policy(observation)`` is the action, shape (m,). For observations of shape (N, size) the
+    actions have the shape (N, m).
     """
 
-    mean: Array  #: of the observation, shape (size,)
-    deviation: Array  #: shape (size,)
+    mean: Array  #: mean observation, shape (size,)
+    deviation: Array  #: standard deviation of the observation, shape (size,)
     weights: tuple[Array, ...]  #: of each layer, shape (outputs, inputs)
-    biases: tuple[Array, ...]  #: shape (outputs,)
-    #: Where it was trained, as ``gymnasium.make(**policy.environment)`` takes it: ``id`` and
-    #: keywords; empty where that is not known.
+    biases: tuple[Array, ...]  #: of each layer, shape (outputs,)
+    #: ``gymnasium.make(**policy.environment)`` makes the environment of training; empty: unknown.
     environment: Mapping[str, Any] = field(default_factory=dict)
 
     def __call__(self, observation: ArrayLike) -> Array:
@@ -56,15 +56,15 @@ class MlpPolicy:
         return np.clip(x, -1.0, 1.0)
 
     def __repr__(self) -> str:
-        """The sizes of its layers."""
+        """The sizes of the layers."""
         sizes = [len(self.mean), *(len(bias) for bias in self.biases)]
         return f"MlpPolicy({' -> '.join(map(str, sizes))})"
 
     def save(self, path: str | Path) -> None:
-        """Write it as a NumPy archive of single precision.
+        """Write the policy as a NumPy archive in single precision.
 
         Raises:
-            TypeError: a value in ``environment`` that is not text, a number or a list of them.
+            TypeError: ``environment`` cannot be written as JSON.
         """
         layers = {f"weight{k}": w for k, w in enumerate(self.weights)}
         layers |= {f"bias{k}": b for k, b in enumerate(self.biases)}
@@ -97,10 +97,14 @@ class MlpPolicy:
             return cls(arrays["mean"], arrays["deviation"], weights, biases, environment)
 
     def to_sb3(self, model: Any, normalize: Any) -> None:
-        """Give a Stable-Baselines3 actor-critic this mean action, to go on learning from.
+        """Copy this policy into a Stable-Baselines3 actor-critic, to continue its training.
+
+        Args:
+            model: gets the layers that lead to the mean action.
+            normalize: its ``VecNormalize``, which gets mean and variance of the observation.
 
         Raises:
-            ValueError: layers of other sizes, or an environment of other observations.
+            ValueError: layers of other sizes.
         """
         rms, layers = normalize.obs_rms, _actor(model)
         found = [tuple(layer.weight.shape) for layer in layers]
@@ -113,7 +117,7 @@ class MlpPolicy:
 
     @classmethod
     def from_sb3(cls, model: Any, normalize: Any) -> MlpPolicy:
-        """The mean action of a Stable-Baselines3 actor-critic with a ``VecNormalize``."""
+        """The policy of a Stable-Baselines3 actor-critic with ``VecNormalize``: its mean action."""
         rms, layers = normalize.obs_rms, _actor(model)
         return cls(
             np.asarray(rms.mean),

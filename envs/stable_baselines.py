@@ -1,4 +1,4 @@
-"""For Stable-Baselines3, the extra ``learn``; see :mod:`tauguard.envs.adapters`."""
+"""Adapters for Stable-Baselines3 (extra ``learn``), from :mod:`tauguard.envs.adapters`."""
 
 from tauguard.envs.adapters.stable_baselines import NativeVecEnv
 

@@ -1,4 +1,4 @@
-"""The wrappers in one place."""
+"""All Gymnasium wrappers of tauguard, to import from one module."""
 
 from tauguard.envs.adapters.budget import CostBudget, CostStep
 from tauguard.envs.adapters.observations import CameraObservation, DetectorObservation

@@ -1,4 +1,4 @@
-"""Display in a separate thread: a slow viewer drops answers and never delays the detector."""
+"""Display in a separate thread: a slow viewer misses answers, but never delays the detector."""
 
 import threading
 from collections import deque
@@ -8,7 +8,7 @@ from typing import Self
 from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live.stream import Sample
 
-#: Length of the queue of answers; further answers are dropped, changes of state last.
+#: Largest number of queued answers; further ones are dropped. For changes of state it is doubled.
 WAITING = 1000
 #: At the end, wait this long for answers that have not been shown [s].
 PATIENCE = 1.0
@@ -22,7 +22,7 @@ class BackgroundDisplay:
     """
 
     def __init__(self, show: Callable[[Sample, Answer], None], waiting: int = WAITING) -> None:
-        """Take the function that shows one answer; it may block."""
+        """Show answers by the function ``show``, which may block."""
         self._show, self._most = show, waiting
         self._queue: deque[tuple[Sample, Answer]] = deque()
         self._wake, self._over = threading.Event(), False

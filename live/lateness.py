@@ -2,26 +2,26 @@
 
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
-#: Longest time without a sample, and largest delay of a sample compared with the least delayed one;
-#: beyond it is a fault [s].
+#: Limit of time without a sample, and of a sample's delay relative to the least delayed one [s].
 BEHIND = 20e-3
 #: The limit is at least this number of sample intervals.
 INTERVALS = 2.5
-#: Two clocks may drift apart at this rate: by its data sheet each crystal is off by at most 5e-5
-#: (20 to 50 ppm with temperature and age). A delay that grows more slowly is not seen.
+#: Largest relative drift of two clocks, twice that of a crystal: 20 to 50 ppm by data sheets, with
+#: temperature and age. A delay that grows more slowly is not detected.
 DRIFT = 1e-4
 
 
 def most_behind(dt: float) -> float:
-    """The silence or lateness that is a fault at this sample interval [s]."""
+    """Largest silence and delay that are no fault at the sample interval ``dt`` [s]."""
     return max(BEHIND, INTERVALS * dt)
 
 
 class Lateness:
-    """How late a sample is, compared with the least late sample so far.
+    """Delay of each sample relative to the least delayed sample so far.
 
-    The difference of the two clocks is unknown, so its least value counts as no delay. This value
-    may grow by ``DRIFT``, so that a drift of the clocks is not taken for lateness.
+    The offset between the robot's clock and this machine's is unknown. So the least difference of
+    arrival and time stamp so far counts as no delay. It grows by ``DRIFT``, so that a drift of the
+    clocks does not count as delay.
     """
 
     def __init__(self, dt: float) -> None:
@@ -34,7 +34,7 @@ class Lateness:
 
         Time stamps of samples that the monitor rejects are ignored, so one stale packet does not
         change the lateness of others. After a restart of the robot's clock the measurement restarts
-        when the monitor has settled.
+        as soon as the monitor accepts samples.
 
         Args:
             answer: the monitor's.
@@ -62,7 +62,7 @@ class Lateness:
 def late_answer(answer: Answer, late: float) -> Answer:
     """The answer to a late sample.
 
-    Without a collision the state is not "free", because the robot has moved on.
+    The state is a collision or a fault, never "free", because the robot has moved on.
     """
     reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
     return answer._replace(state=COLLISION if answer.alarm else FAULT, reason=reason)

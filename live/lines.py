@@ -18,7 +18,7 @@ class LineStream(Closing):
 
     Args:
         stream: an open file such as ``sys.stdin``; its file descriptor is read.
-        joint_names: what the joints are called, in the order of the columns.
+        joint_names: names of the joints, in the order of the columns.
         rate: expected sample rate [Hz].
     """
 
@@ -27,13 +27,13 @@ class LineStream(Closing):
         self.joint_names, self.rate = tuple(joint_names), rate
         self.events: list[str] = []
         self._file, self._pending, self._lines = stream, b"", 0
-        self._ready = selectors.SelectSelector()  # a file can be waited for, too
+        self._ready = selectors.SelectSelector()  # others refuse files
         self._ready.register(stream, selectors.EVENT_READ)
 
     def read(self, timeout: float) -> Sample | None:
         """The sample of the next line, or None if none came within ``timeout`` seconds.
 
-        A line that is no sample is an event, and its values are NaN: the monitor calls it a fault.
+        A line that is no sample is listed as an event and returned as NaN, a fault to the monitor.
 
         Raises:
             StreamClosed: the stream has ended, or a line has no end.

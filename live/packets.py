@@ -1,4 +1,4 @@
-"""A log as the packets that a robot would send, and the faults that packets can have."""
+"""A log as packets of a robot, and faults that are injected into such packets."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _busiest(values: Array) -> int:
 
 
 def _encoder(packets: Packets, rows: Rows) -> Packets:
-    """The position of the joint that moves most stays; its velocity and current go on."""
+    """The position of the joint that moves most stays constant; velocity and current go on."""
     joint = _busiest(packets.q[rows])
     q = packets.q.copy()
     q[rows, joint] = q[max(rows[0] - 1, 0), joint]
@@ -175,7 +175,7 @@ def _swapped(packets: Packets, rows: Rows) -> Packets:
 
 
 def _sign(packets: Packets, rows: Rows) -> Packets:
-    """All currents have the other sign."""
+    """All currents have the opposite sign."""
     current = packets.current.copy()
     current[rows] *= -1
     return replace(packets, current=current)
@@ -188,7 +188,7 @@ def _nan(packets: Packets, rows: Rows) -> Packets:
     return replace(packets, current=current)
 
 
-#: Every fault by its name; the first line of each function says what it does.
+#: Faults by name, each described by its function's docstring.
 FAULTS: dict[str, Callable[[Packets, Rows], Packets]] = {
     "frozen": _frozen,
     "stale": _stale,

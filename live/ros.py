@@ -20,7 +20,7 @@ def sample_of(message: Any, names: Sequence[str], arrived: int) -> Sample:
     """Convert a JointState to a sample; its joints are found by name.
 
     Raises:
-        ValueError: a joint is not in it, or it has no velocities or no efforts.
+        ValueError: the message lacks a joint, velocities or efforts.
     """
     order = list(message.name)
     if missing := [name for name in names if name not in order]:
@@ -50,7 +50,7 @@ class RosStream(Closing):
     def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
         """Subscribe."""
         try:
-            # rclpy comes with a ROS 2 installation, not from a package index: it is no dependency.
+            # rclpy is no dependency: it comes with ROS 2, not from a package index.
             rclpy: Any = import_module("rclpy")
             executors: Any = import_module("rclpy.executors")
             qos: Any = import_module("rclpy.qos")

@@ -1,7 +1,7 @@
-"""The loop that asks the detector about each sample, and the record of a session.
+"""The loop that gives each sample to the detector, and the record of a session.
 
-A separate thread watches for silence. The state is a fault as soon as no sample has
-come for 20 ms, even if the stream blocks, reconnects or receives other packets.
+A separate thread detects silence. The state is a fault when no sample has come for 20 ms (or 2.5
+sample intervals), even if the stream blocks, reconnects or receives other packets.
 """
 
 import gc
@@ -54,16 +54,18 @@ class Session:
     silences: list[Silence] = field(default_factory=list)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS + 1, np.int64))
     """Samples by their latency from packet to answer, in microseconds."""
-    slowest: int = 0  #: [ns]
+    slowest: int = 0  #: largest latency [ns]
     rows: list[Sample] = field(default_factory=list)
     scores: list[float] = field(default_factory=list)
     alarms: list[bool] = field(default_factory=list)
     ended: str = ""  #: why the session ended
     lost: bool = False  #: the session ended because the connection broke
     _silence: Silence | None = None  #: the present silence
-    _now: float = np.nan  #: the last robot's time that was new [s]
-    _told: int = 0  #: this machine's clock when it came [ns]
-    _at: float = np.nan  #: robot's time of the last sample; where it stands, this machine's goes on
+    _now: float = np.nan  #: latest robot's time that differed from the one before [s]
+    _told: int = 0  #: this machine's clock when that time arrived [ns]
+    _at: float = (
+        np.nan
+    )  #: robot's time of the last sample, extrapolated while its stamps repeat [s]
 
     def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
         """Record one sample.
@@ -97,7 +99,7 @@ class Session:
 
         Returns:
             A sample without values at the present time of the robot, and the answer: a fault, or
-            the collision whose alarm was up when the samples ended.
+            the collision whose alarm was active when the samples ended.
         """
         if self._silence is None:
             self._silence = Silence(self._at, seconds)
@@ -113,7 +115,7 @@ class Session:
         return sample, self.answer
 
     def close(self, why: str, lost: bool) -> None:
-        """Record that the source ended: no sample comes any more, so the state is not free."""
+        """Record that the source ended; the state is then a fault, unless an alarm is active."""
         self.ended, self.lost = why, lost
         if not self.answer.alarm and self._silence is None:
             self.answer = self.answer._replace(state=FAULT, reason=f"no samples: {why}")
@@ -182,7 +184,7 @@ class _SilenceClock:
             self._report(sample, said)
 
     def _look(self) -> float:
-        """Record and report a silence. Returns the seconds until the next one may begin."""
+        """Record and report a silence, if there is one. Returns the seconds to the next check."""
         with self._lock:
             since = time.monotonic() - self._last
             if since < self._most:
@@ -225,21 +227,21 @@ def listen(
     report: Report | None = None,
     keep: bool = False,
 ) -> Session:
-    """Ask the monitor about every sample until the stream ends, the time is up, or Ctrl-C.
+    """Give every sample to the monitor until the stream ends, the time is over, or Ctrl-C.
 
     Args:
         stream: the robot's stream; the robot is never commanded.
         monitor: made for the stream's joints and rate.
         seconds: duration by this machine's clock.
-        report: called after every answer, and every 20 ms while no sample comes (with a sample of
-            NaN). It must return at once; the latency does not include it. During silence another
-            thread calls it, never two at a time. If it raises an exception, the session ends.
+        report: called after every answer, and repeatedly during silence (with a sample of NaN, from
+            another thread, but never from two at a time). It must return at once; the latency does
+            not include it. If it raises an exception, the session ends.
         keep: keep the samples, for :meth:`Session.trace`.
     """
     session, lateness = Session(stream.joint_names, keep), Lateness(1 / stream.rate)
     end = time.monotonic() + seconds
     collecting = gc.isenabled()
-    gc.disable()  # a collection would come between a packet and its answer
+    gc.disable()  # garbage collection would delay answers
     try:
         with _SilenceClock(session, lateness.most, report or _no_report) as clock:
             while (now := time.monotonic()) < end:

@@ -75,10 +75,10 @@ class Closing:
     """Context manager of streams and servers: closes them at the end of the block."""
 
     def close(self) -> None:
-        """Overridden."""
+        """Close; subclasses override this."""
 
     def __enter__(self) -> Self:
-        """Itself."""
+        """Return this object."""
         return self
 
     def __exit__(
@@ -87,5 +87,5 @@ class Closing:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close it."""
+        """Close this object."""
         self.close()

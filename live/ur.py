@@ -1,4 +1,4 @@
-"""A Universal Robots arm, read by RTDE; nothing is ever written to the robot but the handshake."""
+"""Read a Universal Robots arm by RTDE; nothing but the handshake is sent to the robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tauguard.live import rtde
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 from tauguard.traces.trace import UR_JOINTS
 
-#: The requested variables, and the types with which the controller must answer.
+#: The requested variables, and their types, which the controller's answer must confirm.
 VARIABLES = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
@@ -23,12 +23,12 @@ VARIABLES = {
 }
 #: Time limit for connection and handshake together [s].
 HANDSHAKE = 5.0
-#: An open connection is given up after this time without a data packet, because a robot that loses
-#: its power does not close it [s].
+#: Time without a data packet after which a connection is given up [s], because a robot that loses
+#: power does not close it.
 NO_DATA = 5.0
 #: Seconds between attempts to connect again.
 RETRY = 0.2
-#: Controllers that send 500 samples a second (e-Series, major version 5 and up); older: 125.
+#: Lowest major version of controllers that send 500 samples per second (e-Series); others send 125.
 E_SERIES = 5
 
 
@@ -43,7 +43,7 @@ class UrStream(Closing):
 
     Raises:
         ConnectionError: no answer, another protocol version, or variables that the controller does
-            not have: one line that says which.
+            not have (named in the message).
     """
 
     def __init__(
@@ -143,8 +143,7 @@ class _Connection:
     """An RTDE connection on which the controller sends data.
 
     Raises:
-        ConnectionError: no answer in time, another protocol version, or variables that the
-            controller does not have: one line that says which.
+        ConnectionError: as for :class:`UrStream`.
     """
 
     def __init__(self, host: str, port: int, rate: float | None, within: float) -> None:

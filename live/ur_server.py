@@ -1,8 +1,8 @@
 """An RTDE server on this machine that replays a log in place of a robot.
 
-It answers what a UR controller answers to a client that reads: the handshake, the recipe of output
+It answers the requests of a client that reads as a UR controller does: handshake, recipe of output
 variables, start and pause. Inputs are refused. Its clock begins with the first start. A client
-that connects later receives the log from the present time on, as it would from a robot.
+that starts later receives the log from the present time on, as it would from a robot.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tauguard.live.packets import Packets
 from tauguard.live.stream import Closing
 
 HOST = "127.0.0.1"
-#: Output variables, their types, and the field of :class:`Packets` that they come from ("" : 0).
+#: Output variables: type, and field of :class:`Packets` with the value ("": the value is 0).
 OUTPUTS = {
     "timestamp": ("DOUBLE", "t"),
     "actual_q": ("VECTOR6D", "q"),
@@ -81,7 +81,7 @@ class UrServer(Closing):
         return int(self._listener.getsockname()[1])
 
     def start(self) -> UrServer:
-        """Serve in the background; returns itself."""
+        """Serve in the background; returns this server."""
         threading.Thread(target=self._accept, daemon=True).start()
         return self
 
@@ -163,7 +163,7 @@ class _Session:
                 self._answer(request)
 
     def _send_due(self) -> float:
-        """Send what is due. Returns the seconds until more is due."""
+        """Send the packets that are due. Returns the seconds until the next one is due."""
         packets, now = self.server.packets, self.server.clock()
         while self.row < len(packets.due) and packets.due[self.row] <= now:
             if self.row % self.step == 0:
@@ -195,7 +195,7 @@ class _Session:
         elif kind == rtde.SETUP_OUTPUTS:
             answer = self._set_up(payload)
         elif kind == rtde.SETUP_INPUTS:
-            self.client.sendall(rtde.text_message("play-ur", "inputs are not taken", 1))
+            self.client.sendall(rtde.text_message("play-ur", "inputs are refused", 1))
             names = payload.decode("ascii", "replace").split(",")
             answer = b"\x00" + ",".join("NOT_FOUND" for _ in names).encode()
         elif kind in (rtde.START, rtde.PAUSE):

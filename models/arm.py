@@ -49,20 +49,22 @@ class Facts:
     armature: Array  #: rotor inertia at the joint [kg m^2]
     damping: Array  #: the file's damping, simulated by MuJoCo [N m s/rad]
     friction_loss: Array  #: the file's friction loss, simulated by MuJoCo [N m]
-    home: Array  #: [rad]
+    home: Array  #: home pose [rad]
     max_speed: Array  #: [rad/s]
     max_acceleration: Array  #: [rad/s^2]
     spread: Array  #: largest distance of drawn poses from home [rad]
-    servo_inertia: Array | None  #: [kg m^2]; None: that of the home pose
+    servo_inertia: (
+        Array | None
+    )  #: for the servo's gains [kg m^2]; None: use the home pose's inertia
     bandwidth: Array  #: bandwidth of the servo [rad/s]
     compensation: float  #: fraction of the known friction that the servo compensates
-    tool: str | None  #: site, or None: the last link's origin
-    gripper: tuple[str, ...]  #: joints below the flange
+    tool: str | None  #: site of the tool; None: the last link's origin
+    gripper: tuple[str, ...]  #: joints of the gripper
     sources: dict[str, str] = field(default_factory=dict)  #: source of each part, as text
 
     @property
     def nominal(self) -> Drive:
-        """The drive that controller and observer assume, with all friction, the file's included."""
+        """The drive that controller and observer assume; its friction includes the file's."""
         if not (self.damping.any() or self.friction_loss.any()):
             return self.drive
         own = self.drive.friction or level_friction(np.zeros_like(self.damping), self.damping * 0)
@@ -78,7 +80,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm ready to be put into a scene; ``spec`` holds nothing else."""
+    """An arm to be put into a scene; ``spec`` contains the arm only."""
 
     __repr__ = in_a_line
 
@@ -119,7 +121,7 @@ class Arm:
         return self.spec.body(self.links[-1]).add_site(name="flange")
 
     def place(self, pose: Array) -> None:
-        """Move the base: ``pose`` is the pose of the file's world in the world, shape (4, 4)."""
+        """Move the base: ``pose`` is the pose of the file's world frame in the scene, (4, 4)."""
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(pose[:3, :3]).ravel())
         frame = self.spec.worldbody.add_frame(pos=pose[:3, 3], quat=quat)
@@ -133,7 +135,7 @@ def load_arm(source: str | Robot) -> Arm:
 
     Args:
         source: "cura6", a name of :data:`tauguard.models.ROBOTS`, an MJCF or URDF file, a TOML file
-            (:meth:`Robot.from_toml`), or a robot; a file may be followed by ``#`` and the names of
+            (:meth:`Robot.from_toml`), or a robot. A file's name may end in ``#`` and the names of
             the arm's joints (:meth:`Robot.named`). Missing numbers are derived.
 
     Raises:
@@ -167,7 +169,7 @@ def _left_over(robot: Robot) -> str | None:
 def _from_file(
     robot: Robot, path: Path, modified: int, sources: tuple[tuple[str, str], ...]
 ) -> Arm:
-    """The arm of a file at a modification time (for the cache); do not change its spec."""
+    """The arm of a file, cached until the file's time changes; do not change its spec."""
     file = read_arm(path, robot.joints, robot.gripper == "weld", robot.tool)
     known = dict(sources)
     if robot.source is not None:
@@ -241,7 +243,9 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         model.dof_armature[model.joint(name).dofadr[0]] = inertia
     dofs = model.jnt_dofadr[derive.joint_ids(model, joints)]
     speed = np.where(np.isfinite(file.max_speed), file.max_speed, derive.DEFAULT_SPEED)
-    words = "the file's limits" if np.isfinite(file.max_speed).all() else "none in the file: 2"
+    words = (
+        "the file's limits" if np.isfinite(file.max_speed).all() else "none in the file: 2 rad/s"
+    )
     tip = model.body(file.links[-1]).id
     speed = said.row("max_speed", speed, words)
     drive = with_speeds(drive, speed, derive.lightest_inertia(model, joints))

@@ -1,4 +1,4 @@
-"""The drives of an arm: as its description states them, assumed, or scaled from the CURA6's."""
+"""The drives of an arm: stated in its description, assumed, or scaled from the CURA6-like arm's."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,7 +11,7 @@ from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.left_over import LeftOver
 from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joint
 
-#: Presliding distance of joints with a known friction level only [rad].
+#: Default presliding distance: Coulomb friction over bristle stiffness [rad].
 PRESLIDING = 1.5e-3
 #: Smallest time constant with which back-EMF brakes a joint [s].
 _FADE_TIME = 4e-3
@@ -33,7 +33,7 @@ def level_friction(coulomb: Array, viscous: Array) -> Friction:
 
 
 def stated_drive(stated: RobotDrive, limit: Array, sources: dict[str, str]) -> Drive:
-    """The drives that a description states; ``sources`` receives a note of what is assumed."""
+    """The drives that a description states; ``sources`` receives a note on assumed numbers."""
     n = len(limit)
     gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
     current, gain = stated.row("current_limit", n), stated.row("gain", n)
@@ -112,13 +112,13 @@ def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
 def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
     """``drive`` with friction, ripple, lag and sensor noise scaled from the CURA6-like arm.
 
-    Coulomb friction is a fraction of the torque limit, viscous friction of that limit over the
-    largest speed. Ripple and noise of the currents are fractions of the current limit. The rise of
-    friction with load is inversely proportional to the limit. Each fraction is the mean over that
-    arm's joints.
+    Coulomb friction is a fraction of the torque limit. Viscous friction is a fraction of the torque
+    limit over the largest speed. Ripple and noise of the currents are fractions of the current
+    limit. The rise of friction with load is inversely proportional to the torque limit. Each
+    fraction is the mean over the CURA6-like arm's joints.
 
     Args:
-        drive: its stated joint friction is kept.
+        drive: the drives; friction that they state is kept.
         speed: largest joint speeds [rad/s], shape (n,).
         lossy: joints with friction in the file, which get no more friction, shape (n,).
 

@@ -13,10 +13,10 @@ from tauguard.models.mjcf import SpecText, compiled, inline_meshes
 from tauguard.models.robot_check import checked_robot
 from tauguard.models.urdf import UrdfFile, is_urdf, max_speeds, read_urdf
 
-#: Collision bits of the arm and of obstacles; the arm has no collisions with itself.
+#: Bits of MuJoCo's ``contype`` of the arm and of obstacles; the arm does not collide with itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
-#: Radius of the capsule that replaces a link without any shape: at most [m], and as a fraction of
-#: the arm's length.
+#: Largest radius [m] of the capsule that a link without any shape gets, and that radius as a
+#: fraction of the arm's length.
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
 #: Colour of that capsule; group of collision shapes if the file has visual shapes, too.
 STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
@@ -36,7 +36,7 @@ _KINDS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 @dataclass(frozen=True)
 class ArmFile:
-    """The content of a file about an arm; ``spec`` holds nothing else."""
+    """The arm in a file; ``spec`` contains the arm only."""
 
     spec: mujoco.MjSpec
     links: tuple[str, ...]  #: the body of each joint, base to tip
@@ -44,7 +44,7 @@ class ArmFile:
     torque_limit: Array  #: [N m], infinite where the file has none, shape (n,)
     max_speed: Array  #: [rad/s], infinite where the file has none, shape (n,)
     home: Array | None  #: joint positions of the file's first keyframe [rad], shape (n,)
-    gripper: tuple[str, ...]  #: joints below the flange
+    gripper: tuple[str, ...]  #: joints of the gripper
     model: mujoco.MjModel  #: ``spec`` compiled without its shapes
     mended: tuple[str, ...]  #: links of a URDF whose impossible inertia was corrected
     sticks: tuple[str, ...]  #: links without any shape, which were given a capsule
@@ -68,8 +68,8 @@ def read_arm(
         wanted: names of the arm's joints; every other joint is welded at zero. The
             default is the file's only chain; branches at its end are a gripper.
         weld_gripper: weld the joints of the gripper (otherwise they move without a drive).
-        tool: a body or site; a body, and any body with a usual name of a tool frame, becomes a
-            site.
+        tool: name of a body or site. A body of this name, or of a usual name of a tool frame, gets
+            a site of its name.
 
     Raises:
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
@@ -241,8 +241,8 @@ def _chain(
             joint = body.joints[0]
             if len(body.joints) > 1 or joint.type not in _KINDS:
                 raise ValueError(
-                    f"body {body.name!r}: expected one hinge or slide joint a body; name the arm's "
-                    'joints, Robot(file, joints=("...", ...)), and the others are welded'
+                    f"body {body.name!r}: expected one hinge or slide joint per body; name the "
+                    'arm\'s joints, Robot(file, joints=("...", ...)), and the others are welded'
                 )
             links.append(body.name)
             joints.append(joint.name)
@@ -263,7 +263,7 @@ def _ends(moving: list[mujoco.MjsBody]) -> str:
 
 
 def _longest(body: mujoco.MjsBody, before: int = 0) -> list[str]:
-    """Joints of the longest chain from a body on, without short branches at its end: fingers."""
+    """Joints of the longest chain from a body on, without short branches (fingers) at its end."""
     names = [joint.name for joint in body.joints]
     count = before + len(names)
     parts = [part for part in body.bodies if any(_joints_below(part))]
@@ -298,7 +298,7 @@ def _let_collide(
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Set the arm's collision bits on all colliding geoms, and give every link such a geom.
 
-    Returns the links without any shape, and all whose shape differs from the file's, and how.
+    Returns the links that got a capsule; the links whose shape differs from the file's, and how.
     """
     sticks, replaced = [], {}
     for geom in spec.geoms:
@@ -318,7 +318,7 @@ def _let_collide(
             continue
         for geom in geoms:
             geom.contype, geom.conaffinity = ARM_BITS, OBSTACLE_BITS
-        words = "convex hull of what shows"
+        words = "convex hull of its visual shapes"
         if not geoms:
             span = np.array(spec.body(links[i + 1]).pos) if i + 1 < len(links) else np.zeros(3)
             _add_stick(body, span, radius)

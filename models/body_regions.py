@@ -75,7 +75,7 @@ _TABLE = (
     ("lower_leg", 130, 60, 75, False, False),
 )
 
-#: The regions by name; ``back`` stands for back and shoulders.
+#: The regions by name; ``back`` is back and shoulders.
 BODY_REGIONS = {
     name: BodyRegion(
         name,

@@ -23,13 +23,13 @@ PRESLIDING = 1.5e-3
 
 
 def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str]) -> Robot:
-    """The robot with its calibrated file's gains, rotor inertias and friction, unless it has gains.
+    """The robot with the gains, rotor inertias and friction of a calibrated file.
 
     Args:
-        robot: the user's description.
+        robot: the user's description; returned unchanged if it states gains.
         path: the robot's file.
-        file: the content of the file; its damping and friction loss are replaced by the friction
-            that was identified, which includes them.
+        file: the content of the file. Its damping and friction loss are set to 0 if identified
+            friction is used, which includes them.
         sources: receives the source of the drive.
     """
     drive, n = robot.drive, len(file.joints)
@@ -53,8 +53,7 @@ def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str])
             joint.damping[:], joint.frictionloss = 0.0, 0.0
             file.model.dof_damping[dof] = file.model.dof_frictionloss[dof] = 0.0
     sources["drive"] = (
-        f"the file's calibration: {learned}; noise and what repeats with the motion: `tauguard "
-        "twin`"
+        f"the file's calibration: {learned}; `tauguard twin` adds noise and repeatable errors"
     )
     return replace(robot, drive=known)
 
@@ -62,9 +61,9 @@ def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str])
 def friction_rows(friction: dict[str, Any]) -> dict[str, Any]:
     """Keywords of :class:`RobotDrive` that approximate an identified friction model.
 
-    The identified model may have negative weights, and the simulated law may not. Sliding friction
-    is therefore fitted at :data:`SPEEDS` by non-negative least squares. Ripple, and offsets that
-    differ by direction, are left out.
+    The identified model can have negative weights, which the simulated law does not allow. Sliding
+    friction is therefore fitted at :data:`SPEEDS` by non-negative least squares. Ripple, and
+    offsets that differ by direction, are left out.
 
     Args:
         friction: the fields of :class:`tauguard.detectors.FrictionModel`.

@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 #: Fixed vertices: none, the upper edge, the two upper corners, or all four edges.
 PINS = ("none", "edge", "corners", "frame")
 
-#: Rayleigh damping of an elastic sheet's stiffness [s]: a hundredth of a millisecond.
+#: Rayleigh damping of an elastic sheet's stiffness [s].
 RAYLEIGH = 1e-5
 
 
@@ -22,8 +22,7 @@ RAYLEIGH = 1e-5
 class Cloth:
     """A square cloth of ``count`` x ``count`` vertices in its own x-y plane, edges along x and y.
 
-    A cloth of about 20 x 20 costs a hundred times as much as the arm: list it only if it is
-    needed.
+    A step with a cloth of about 20 x 20 takes a hundred times as long as one with the arm alone.
     """
 
     count: int = 15  #: vertices along each side
@@ -32,7 +31,7 @@ class Cloth:
     radius: float = 1e-3  #: half the thickness in contacts [m]
     position: Vector = (0.7, 0.0, 0.8)  #: position of the centre [m]
     quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
-    """Orientation; the default hangs it across the x axis, y edge up."""
+    """Orientation; by default the cloth is vertical and normal to the world's x axis, its y up."""
     pinned: str = "edge"  #: one of :data:`PINS`
     damping: float = 0.01  #: damping of the edges [1/s]; not used for an elastic sheet
     young: float | None = None
@@ -55,7 +54,7 @@ class Cloth:
             raise ValueError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
 
     def pins(self) -> list[int]:
-        """Numbers of the fixed vertices; vertex ``i * count + j`` is row i along x, j along y."""
+        """Indices of the fixed vertices; ``i * count + j`` is the i-th along x and j-th along y."""
         n = self.count
         i, j = np.divmod(np.arange(n * n), n)
         held = {

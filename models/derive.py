@@ -12,18 +12,15 @@ from tauguard.arrays import Array
 ROTOR_PER_TORQUE = 0.005
 #: Rotor inertia of a joint without torque limit, as a fraction of the joint's largest inertia.
 ROTOR_FRACTION = 0.05
-#: Default torque limit: the first number times the sum of the torque that holds the arm and of the
-#: file's friction, plus the torque that accelerates the largest inertia by the second number
-#: [rad/s^2] (a UR10e's base: 27).
+#: Default torque limit: HOLDING_FACTOR times (largest gravity torque + the file's friction), plus
+#: SPARE_ACCELERATION [rad/s^2] times the largest inertia. (A UR10e's base can reach 27 rad/s^2.)
 HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
-#: Torque limit of the strongest joint over gravity's torque at the most loaded joint. UR5, UR10,
-#: Panda, xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1. A ratio outside this
-#: range is reported.
+#: Plausible ratios of the strongest joint's torque limit to the largest gravity torque of a joint.
+#: UR5, UR10, Panda, xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1.
 PLAUSIBLE = (1.0, 8.0)
-#: Least lever of gravity [m]: largest gravity torque over the arm's weight. Below it gravity loads
-#: no hinge.
+#: If the largest gravity torque over the arm's weight is below this [m], gravity loads no hinge.
 SHORTEST_LEVER = 0.02
-#: Joint speed of an arm whose file states none [rad/s], and acceleration of every such arm.
+#: Default of the largest joint speed [rad/s] and of the largest joint acceleration [rad/s^2].
 DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
 #: Number of poses in which inertia and gravity are computed.
 POSES = 64
@@ -31,9 +28,9 @@ POSES = 64
 FREE_RANGE = np.pi
 #: Distance of the home pose from both ends of a joint's range, as a fraction of it.
 HOME_MARGIN = 0.1
-#: A default bandwidth is lowered until the change of the servo's fastest mode in a step
-#: (:func:`stiffest_mode`) is at most the first number. With a stated bandwidth it may be up to the
-#: second. At 2 the servo would be unstable.
+#: Limits of the change of the servo's fastest mode in a step (:func:`stiffest_mode`). A default
+#: bandwidth is lowered to the first limit. A stated bandwidth beyond the second one is refused.
+#: At 2 the servo is unstable.
 MOST_PER_STEP, LIMIT_PER_STEP = 1.0, 1.5
 #: Upper bound of a joint's rotation while a contact force builds up [rad]: 5 cm at 0.2 m.
 PRESSING = 0.25
@@ -97,7 +94,7 @@ def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
 
 
 def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> str:
-    """A text on implausible torque limits [N m], shape (n,), of a file; "" if they are plausible.
+    """A warning about a file's torque limits [N m], shape (n,); "" if they are plausible.
 
     The strongest joint of a serial arm has a few times the gravity torque of the most loaded one.
     """
@@ -108,15 +105,15 @@ def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Arr
     weight = float(np.linalg.norm(model.opt.gravity)) * float(model.body_mass.sum())
     held, most = int(np.argmax(needed)), int(np.argmax(np.where(hinge, limit, 0.0)))
     if needed[held] < SHORTEST_LEVER * weight:
-        return ""  # gravity turns no axis: nothing to compare with
+        return ""  # gravity loads no joint: nothing to compare with
     low, high = PLAUSIBLE
     ratio = limit[most] / needed[held]
     if low <= ratio <= high:
         return ""
     return (
-        f"; implausible: {limit[most]:.3g} N m at {joints[most]}, where gravity asks at most "
-        f"{needed[held]:.2g} N m of {joints[held]} ({ratio:.2g} times; cobots have 1.6 to 4.1): "
-        "state torque_limit"
+        f"; implausible: the largest limit, {limit[most]:.3g} N m at {joints[most]}, is "
+        f"{ratio:.2g} times the largest gravity torque, {needed[held]:.2g} N m at {joints[held]} "
+        "(cobots have 1.6 to 4.1 times): state torque_limit"
     )
 
 
@@ -136,8 +133,8 @@ def largest_energy(
 ) -> tuple[float, float]:
     """Energies that an arm can put into a contact [J]: kinetic energy, and work of its drives.
 
-    The kinetic energy 1/2 v^T |M| v takes the largest joint speeds with the worst signs, over the
-    random poses. The work is that of all drives at their limits over :data:`PRESSING`.
+    The kinetic energy 1/2 v^T |M| v has the largest joint speeds, the worst signs and the worst of
+    the random poses. The work is that of all drives at their limits over :data:`PRESSING`.
     """
     masses = np.abs(inertia_matrices(model, joints, random_poses(model, joints)))
     moving = 0.5 * float(np.einsum("i,kij,j->k", speed, masses, speed).max())
@@ -145,7 +142,7 @@ def largest_energy(
 
 
 def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) -> Array:
-    """Torque limits [N m], shape (n,); hinges without one get one that holds and moves the arm."""
+    """Torque limits [N m], shape (n,); a hinge without one gets the default (HOLDING_FACTOR)."""
     if np.isfinite(stated).all():
         return stated
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
@@ -176,8 +173,8 @@ def stiffest_mode(
 ) -> tuple[float, int]:
     """Change of the servo's fastest mode in a time step, and the joint that dominates it.
 
-    An explicit velocity loop of rate ``d`` and a position loop of ``k`` (per unit of inertia) are
-    stable for ``d dt + k dt^2 / 2 < 2``. The result is the largest such sum over the poses.
+    With damping ``d`` and stiffness ``k`` per unit of inertia, an explicitly integrated servo is
+    stable for ``d dt + k dt^2 / 2 < 2``. The first result is the largest such sum over the poses.
     """
     dt = float(model.opt.timestep)
     masses = inertia_matrices(model, joints, random_poses(model, joints))
@@ -196,9 +193,9 @@ def stiffest_mode(
 def home_pose(model: mujoco.MjModel, joints: tuple[str, ...], tip: int) -> Array:
     """A home pose [rad], shape (n,): in front of the base, away from singular poses and limits.
 
-    Among fixed random poses that keep off the joint limits it has the largest manipulability,
-    weighted by the distance of the tool from the middle of its reach. An arm of fewer than four
-    joints gets the pose nearest to zero that keeps off the limits.
+    It is the best of fixed random poses away from the joint limits. The criterion is manipulability
+    times a weight that is largest if the tool is in the middle of its reach, in front of the base.
+    An arm of fewer than four joints gets the pose nearest to zero that is away from the limits.
     """
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]

@@ -1,6 +1,6 @@
 """The drive train: from motor current to joint torque, its friction, ripple and sensors.
 
-Units are those of the joint side: ``tau = gain * current`` with the gain in N m per ampere.
+All numbers refer to the joint side of the gear: ``tau = gain * current``, gain in N m per ampere.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Friction:
     __repr__ = in_a_line
 
     coulomb: Array  #: Fc [N m], shape (n,)
-    static: Array  #: Fs, level at rest [N m], shape (n,); below Fc it rises with speed
+    static: Array  #: Fs, level at rest [N m], shape (n,); if below Fc, friction rises with speed
     stribeck_velocity: Array  #: vs [rad/s], shape (n,)
     viscous: Array  #: [N m s/rad], shape (n,)
     bristle_stiffness: Array  #: k [N m/rad], shape (n,)
@@ -112,11 +112,11 @@ class Sensors:
     position_quantum: float = 2e-6  #: [rad]
     velocity_noise: float = 5e-4  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
-    rate: float = 0.0  #: samples a second; 0: one at every physics step
+    rate: float = 0.0  #: samples per second; 0: one at every physics step
     jitter: float = 0.0  #: standard deviation of a sample's time [s]
     left_over: LeftOver | None = None
-    """Errors of the current's model along recorded motions: added to what is reported, without an
-    effect on the motion."""
+    """Errors of the model of the current along recorded motions. They are added to the reported
+    currents and do not affect the motion."""
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
@@ -133,7 +133,7 @@ class Sensors:
         return None if self.left_over is None else Player(self.left_over, dt, rng)
 
     def samples(self, t: Array, rng: np.random.Generator) -> NDArray[np.intp]:
-        """Indices, rising, of the physics steps at times ``t`` [s] that are sampled."""
+        """Increasing indices of the physics steps (at times ``t`` [s]) that are sampled."""
         if self.rate <= 0 or len(t) < 2 or self.rate * (t[1] - t[0]) > 1:
             return np.arange(len(t))
         times = np.arange(t[0], t[-1], 1 / self.rate)
@@ -197,7 +197,7 @@ PARTS = ("friction", "stribeck", "load", "warmth", "ripple", "lag", "sensors")
 
 @dataclass(frozen=True)
 class Drive:
-    """The drives of an arm. A part that is ``None`` is left out and costs nothing."""
+    """The drives of an arm. A part that is ``None`` is not simulated."""
 
     __repr__ = in_a_line
 
@@ -209,10 +209,10 @@ class Drive:
     ripple: Ripple | None = None
     sensors: Sensors | None = None
     rated_speed: Array | None = None
-    """Up to this speed the full torque is available [rad/s], shape (n,).
+    """Largest speed at which the full torque is available [rad/s], shape (n,).
 
-    Above it the back-EMF reduces the torque along the motion, to zero at ``no_load_speed``, and
-    brakes beyond.
+    Above it the back-EMF reduces the largest torque along the motion. The torque is 0 at
+    ``no_load_speed`` and brakes beyond.
     """
     no_load_speed: Array | None = None  #: [rad/s], above the rated speed, shape (n,)
 

@@ -8,15 +8,15 @@ import numpy as np
 
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors
 
-#: Version of the text; a reader refuses newer ones.
+#: Version of the text; a reader refuses other versions.
 VERSION = 1
 _PARTS = {"friction": Friction, "ripple": Ripple, "sensors": Sensors}
 
 
 def drive_text(drive: Drive) -> str:
-    """``drive`` as JSON with every digit; :func:`drive_of` gives back an equal drive.
+    """``drive`` as JSON text, from which :func:`drive_of` makes an equal drive.
 
-    Left-over errors of currents are not part of the text: no reader of a recording needs them.
+    The text leaves out recorded errors of currents (``left_over``): no reader needs them.
     """
     if drive.sensors is not None:
         drive = replace(drive, sensors=replace(drive.sensors, left_over=None))

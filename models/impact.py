@@ -45,7 +45,7 @@ def blow_velocity(
 ) -> Array:
     """Joint velocities [rad/s] that move the point at ``speed`` [m/s] along the direction, (n,).
 
-    Among all such velocities these have the least kinetic energy; arguments as in
+    Of all such velocities these have the least kinetic energy. The arguments are those of
     :func:`reflected_mass`.
     """
     mass, column = _along(scene, q, body, point, direction)

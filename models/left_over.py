@@ -1,11 +1,11 @@
 """Replay of the current errors of a drive model, matched to similar recorded motions.
 
-The error of a model of a real drive mostly repeats with the motion, has heavy tails and
-depends on speed, acceleration and the time since a stop. A random process can have the same level
-but not this structure. Stretches of the recorded error have it. While the motion resembles that of
-the log, the log's error is continued. When it differs, the stretch with the most similar motion is
-faded in, as in motion matching for animated characters (Clavet 2016, "Motion matching and the road
-to next-gen animation"). Each joint is matched separately.
+The error of a model of a real drive mostly repeats with the motion, has heavy tails and depends on
+speed, acceleration and the time since a stop. A random process does not have this structure, so
+stretches (intervals) of a recorded error are replayed. A stretch goes on while the present motion
+resembles the motion of its log. Otherwise the stretch with the most similar motion is faded in, as
+in motion matching for animated characters (Clavet 2016, "Motion matching and the road to next-gen
+animation"). Each joint is matched separately.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ SLOW = 0.02
 FAST, SLOWER = 0.02, 0.06
 #: Time between two comparisons of the motions, and duration of a fade [s].
 EVERY = 0.05
-#: A stretch is left when its motion is farther from the present one than the nearest stretch's by
-#: more than this.
+#: A stretch is left if its feature distance from the present motion exceeds that of the nearest
+#: stretch by more than this.
 MARGIN = 1.0
 #: Least remaining length of the log at the beginning of a stretch [s].
 LEAST = 0.2
 #: A joint that stops takes one of the STOPS nearest stretches at random, because stops differ. A
 #: standing joint takes, of the STANDS nearest stretches, the one with the most similar torque.
 STOPS, STANDS = 8, 64
-#: A joint that has stood for HELD keeps its torque [s]. The torque fades with the time constant
-#: FORGET at rest and RELEASE in motion [s].
+#: A joint that has stood for HELD [s] keeps its error at a change of stretch, by an offset. The
+#: offset decays with the time constant FORGET [s] at rest and RELEASE [s] in motion.
 HELD, FORGET, RELEASE = 0.3, 1.6, 0.2
 #: Scales of speed [rad/s] and acceleration [rad/s^2]; weights of the features.
 SPEED, ACCELERATION = 0.05, 0.5
 WEIGHTS = np.array([1.0, 0.5, 0.5, 0.5, 1.0, 1.0])
-#: The feature that says how long ago the joint moved; its values now, and after :data:`HELD`.
+#: Index of the feature of the time since the joint moved; its values in motion, and after HELD.
 MOVED = 3
 _UNMOVED, _LONG = (float(WEIGHTS[MOVED] * np.log10(0.02 + s)) for s in (1e-3, HELD))
 
@@ -59,8 +59,8 @@ _Tree: TypeAlias = "tuple[cKDTree, NDArray[np.intp]]"
 class LeftOver:
     """Errors of reported currents along recorded motions, evenly sampled."""
 
-    rate: float  #: samples a second
-    log: NDArray[np.int64]  #: which log a sample is from, rising, shape (N,)
+    rate: float  #: samples per second
+    log: NDArray[np.int64]  #: number of each sample's log, increasing, shape (N,)
     qd: Array  #: [rad/s], shape (N, n)
     current: Array  #: reported less modelled current [A], shape (N, n)
 
@@ -130,7 +130,7 @@ class LeftOver:
 
     @cached_property
     def _trees(self) -> list[tuple[_Tree, _Tree]]:
-        """Per joint, search trees of all stretches and of those that begin with it at rest."""
+        """Per joint, search trees of all stretches, and of those at whose start it stands."""
         later = self._starts + round(HELD * self.rate)
         later = np.minimum(later, self._starts + self.remaining[self._starts])
         found = []
@@ -221,7 +221,7 @@ class _Motion:
 
 
 class Player:
-    """Gives the errors along a running motion, block by block."""
+    """Generates the errors along a running motion, block by block."""
 
     def __init__(self, source: LeftOver, dt: float, rng: np.random.Generator) -> None:
         """Start with no matched stretch.
@@ -238,7 +238,7 @@ class Player:
         self._due = 0
         self._at = np.full(n, -1.0)  # row of the source, per joint
         self._before = np.full(n, -1.0)  # row that is faded out
-        self._held = np.zeros(n)  # added so that a joint at rest keeps its torque [A]
+        self._held = np.zeros(n)  # offset by which a joint at rest keeps its error [A]
         self._held_before = np.zeros(n)
         self._keep = np.exp(-dt / np.array([FORGET, RELEASE]))
 
@@ -262,7 +262,7 @@ class Player:
         for j, now in enumerate(motion):
             at, stands = int(self._at[j]), bool(now[MOVED] > _UNMOVED)
             known = at >= 0 and source.remaining[at] > ahead
-            if known and stands:  # a stretch is left before the joint moves in it
+            if known and stands:  # a stretch is left before its joint begins to move
                 known = source.features[at + ahead, j, MOVED] > _UNMOVED
             here = float(np.linalg.norm(source.features[at, j] - now)) if known else np.inf
             stood = at >= 0 and min(now[MOVED], source.features[at, j, MOVED]) > _LONG

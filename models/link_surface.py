@@ -1,4 +1,4 @@
-"""Sample points on the surface of an arm's links that can be touched."""
+"""Sample points on the outer surface of an arm's links."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LinkSurface:
 
     __repr__ = in_a_line
 
-    link: NDArray[np.int64]  #: 0-based, rising, shape (K,)
+    link: NDArray[np.int64]  #: 0-based, increasing, shape (K,)
     point: Array  #: in the link's frame [m], shape (K, 3)
     normal: Array  #: unit vector out of the link, in its frame, shape (K, 3)
 
@@ -66,8 +66,8 @@ def link_surface(
     the surface that can be touched from outside. No line enters where one geom lies inside another.
 
     Args:
-        source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
-        points: wanted on each link.
+        source: MJCF or URDF (text or file), a spec or a compiled model, of the arm only.
+        points: number of points on each link.
         seed: seed of the lines.
 
     Raises:
@@ -105,17 +105,17 @@ def arm_surface(
 ) -> tuple[LinkSurface, tuple[str, ...]]:
     """The surface of the arm in a robot file, and the links that have a substitute capsule.
 
-    Meshes of a URDF are looked for from its folder upwards. A link without a shape that MuJoCo
-    reads becomes a capsule along it. This is impossible for the last link, whose end is unknown.
+    Meshes of a URDF are searched for in its folder and the folders above. A link without a shape
+    that MuJoCo can read gets a capsule. The last link cannot: its end is unknown.
 
     Args:
         path: MJCF or URDF file.
         joints: names of the arm's joints; every other joint is welded at zero.
-        points: wanted on each link.
+        points: number of points on each link.
 
     Raises:
-        ValueError: not a robot that MuJoCo can read, without one of the joints, no serial chain of
-            them, or a last link without a shape.
+        ValueError: MuJoCo cannot read the robot, a joint is missing, the joints are no serial
+            chain, or the last link has no shape.
     """
     file = read_arm(path, joints)
     if file.joints != joints:

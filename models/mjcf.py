@@ -42,7 +42,7 @@ def xml_text(spec: mujoco.MjSpec) -> str:
 
 
 class SpecText:
-    """The text of a spec as it was given, written when it is first needed.
+    """The MJCF text of a copy of a spec, written when it is first needed.
 
     Writing an arm with detailed meshes takes seconds, and few callers read the text.
     """
@@ -82,7 +82,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The model of ``spec``, without its mesh geoms if it does not compile with them.
 
     Raises:
-        ValueError: it compiles neither with nor without shapes; the text is MuJoCo's first message.
+        ValueError: it compiles neither with nor without them; the text is MuJoCo's first message.
     """
     try:
         return spec.compile()

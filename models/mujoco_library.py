@@ -9,7 +9,7 @@ import mujoco
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """The library itself.
+    """The loaded library.
 
     Raises:
         OSError: there is none beside the binding.
@@ -23,7 +23,7 @@ def library() -> ctypes.CDLL:
 
 @functools.cache
 def function_address(name: str) -> int:
-    """The address of one of its functions."""
+    """The address of a function of the library."""
     address = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
     assert address is not None
     return address
@@ -31,5 +31,5 @@ def function_address(name: str) -> int:
 
 @functools.cache
 def variable_address(name: str) -> int:
-    """The address of one of its global variables."""
+    """The address of a global variable of the library."""
     return ctypes.addressof(ctypes.c_void_p.in_dll(library(), name))

@@ -57,7 +57,7 @@ def _beginning(path: Path) -> str:
 
 
 def _compiled_urdf(text: str) -> mujoco.MjModel:
-    """The model of a URDF without shapes; massless moving links get a gram or less."""
+    """The model of a URDF without shapes; massless moving links get a mass of 0.1 g."""
     try:
         return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text)))
     except ValueError as error:
@@ -104,9 +104,9 @@ def pin_model(
     """The Pinocchio model of an arm: hinge and slide joints, armature included, sites as frames.
 
     Args:
-        source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
-        base_pose: pose of the arm's world in the world, (4, 4); the default is the file's own.
-        gravity: [m/s^2], (3,); the default is the file's own.
+        source: MJCF or URDF (text or file), a spec or a compiled model, of the arm only.
+        base_pose: pose of the file's world frame in the world, (4, 4); default: they coincide.
+        gravity: [m/s^2], (3,); default: the file's.
 
     Raises:
         ValueError: not a model, no joints, ball or free joints, several joints on one body, or a

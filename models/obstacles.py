@@ -48,9 +48,9 @@ class Clamp:
 
 @dataclass(frozen=True)
 class BodyProxy:
-    """A body region of a person: its effective mass behind its contact stiffness.
+    """A body region of a person, with its effective mass and contact stiffness.
 
-    It is a ball, because every further contact point would multiply the stiffness. It slides along
+    It is a ball, because each further contact point would add its stiffness. It slides along
     ``direction``, as in the standard's two-mass model, or is fixed (``clamped``).
     """
 
@@ -80,7 +80,7 @@ class BodyProxy:
 
     @property
     def stiffness(self) -> float:
-        """Of the contact [N/m]."""
+        """Stiffness of the contact [N/m]."""
         return self.limits.stiffness
 
 
@@ -176,10 +176,10 @@ def add_pairs(
 ) -> None:
     """Add a contact pair for each shape of the arm and each obstacle, of the stated stiffness.
 
-    With d = solimp's dmin small, MuJoCo's direct solref format gives f = (K pen + B v) / A for a
-    ``solref`` of (-K, -B), whatever the pose; A is the sum of both bodies' translational
-    ``body_invweight0``, which only a compiled model tells. Two shapes of one link that touch the
-    same obstacle are two springs.
+    With a small dmin in ``solimp`` and ``solref`` = (-K, -B), MuJoCo's force in every pose is
+    f = (K pen + B v) / A. A is the sum of both bodies' translational ``body_invweight0``, which
+    MuJoCo computes when it compiles the model. Two shapes of one link that touch the same obstacle
+    are two springs.
     """
     for geom in shapes:
         for name in obstacles:
@@ -200,7 +200,7 @@ def add_pairs(
 
 
 def pair_weights(model: mujoco.MjModel) -> np.ndarray:
-    """A of every contact pair: both bodies' translational ``body_invweight0``, shape (npair,)."""
+    """The number A of :func:`add_pairs` for every contact pair, shape (npair,)."""
     inverse = model.body_invweight0[:, 0]
     bodies = model.geom_bodyid
     return np.asarray(inverse[bodies[model.pair_geom1]] + inverse[bodies[model.pair_geom2]])

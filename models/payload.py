@@ -45,8 +45,8 @@ def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: flo
     The model's derived constants are updated, and contact pairs keep their stated stiffness.
 
     Args:
-        model: the scene's; changed.
-        data: the running state; not touched, its next step feels the new mass.
+        model: model of the scene; changed.
+        data: the running state; not changed. Its next step uses the new mass.
         body: id of the payload body (``Scene.payload_body``).
         mass: [kg].
 

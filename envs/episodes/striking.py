@@ -27,28 +27,28 @@ PARKED = np.array([0.0, 0.0, 50.0])
 TARGETS, TRIES = 16, 10
 #: Largest force of a collision [N]; a target that needs more is given up.
 FORCE_LIMIT = 400.0
-#: An obstacle that touches the arm sooner than this [s] overlapped it from the start.
+#: An obstacle that touches the arm sooner than this [s] overlapped it at the start.
 CLEAR = 0.01
-#: Offset of a clamp's strength [m]: its depth is the strength minus this. The depth may be below 0
-#: where another part of the link reaches further than the planned point.
+#: A clamp's strength is its depth plus this [m], so that strengths are positive. The depth is
+#: negative if another part of the link extends beyond the planned point.
 CLAMP_OFFSET = 0.03
-#: First guesses: strike speed [m/s], clamp depth from the offset [m], pulse force [N].
+#: Initial strength: strike speed [m/s], clamp depth plus offset [m], pulse force [N].
 STRENGTH = {"strike": 0.5, "clamp": CLAMP_OFFSET, "pulse": 80.0}
-#: What an obstacle or a person can do: strikes [m/s], clamps [m], pulses [N].
+#: Smallest and largest strength that an obstacle or a person can cause, in the same units.
 STRENGTH_RANGE = {"strike": (0.02, 6.0), "clamp": (0.005, 0.1), "pulse": (1.0, 1500.0)}
-#: Largest ratio of two successive strengths.
+#: Largest ratio of two successive strengths in the search.
 STRENGTH_FACTOR = {"strike": 10.0, "clamp": 1.3, "pulse": 10.0}
 
 
 @dataclass(frozen=True)
 class Window:
-    """An injected collision as it happened."""
+    """The simulation of an injected collision."""
 
     begin: int  #: first row
     rollout: Rollout
     wrenches: labels.Wrenches
-    peak_tau: float  #: [N m]
-    peak_force: float  #: [N]
+    peak_tau: float  #: largest external torque of joints 1-4 [N m]
+    peak_force: float  #: largest force on a link [N]
 
 
 class Striking:
@@ -62,8 +62,8 @@ class Striking:
     ) -> None:
         """Prepare for one scene and motion; ``rng`` draws points and directions.
 
-        It has no reference to the simulation that uses it. Such a cycle would keep megabytes of
-        native memory for each simulation until Python next collects cycles.
+        This object does not refer to the simulation that uses it: the reference cycle would keep
+        megabytes of native memory until Python collects cycles.
         """
         motion = follow.motion
         self._scene, self._motion, self._loop, self._follow = scene, motion, follow.loop, follow
@@ -80,7 +80,7 @@ class Striking:
         """Run from ``row`` up to the collision's window and carry out the collision there.
 
         Returns:
-            The row before the window, and the window, or why no target fitted.
+            The row that the simulation has reached; the window after it, or why no target fitted.
         """
         lead = 0 if plan.kind == "pulse" else self._row(LEAD)
         tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
@@ -110,7 +110,7 @@ class Striking:
         if room < STRIDE:
             return "no time is left before the next collision or the end of the episode"
         if not tried:
-            return f"no place on the link offers it within {room:.1f} s"
+            return f"no point of the link allows this collision within {room:.1f} s"
         torque, force = plan.severity or (0.0, np.inf), plan.force or (0.0, FORCE_LIMIT)
         return (
             f"none of {tried} targets gave {torque[0]:g} to {torque[1]:g} N m at a force of "
@@ -118,9 +118,10 @@ class Striking:
         )
 
     def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
-        """The plan as given; after some attempts an easier one.
+        """The plan; after a quarter of the attempts an easier one.
 
-        A motion may have no dwell, or no link that moves towards a clamp.
+        The easier plan needs no rest of the arm, because the motion may have no pause. A clamp gets
+        a random link, because the planned link may not move towards a clamp.
         """
         if attempt < TARGETS // 4:
             return plan
@@ -130,10 +131,11 @@ class Striking:
         return replace(plan, link=int(self._rng.integers(2, links + 1)))
 
     def _search(self, plan: CollisionPlan, target: Target, begin: int, end: int) -> Window | None:
-        """Repeat the window until the achieved peak torque lies in the plan's stratum.
+        """Repeat the window with other strengths until the peak torque is in ``plan.severity``.
 
-        The strength is scaled by the achieved torque until the stratum is bracketed, then bisected
-        (geometrically). ``None`` if the stratum cannot be reached from this target.
+        The strength is scaled by the ratio of wanted to achieved torque until one strength gives
+        too little and one too much torque, then bisected geometrically. ``None`` if this target
+        does not give the torque, or only with a force out of range.
         """
         strength = plan.strength or STRENGTH[plan.kind]
         below, above = STRENGTH_RANGE[plan.kind]
@@ -164,7 +166,7 @@ class Striking:
     def _attempt(
         self, plan: CollisionPlan, target: Target, strength: float, begin: int, end: int
     ) -> Window | None:
-        """The window with this strength; ``None`` where the obstacle touched too early."""
+        """Simulate with this strength; ``None`` if the obstacle overlaps at its start."""
         dt = self._dt
         rows = end - begin
         wrench, body = None, -1
@@ -218,7 +220,7 @@ class Striking:
     def _pulse_truth(
         self, wrench: Array, target: Target, rollout: Rollout, dt: float
     ) -> labels.Wrenches:
-        """The wrench that acted, expressed about the pushed point instead of the centre of mass."""
+        """The pulse's wrench about the pushed point instead of the centre of mass."""
         rows = len(wrench)
         found = labels.Wrenches.empty(rows, len(self._scene.link_bodies))
         link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])

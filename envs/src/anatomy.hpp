@@ -25,13 +25,13 @@ struct Anatomy {
   double hip_height, trunk, shoulder, hip_half, neck, head;
   double upper_arm, lower_arm, hand, grip, thigh, shank;
   double floor, facing, hand_speed, walk_speed, reaction_time;
-  double step_back;  // after a touch [m]
+  double step_back;  // distance of the step back after a touch [m]
   bool seated, hanging, reacts;
 };
 
-// The script, which is repeated. A row of `reaches` is one reach of a hand: wait [s], place [m],
-// hold [s]. A row of `walks` is one walk: wait [s], place [m]; the first row is where the person
-// starts.
+// The script of a person, which is repeated. A row of `reaches` is one reach of a hand: wait [s],
+// place [m], hold [s]. A row of `walks` is one walk: wait [s], place [m]; the first row is where
+// the person starts.
 struct Script {
   const double *reaches = nullptr, *walks = nullptr;
   std::size_t reach_rows = 0, walk_rows = 0;
@@ -40,30 +40,30 @@ struct Script {
 constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
-// After a touch the hand withdraws at this multiple of its speed and stays away for this long [s].
-constexpr double startle = 1.6, quiet = 1.0;
-// Duration of a person's step back, and of the stay there [s].
-constexpr double step_time = 0.6, step_lasts = 2.0;
-// A seated person leans back instead, by this angle per metre of a step [rad/m], at most at this
-// rate [rad/s].
-constexpr double lean_back = 1.2, lean_rate = 1.2;
-// Smallest force that a person feels [N]; turning rate [rad/s]. The body leans towards a goal
-// farther than `comfort` times the arm's length, by at most `most_lean` [rad]. The arm extends to
-// at most `stretch` times its length.
-constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
+constexpr double startle = 1.6;     // speed at which a touched hand withdraws, over its usual speed
+constexpr double quiet = 1.0;       // rest of a hand after that [s]
+constexpr double step_time = 0.6;   // duration of the step back after a touch [s]
+constexpr double step_lasts = 2.0;  // time that the person then stays back [s]
+constexpr double lean_back = 1.2;   // backward lean of a seated person over `step_back` [rad/m]
+constexpr double lean_rate = 1.2;   // largest rate of a lean [rad/s]
+constexpr double felt = 1.0;        // smallest force that a person feels [N]
+constexpr double turn_rate = 3.0;   // largest rate of a turn [rad/s]
+constexpr double comfort = 0.95;    // lean towards goals beyond this fraction of the arm's length
+constexpr double stretch = 0.985;   // largest extension of the arm over its length
+constexpr double most_lean = 0.7;   // largest forward lean [rad]
 
-// Palms, forearms and upper arms keep the distance `clearance` from barriers [m]. A hand that is
-// stopped climbs at the speed `climb` [m/s] by at most `highest_climb` [m], and comes down at
-// `descend` [m/s]. Before a walk the person takes both hands back. If they are not back within
-// `patience` [s], the walk waits for as long again.
-constexpr double clearance = 0.005, climb = 0.6, highest_climb = 0.6, descend = 0.2, patience = 2.0;
+constexpr double clearance = 0.005;    // distance of palms and arms from barriers [m]
+constexpr double climb = 0.6;          // speed at which a hand that a barrier stops rises [m/s]
+constexpr double highest_climb = 0.6;  // largest rise of such a hand [m]
+constexpr double descend = 0.2;        // speed at which the hand comes down again [m/s]
+constexpr double patience = 2.0;       // before a walk: time to take hands back, else its delay [s]
 
 inline double minimum_jerk(double u) {
   u = std::min(std::max(u, 0.0), 1.0);
   return u * u * u * (10.0 + u * (6.0 * u - 15.0));
 }
 
-// Going from one value to another; done at `began + lasts`.
+// Minimum-jerk change from one value to another, from the time `began` to `began + lasts` [s].
 struct Course {
   double from = 0, to = 0, began = 0, lasts = 1;
   double at(double t) const { return from + (to - from) * minimum_jerk((t - began) / lasts); }

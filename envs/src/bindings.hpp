@@ -1,4 +1,4 @@
-// What the files of Python's view of the plant share.
+// Declarations that the files of the plant's Python bindings share.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -20,14 +20,14 @@ using Numbers = std::vector<double>;
 // An array that Python made and the plant reads or writes.
 using Array = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
 
-// The same for the plant, which keeps the array alive.
+// That array as the plant stores it, which keeps it alive.
 inline Held held(const Array& array) {
   Held out(array.data(), {}, std::make_shared<Array>(array));
   for (std::size_t k = 0; k < array.ndim(); ++k) out.add_axis(array.shape(k));
   return out;
 }
 
-// Joints, people, surroundings, output rows and controls, of which a plant is made.
+// Binds the types that a plant is made of: joints, people, surroundings, output rows, controls.
 void bind_values(nb::module_& m);
 
 }  // namespace tauguard::envs

@@ -1,5 +1,5 @@
-// The command of every drive: from an action in [-1, 1] until the next one, or from a table of
-// references, row by row.
+// The command of every drive. It comes from an action in [-1, 1] for one control period, or from a
+// row of a table of references for one physics step.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,13 @@
 namespace tauguard::envs {
 
 enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian = 4, table = 5 };
-// Replacements of the action by a reaction: follow velocities, no power, no power with brakes on.
+// Reactions that replace the action: follow velocities, no power, no power with brakes on.
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
-// Stiffness of a brake in units of the servo's. A brake holds like a spring that slips beyond its
-// torque.
-constexpr double brake_stiffness = 10.0;
-constexpr double brake_damping = 3.0;
-// Damping of the Cartesian mode's least squares; it bounds the step near a singular pose.
+// A brake is a spring and a damper, and slips at the torque limit.
+constexpr double brake_stiffness = 10.0;  // over the servo's kp
+constexpr double brake_damping = 3.0;     // over the servo's kd
+// Damping of the Cartesian mode's least squares; it bounds the joint step near a singular pose.
 constexpr double cartesian_damping = 0.02;
 
 // References of a run, row-major (rows x joints): position [rad], velocity [rad/s], torque [N m].
@@ -30,9 +29,8 @@ struct Table {
   std::size_t width = 0;  // joints
 };
 
-// Least distance of a reference from the ends of a joint's range [rad], and largest rate of its
-// approach [1/s]: they keep the arm off its stops.
-constexpr double end_margin = 0.01, end_rate = 6.0;
+constexpr double end_margin = 0.01;  // distance of references from the ends of joint ranges [rad]
+constexpr double end_rate = 6.0;     // largest speed towards that limit over the distance [1/s]
 
 struct Command {
   std::vector<double> origin, speed, feed;  // reference [rad], its velocity [rad/s], torque [N m]
@@ -47,15 +45,15 @@ struct Controls {
   std::vector<double> max_speed;     // [rad/s]
   std::vector<double> torque_limit;  // [N m]
   std::vector<double> low, high;     // ends of the joints' ranges [rad]
-  // Square of the largest force that the arm and what it meets can exert [N^2]: a part that grows
-  // with the square of the joints' speed over the largest, and one that does not.
+  // The largest possible contact force F [N] satisfies F^2 = moving s^2 + driven, where s is the
+  // largest joint speed over max_speed.
   double moving = INFINITY, driven = 0;
   Override override = Override::none;
   std::vector<double> override_speed;  // [rad/s]
   Command command;
   Table table;
 
-  // Removes an override and puts the reference where the arm is.
+  // Removes an override; the joint positions q become the reference.
   void reset(const std::vector<double>& q) {
     override = Override::none;
     command.origin = q;
@@ -159,8 +157,9 @@ struct Controls {
     }
   }
 
-  // The reference stays where the servo would ask for no more than full torque: no wind-up in a
-  // blocked arm. Without a servo it follows the arm, so that the next command starts from there.
+  // Limits the distance of the reference from the arm to that at which the servo's stiffness gives
+  // the torque limit, so that a blocked arm does not wind up. Without a servo the reference follows
+  // the arm.
   void follow(const std::vector<Joint>& joints, const double* q) {
     for (std::size_t i = 0; i < command.origin.size(); ++i) {
       const double window = command.servo || command.brake ? torque_limit[i] / joints[i].kp : 0.0;
@@ -169,7 +168,7 @@ struct Controls {
   }
 };
 
-// Whether a number can be a value of this type; what counts or chooses is a whole number.
+// Whether a number can be a value of type T; counts, flags and enums are whole numbers.
 template <class T>
 inline bool holds(const T&, double number) {
   if constexpr (std::is_same_v<T, double>) return true;

@@ -1,4 +1,4 @@
-// Bodies that the arm meets and that move by themselves: along a path, or as the surface of a belt.
+// Bodies with a prescribed motion: along a path, or as the surface of a belt.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace tauguard::envs {
 
 using geometry::Vec3;
 
-// A body that follows a path: rows of time [s] and position [m]; after the last it begins anew.
+// A body that follows a path: rows of time [s] and position [m]. The path is repeated.
 struct Carried {
   int mocap = -1;
   std::vector<std::array<double, 4>> path;
@@ -35,7 +35,8 @@ struct Carried {
   }
 };
 
-// The surface of a conveyor: a slide that moves at a speed [m/s] and stays where it is.
+// The surface of a conveyor: a slide joint with the velocity `speed` [m/s] that stays at position
+// 0.
 struct Belt {
   int qpos = -1, dof = -1;
   double speed = 0;

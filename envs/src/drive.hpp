@@ -7,25 +7,25 @@
 
 namespace tauguard::envs {
 
-// One joint: where it is in MuJoCo's arrays, its drive and its servo. A bristle stiffness of 0
-// leaves friction out, an empty ripple the ripple.
+// One joint: its addresses in MuJoCo's arrays, its drive and its servo. A bristle stiffness of 0
+// leaves only viscous friction.
 struct Joint {
   int qpos = -1, dof = -1;     // addresses in qpos and qvel
   double gain = 1.0;           // N m/A, as simulated
-  double nominal_gain = 1.0;   // N m/A, as the controller believes
+  double nominal_gain = 1.0;   // N m/A, as the controller assumes
   double current_limit = 0.0;  // A
   double gear = 1.0;
   double coulomb = 0.0, breakaway = 0.0;  // N m, at the episode's temperature
   double stribeck_velocity = 1.0;         // rad/s
   double viscous = 0.0;                   // N m s/rad, at the episode's temperature
   double bristle_stiffness = 0.0;         // N m/rad
-  double load = 0.0;                      // 1/(N m)
+  double load = 0.0;                      // relative rise of friction per motor torque, 1/(N m)
   double kp = 0.0, kd = 0.0;              // N m/rad, N m s/rad
-  // Above the rated speed the torque along the motion falls, to nothing at the no-load speed, and
-  // brakes beyond [rad/s]; a no-load speed of 0 leaves this out.
+  // Above the rated speed the largest torque along the motion falls linearly, to 0 at the no-load
+  // speed and below 0 beyond it [rad/s]. A no-load speed of 0 disables this limit.
   double rated_speed = 0.0, no_load_speed = 0.0;
-  double known_coulomb = 0.0, known_viscous = 0.0;  // what the servo makes up for; N m, N m s/rad
-  std::vector<double> cycles, amplitude, phase;     // per motor revolution; A; rad
+  double known_coulomb = 0.0, known_viscous = 0.0;  // compensated by the servo; N m, N m s/rad
+  std::vector<double> cycles, amplitude, phase;     // ripple: per motor revolution; A; rad
   std::vector<double> slope, slope_velocity;        // rises of the friction level; N m, rad/s
 };
 
@@ -34,9 +34,8 @@ struct JointState {
   double bristle = 0.0;  // rad
 };
 
-// Bristle friction (Dahl/LuGre presliding with a Stribeck level), the bristle integrated exactly
-// for a constant velocity over the step: dz/dt = v - k |v| / g(v) z. Returns the friction torque [N
-// m].
+// Torque of bristle friction (Dahl/LuGre presliding with a Stribeck level) [N m]. The bristle's
+// equation dz/dt = v - k |v| / g(v) z is solved exactly for a constant velocity over the step.
 inline double friction(const Joint& j, JointState& s, double v, double tau, double dt) {
   if (j.bristle_stiffness <= 0.0) return j.viscous * v;
   const double ratio = v / j.stribeck_velocity;
@@ -62,8 +61,8 @@ inline double ripple(const Joint& j, double q) {
   return j.gain * sum;
 }
 
-// Fraction of the current limit that is available in the direction of a speed; the motor's back-EMF
-// takes the rest of the voltage.
+// Fraction of the current limit that the motor can supply along a motion at this speed. It falls,
+// because back-EMF leaves less voltage.
 inline double reserve(const Joint& j, double speed) {
   const double fraction = (j.no_load_speed - speed) / (j.no_load_speed - j.rated_speed);
   return std::min(std::max(fraction, -1.0), 1.0);
@@ -79,8 +78,8 @@ inline double possible(const Joint& j, double current, double qd) {
   return std::min(std::max(current, low), high);
 }
 
-// Torque by which the servo compensates the friction that it knows at a reference speed [N m]; the
-// Coulomb part rises over `smooth` [rad/s].
+// Torque with which the servo compensates known friction at a reference speed [N m]. The sign of
+// the Coulomb part is tanh of the speed over `smooth` [rad/s].
 inline double compensation(const Joint& j, double speed) {
   constexpr double smooth = 0.02;
   return j.known_coulomb * std::tanh(speed / smooth) + j.known_viscous * speed;
@@ -91,13 +90,13 @@ struct DriveTrain {
   std::vector<Joint> joints;
   std::vector<JointState> states;
   double dt = 1e-3;    // of a physics step [s]
-  double decay = 0.0;  // of the current's error over a step; 0: no lag
+  double decay = 0.0;  // factor of the current's error per step; 0: no lag
 
   std::size_t size() const { return joints.size(); }
   void relax() { states.assign(joints.size(), JointState{}); }
 
-  // The torque [N m] that joint i's drive leaves at the joint for a wanted motor torque; the
-  // current is limited and lags.
+  // Joint i's torque from the drive, less friction, for a wanted motor torque [N m]. The current is
+  // limited and lags.
   double apply(std::size_t i, double wanted, double q, double qd) {
     const Joint& j = joints[i];
     JointState& s = states[i];

@@ -16,7 +16,8 @@ namespace tauguard::envs {
 using geometry::load;
 using geometry::Vec3;
 
-// The tool of an arm: a site, or where it is -1 the origin of a body; first: the arm's first joint.
+// The tool of an arm: a site, or the origin of a body if `site` is -1. `first`: the arm's first
+// joint.
 struct Tool {
   int site = -1, body = -1, first = 0;
 };
@@ -38,12 +39,12 @@ struct Kinematics {
   std::size_t size() const { return links.size(); }
   Vec3 axis(std::size_t i) const { return load(physics->axis(links[i].joint)); }
   Vec3 anchor(std::size_t i) const { return load(physics->anchor(links[i].joint)); }
-  // How far the point p of a link beyond joint i moves per unit of joint i.
+  // Velocity of point p, which joint i moves, per unit of the joint's velocity.
   Vec3 lever(std::size_t i, Vec3 p) const {
     return links[i].slide ? axis(i) : cross(axis(i), p - anchor(i));
   }
 
-  // Of the point p of a link at joint velocities qd.
+  // Velocity of point p of a link at joint velocities qd.
   Vec3 velocity(std::size_t link, Vec3 p, const double* qd) const {
     Vec3 v;
     for (std::size_t i = begin(link); i <= link; ++i) v = v + qd[i] * lever(i, p);

@@ -21,7 +21,7 @@ class Person : public Posture {
   Person() = default;
   explicit Person(const Anatomy& anatomy) : Posture(anatomy) {}
 
-  // At the script's beginning.
+  // Starts the script from its beginning.
   void reset(const Script& script) {
     script_ = script;
     from_ = to_ = walk_place(0);
@@ -43,14 +43,14 @@ class Person : public Posture {
     pose(0.0, 0.0);
   }
 
-  // `geoms`: of the capsules, in their order, where there are barriers.
+  // `geoms`: MuJoCo's ids of the capsules, in their order; read only if there are barriers.
   void bind(const Script& script, const Barriers* barriers, const int* geoms) {
     script_ = script;
     barriers_ = barriers && !barriers->all.empty() ? barriers : nullptr;
     geoms_ = geoms;
   }
 
-  // The state at time t [s], dt after the last one.
+  // Computes the state at time t [s], which is dt after the last call.
   void advance(double t, double dt) {
     react(t);
     walk(t, dt);
@@ -66,7 +66,7 @@ class Person : public Posture {
   // Distance of the nearer hand from a place [m].
   double away(Vec3 place) const { return std::min(norm(place - grip_[0]), norm(place - grip_[1])); }
 
-  // Sends the nearer hand to a place at once, in place of its next reach.
+  // Sends the nearer hand to a place at once; the script's next reach follows after its return.
   void aim(Vec3 place, double hold, double t) {
     if (walking_ || body_.hanging) return;
     const auto away = [&](int side) { return norm(place - grip_[side]); };
@@ -196,7 +196,7 @@ class Person : public Posture {
     stride_ += speed * dt * 4.0;  // [rad/m]: a step of 0.8 m
   }
 
-  // If there are objects, a person takes the hands back before walking off, or stays.
+  // Near barriers a person withdraws the hands before a walk. Returns whether they are at rest.
   bool hands_are_back(double t) {
     if (!barriers_) return true;
     bool back = true;
@@ -213,7 +213,7 @@ class Person : public Posture {
     turned_ += std::min(std::max(error, -most), most);
   }
 
-  // A touch is felt; the hand or the body draws back after the reaction time.
+  // The touched hand, or the body, draws back after the reaction time.
   void react(double t) {
     for (int k = 0; k < person_segments; ++k) {
       if (touched_[k] < 0 || t - touched_[k] < body_.reaction_time) continue;
@@ -230,7 +230,7 @@ class Person : public Posture {
     if (back_.to > 0 && t >= back_until_) back_ = {back_.at(t), 0.0, t, 2 * step_time};
   }
 
-  // In front of the body, or hanging beside it.
+  // Place of a resting hand: in front of the body, or beside it during walks or if `hanging`.
   Vec3 rest_place(int side) const {
     const double sign = side == 0 ? 1.0 : -1.0, reach = body_.upper_arm + body_.lower_arm;
     const Vec3 up{0, 0, 1};
@@ -292,7 +292,7 @@ class Person : public Posture {
       }
       return least;
     };
-    // A trunk that would lean into something, or move an upper arm into it, stays as it was.
+    // If the new lean presses trunk, head or an arm into a barrier, the old lean is kept.
     if (body() < 0 && lean_ != before) {
       lean_ = before;
       body();
@@ -300,7 +300,7 @@ class Person : public Posture {
     for (int side = 0; side < 2; ++side) leg(side, side == 0 ? 1.0 : -1.0);
   }
 
-  // The nearest barrier to some of the capsules, within their clearance.
+  // The gap between these capsules and the nearest barrier, if it is below `clearance`.
   Gap nearest(std::initializer_list<int> segments) const {
     Gap out;
     if (!barriers_) return out;
@@ -317,8 +317,8 @@ class Person : public Posture {
   }
 
   // Corrects an arm that has just been posed towards a goal, starting from the last place of the
-  // palm. A palm that is stopped follows its goal no faster than a startled hand. It slides along
-  // the object and climbs over it, so it passes through nothing.
+  // palm. A palm that a barrier stops slides along the barrier and climbs over it; it follows its
+  // goal at most at the speed of a startled hand.
   void keep_clear(int side, Vec3 shoulder, Vec3 goal, double sign, Vec3 last, double dt) {
     Vec3 want = goal;
     if (held_up_[side]) {

@@ -1,6 +1,5 @@
-// MuJoCo as the plant sees it: three of its functions by address and arrays of one model's data.
-// Nothing here depends on MuJoCo's headers, on the layout of its structs or on Python; the owner
-// that comes with them keeps the arrays alive.
+// Access to MuJoCo: addresses of three functions, and arrays of one model's data. No MuJoCo header,
+// no layout of its structs and no Python is needed here. `Engine::owner` keeps the arrays alive.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +37,7 @@ class Held {
   std::shared_ptr<const void> owner_;
 };
 
-// Fields of MuJoCo's data by their names there, its functions, and their owner.
+// Functions of MuJoCo, fields of its data under MuJoCo's names, and their owner.
 struct Engine {
   using Function = void (*)(const void*, void*);
   const void* model = nullptr;

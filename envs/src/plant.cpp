@@ -1,5 +1,5 @@
-// Python's view of the plant. A plant's result depends on nothing but its own state and action, so
-// it is the same for any number of threads.
+// Python bindings of the plant. A plant's result depends only on its own state and action, so it is
+// the same for any number of threads.
 #include "plant.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using namespace nb::literals;
 
 namespace {
 
-// The arrays that MuJoCo's Python binding shows; model and data are kept alive.
+// The arrays of MuJoCo's Python objects `model` and `data`, which are kept alive.
 Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
                    std::uintptr_t kinematics, std::uintptr_t distance) {
   Engine e;
@@ -60,8 +60,8 @@ void check_action(const Plant& p, Vector action) {
   check(action.data(), action.shape(0), 0);
 }
 
-// While one lives, MuJoCo does not read the clock for `MjData.timer`: a tenth of a small arm's
-// step. The function that it calls instead may be called by anybody, at any time.
+// During the lifetime of an object, MuJoCo does not read the clock for `MjData.timer`, which takes
+// a tenth of a small arm's step. Any thread can call the function that replaces the clock.
 class Untimed {
  public:
   using Clock = double (*)();
@@ -130,8 +130,8 @@ std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix 
   return p.follow({q_des.data(), qd_des.data(), tau_ff.data(), p.joints()}, rows, track);
 }
 
-// Where bodies and joints are along joint positions, without dynamics: a row of each table a row of
-// q, whose columns go to the addresses `qpos`.
+// Poses of bodies and axes of joints, by kinematics alone: one row of each table per row of q. The
+// columns of q belong to the addresses `qpos`.
 void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
            const std::vector<int>& bodies, const std::vector<int>& joints, Array position,
            Array rotation, Array anchor, Array axis) {
@@ -139,7 +139,7 @@ void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
   if (q.shape(1) != n) throw nb::value_error("q: expected one column per address");
   if (position.size() != 3 * rows * bodies.size() || rotation.size() != 3 * position.size() ||
       anchor.size() != 3 * rows * joints.size() || axis.size() != anchor.size())
-    throw nb::value_error("poses: tables of other sizes than asked for");
+    throw nb::value_error("poses: a table has the wrong size");
   double *p = position.data(), *r = rotation.data(), *o = anchor.data(), *a = axis.data();
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;

@@ -1,6 +1,5 @@
 // The plant: one scene's physics with its drives, under one of several control modes. Environments
-// step it by actions, a simulation lets it follow a table of references; the physics step is the
-// same for both.
+// step it by actions; a simulation lets it follow a table of references.
 #pragma once
 
 #include <algorithm>
@@ -84,7 +83,7 @@ class Plant {
     for (const Region& r : around_.regions) turn_back(r, physics_);
   }
 
-  // Up to `steps` physics steps of the action; fewer where the simulation diverges.
+  // Runs `steps` physics steps of the action; stops if the simulation diverges.
   void run(int steps) {
     const std::size_t n = joints();
     for (int k = 0; k < steps && sound_; ++k, ++row_) {
@@ -130,7 +129,7 @@ class Plant {
     report();
   }
 
-  // Follows `rows` rows of references; returns how many steps were sound, all unless it diverged.
+  // Follows `rows` rows of references; returns the number of steps before a divergence.
   std::size_t follow(const Table& table, std::size_t rows, const Track& track) {
     const std::size_t n = joints();
     const Mode before = std::exchange(controls.mode, Mode::table);
@@ -150,14 +149,14 @@ class Plant {
     return done;
   }
 
-  // The plant's state beside MuJoCo's data, as numbers of a fixed length.
+  // The plant's state without MuJoCo's data, as numbers; their count is fixed.
   std::vector<double> state() {
     std::vector<double> out;
     visit([&](auto& value) { out.push_back(static_cast<double>(value)); });
     return out;
   }
 
-  // Restores what state() returned. False, without a change, if it is not of such a plant.
+  // Restores what state() returned. Returns false, and changes nothing, if it is of another plant.
   bool restore(const std::vector<double>& saved) {
     const std::vector<double> before = state();
     if (saved.size() != before.size()) return false;
@@ -180,10 +179,10 @@ class Plant {
   std::vector<double> q_;
   std::vector<Vec3> speeds_;  // of the regions, after the action [m/s]
   std::int64_t count_ = 0;    // physics steps since the reset
-  std::size_t row_ = 0;       // of the action or table
+  std::size_t row_ = 0;       // physics step of the action, or row of the table
   bool sound_ = true;
   bool impossible_ = false;  // unsound because of a force that the arm cannot exert
-  double fastest_ = 0;       // joint speed over the largest, after the last action
+  double fastest_ = 0;       // largest joint speed over max_speed, after the last action
 
   template <class Visitor>
   void visit(Visitor&& each) {
@@ -245,7 +244,7 @@ class Plant {
     for (const Belt& b : belts) b.run(physics_);
   }
 
-  // The script of a person: two rows of hands, and their part of the walks.
+  // The script of person p: the reaches of both hands, and the walks.
   Script script(std::size_t p) const {
     const std::size_t reaches = rows_.reaches.shape(1);
     const std::size_t walks = rows_.walks.shape(0) / around_.people.size();
@@ -282,7 +281,7 @@ class Plant {
     rows_.touched.clear();
   }
 
-  // Velocities over the last physics step; the row has the regions' places before it.
+  // Velocities of the regions over the last physics step, by difference of positions.
   void measure_speeds() {
     if (row_ == 0) return;
     const std::size_t width = 7 * around_.regions.size();
@@ -330,7 +329,7 @@ class Plant {
     read_regions(around_.regions, around_.arms, step, contact_, rows_.touched, between);
   }
 
-  // Whether the arm can exert the largest force so far; a failed solver may report any number.
+  // Whether the arm can exert the largest force so far; a solver that failed reports any force.
   bool possible() const {
     const double squared = contact_.force * contact_.force;
     if (squared <= controls.moving + controls.driven) return true;
@@ -342,8 +341,8 @@ class Plant {
     return squared <= fastest * fastest * controls.moving + controls.driven;
   }
 
-  // q, qd, torque; a tool's position and the vector to its target; a region's position and
-  // velocity.
+  // In this order: q, qd, torque; each tool's position; each tool's vector to its target; position
+  // and velocity of each region.
   void observe() {
     double* out = rows_.observation.data();
     const auto put = [&](Vec3 v) {

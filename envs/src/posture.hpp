@@ -32,7 +32,7 @@ class Posture {
     centre[segment] = mix(a, b, 0.5);
     const Vec3 path = b - a;
     const Vec3 d = (1.0 / norm(path)) * path;
-    // The turn that takes -z to d; no capsule points straight up.
+    // The rotation that takes -z to d. No capsule points straight up.
     std::array<double, 4>& q = quat_wxyz[segment];
     q = {1.0 - d.z, d.y, -d.x, 0.0};
     const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
@@ -59,7 +59,7 @@ class Posture {
     place(skull, chin + body_.head * up + shift, chin + shift);
   }
 
-  // Two links to the goal of the palm, the elbow down and outwards.
+  // Inverse kinematics of two links: the palm goes to `goal`, the elbow down and outwards.
   void arm(int side, Vec3 shoulder, Vec3 goal, double sign) {
     const double first = body_.upper_arm, second = body_.lower_arm + body_.grip;
     const Vec3 path = goal - shoulder;

@@ -13,24 +13,24 @@
 
 namespace tauguard::envs {
 
-// A body region in the scene; -1 where it has no joint (held in place).
+// A body region in the scene; its ids are -1 if it has no joint (held in place).
 struct Region {
   int body = -1, joint = -1, qpos = -1, dof = -1;
   int mocap = -1;                          // mocap frame of a person's part; -1: of no person
   bool held = false;                       // cannot move away
   int sensor = -1;                         // address of its ten contact numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no impact is allowed
-  double span = 0,
-         speed = 0;           // it turns back at this distance from its origin [m]; its speed [m/s]
-  double area = 0;            // area of the robot's contact surface [cm^2]; 0: unknown
+  double span = 0;                         // distance from its origin at which it turns back [m]
+  double speed = 0;                        // its speed when it turns back [m/s]
+  double area = 0;                         // area of the robot's contact surface [cm^2]; 0: unknown
   double least_pressure = 0;  // pressure of a flat surface, if the area is unknown [N/cm^2]
   double stiffness = 0;       // stiffness of its contact [N/m]
-  double touching = 0;        // unbroken contact so far [s]
+  double touching = 0;        // duration of the present contact [s]
   double force = 0;           // at the last physics step [N]
   double advance = 0;         // advance of the arm into it during that contact [m]
 };
 
-// Sends a region that has left its span back at its own speed, like a hand that goes to and fro.
+// Turns back a region that has left its span, so that it moves to and fro like a hand.
 inline void turn_back(const Region& r, const Physics& physics) {
   if (r.joint < 0 || r.speed == 0) return;
   const double at_now = physics.qpos()[r.qpos];
@@ -52,7 +52,7 @@ struct Touched {
 struct Contact {
   double force = 0;         // peak net force on a link [N]
   double cost = 0;          // impulse beyond the regions' limits [N s]
-  double ratio = 0;         // peak force over the limit
+  double ratio = 0;         // peak of a region's force over its limit
   double region_force = 0;  // peak force on a region [N]
   int link = 0;             // 1-based, of the peak force; 0: none
   int region = 0;           // 1-based, of the peak ratio; 0: none
@@ -110,7 +110,7 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
   }
 }
 
-// Speed along a direction [m/s] of a point of the link whose contact is nearest to it.
+// Speed of a point along a direction [m/s], as a point of the link whose contact is nearest to it.
 inline double speed_of(const Kinematics& arms, const double* links, const double* qd, Vec3 point,
                        Vec3 direction) {
   std::size_t link = arms.size();
@@ -129,12 +129,12 @@ struct Sensed {
   double dt;
 };
 
-// Reads the regions' contact sensors. An impact is compared with the transient limit. Contact that
-// lasts for more than half a second, or on a region that cannot move away, is compared with the
-// quasi-static limit; so is every contact where no impact is allowed. The cost is the force beyond
-// the limit that the arm alone would cause: at most the stiffness times its advance since the
-// touch. If somebody runs into an arm at rest, the cost is 0. `between` is the force between two
-// arms, which must not touch: all of it is cost.
+// Reads the regions' contact sensors. The limit of an impact is the transient limit. The limit of
+// contact that lasts longer than `transient_time`, or on a region that cannot move away, is the
+// quasi-static one. (With a transient limit of 0, `ratio` is relative to the quasi-static limit.)
+// The cost is the impulse beyond the limit. It counts only force that the arm causes: at most the
+// stiffness times the arm's advance during the contact, so it is 0 if somebody runs into an arm at
+// rest. `between` is the force between two arms, which must not touch; all of it is cost.
 inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, const Sensed& step,
                          Contact& c, const Touched& peak, double between) {
   double excess = between;

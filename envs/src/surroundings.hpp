@@ -1,4 +1,4 @@
-// What surrounds the drives of a plant, and the rows that its results go to.
+// The surroundings of a plant's drives, and the arrays for its results.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,12 @@ struct Metrics {
 };
 constexpr std::size_t metrics_width = sizeof(Metrics) / sizeof(double);
 
-// What surrounds the drives: the arms' links and tools, body regions, contact sensors.
+// The arms' links and tools, body regions, people, contact sensors and barriers.
 struct Surroundings {
   Kinematics arms;
   std::vector<Tool> tools;
   std::vector<Region> regions;
-  int people_begin = 0;  // the first of the people's regions, person after person
+  int people_begin = 0;  // index of the first person's first region; the others' regions follow
   std::vector<Person> people;
   std::vector<double> low, high;  // bounds of the observation
   int sensor_begin = -1;          // first contact sensor of the links; -1: none

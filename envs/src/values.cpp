@@ -1,5 +1,5 @@
-// Python's view of the values that a plant is made of: what each stands for is said where the type
-// is declared.
+// Python bindings of the values that a plant is made of. The values are described where their types
+// are declared.
 #include <utility>
 #include <vector>
 
@@ -109,7 +109,8 @@ void bind_surroundings(nb::module_& m) {
             const bool each = people.empty() || barriers.empty() ||
                               people_geoms.size() == people.size() * person_segments;
             if (!each || boxes.shape(0) != barriers.size() || boxes.shape(1) != 6)
-              throw nb::value_error("people_geoms, barriers: expected a geom a capsule and a box");
+              throw nb::value_error(
+                  "people_geoms, barriers: expected one geom per capsule, one box per barrier");
             Barriers about;
             for (std::size_t k = 0; k < barriers.size(); ++k)
               about.all.push_back(

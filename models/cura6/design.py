@@ -1,7 +1,6 @@
-"""The arm's design: one table of numbers, from which ``cura6.xml`` is written.
+"""The arm's design: a table of numbers, from which :func:`mjcf` writes ``cura6.xml``.
 
-After a change of a number, ``mjcf()`` gives the file's new text (a test holds the two equal).
-README.md beside this file gives the source of each.
+README.md beside this file gives the source of each number. A test compares table and file.
 """
 
 from collections.abc import Sequence
@@ -29,13 +28,13 @@ class Link:
 
     pos: tuple[float, float, float]  #: of the joint in the parent's frame [m]
     axis: str  #: "y" or "z"
-    reach: float  #: joint range, in both directions [rad]
+    reach: float  #: the joint's range is -reach to reach [rad]
     speed: float  #: largest joint speed [rad/s]
     torque: float  #: largest joint torque [N m]
     rotor: float  #: inertia of motor and gear at the joint (rotor inertia x gear^2) [kg m^2]
     mass: float  #: [kg]
-    looks: tuple[Part, ...]
-    collides: tuple[Part, ...]
+    looks: tuple[Part, ...]  #: visual parts
+    collides: tuple[Part, ...]  #: collision shapes
 
 
 LINKS = (
@@ -171,7 +170,7 @@ def _geom(part: Part, kind: str) -> str:
 
 
 def dome(cap: Part) -> Part:
-    """The bulge of a housing's cap: half an ellipsoid on its outer face; it weighs nothing."""
+    """The bulge of a housing's cap: half an ellipsoid on its outer face, without mass."""
     inner, outer = sorted((np.array(cap.start), np.array(cap.end)), key=lambda p: np.linalg.norm(p))
     along = (outer - inner) / np.linalg.norm(outer - inner) * _BULGE * cap.radius
     (x0, y0, z0), (x1, y1, z1) = (outer - along).tolist(), (outer + along).tolist()

@@ -75,7 +75,7 @@ def test_meshes_of_every_format_show_and_collide(tmp_path, box, kind):
 
 def test_what_only_shows_collides_as_its_hull_and_is_named(tmp_path, box):
     file = arm(tmp_path, shape("visual", write(tmp_path, box, "ply")))
-    assert file.replaced == {"a": "convex hull of what shows"}
+    assert file.replaced == {"a": "convex hull of its visual shapes"}
     (geom,) = file.spec.body("a").geoms
     assert geom.contype
     assert geom.group < HIDDEN
