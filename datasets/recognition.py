@@ -68,6 +68,8 @@ _ANGLES = {
     for per in _PER_SECOND
 }
 _OTHER_ANGLES = ("rpm", *(u + per for u in ("mrad", "turns", "rev") for per in _PER_SECOND))
+#: Words in brackets that are no unit.
+_PLAIN_WORDS = {"measured", "actual", "filtered", "joint", "joints", "motor", "link", "side"}
 #: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
 _NAMES = "|".join((*_SECONDS, *_AMPERES, *_NEWTON_METRES, *_ANGLES, *_OTHER_ANGLES))
 _WRITTEN = re.compile(f"(?<=[a-z0-9])_({_NAMES})$")
@@ -124,7 +126,8 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     def plain(name: str) -> str:
         return _WRITTEN.sub("", _UNIT.sub("", name).strip(" #").lower())
 
-    time = next((name for name in header if plain(name) in TIMES), None)
+    times = [name for name in header if plain(name) in TIMES]
+    time = next(iter(times), None)
     groups: dict[str, tuple[str, ...]] = {}
     for prefix, columns in grouped(header).items():
         field = _field(prefix)
@@ -145,8 +148,9 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     degrees, amperes, newton_metres = _units(used, numbers)
     scale, clock = 1.0, 0.0
     if time is not None:
+        for name in times:
+            _refuse_parts(name, numbers([name])[:, 0], header)
         t = numbers([time])[:, 0]
-        _refuse_parts(time, t, header)
         steps = np.diff(t[np.isfinite(t)])
         repair |= {"order"} if (steps < 0).any() else set()
         scale = _time_scale(time, t)
@@ -192,9 +196,17 @@ def _units(
     """Units by names, else by values: whether angles are degrees; currents [A]; torques [N m].
 
     Raises:
-        ValueError: columns in different units, or angles neither in radians nor in degrees.
+        ValueError: columns in different or unknown units, or angles neither in radians nor in
+            degrees.
     """
     angles = [*groups["q"], *groups.get("qd", ())]
+    for names, units in (
+        (angles, {**_ANGLES, **dict.fromkeys(_OTHER_ANGLES)}),
+        (groups.get("current", ()), _AMPERES),
+        (groups.get("torque", ()), _NEWTON_METRES),
+    ):
+        for name in names:
+            _refuse_unknown(name, units)
     for name in angles:
         if _unit(name, dict.fromkeys(_OTHER_ANGLES, True)):
             raise ValueError(
@@ -226,6 +238,18 @@ def _units(
     return degrees, amperes, newton_metres or 1.0
 
 
+def _refuse_unknown(name: str, units: Mapping[str, Any]) -> None:
+    """Raise ``ValueError`` for a unit in brackets that is none of ``units``, and no plain word."""
+    written = _UNIT.search(name)
+    words = _words(written.group()) if written else ""
+    if words and words not in units and not set(words.split("_")) <= _PLAIN_WORDS:
+        raise ValueError(
+            f"column {name}: unit {words.replace('_', ' ')} is not known, expected one of "
+            f"{', '.join(unit.replace('_', ' ') for unit in units)}; convert it, or give a column "
+            "map with the scale"
+        )
+
+
 def _one(said: Mapping[str, Any], remedy: str) -> Any:
     """The unit that the names of some columns give, None if no name has one."""
     named = {name: value for name, value in said.items() if value is not None}
@@ -239,11 +263,15 @@ def _one(said: Mapping[str, Any], remedy: str) -> Any:
     return named.get(first)
 
 
+def _words(name: str) -> str:
+    """A name in plain letters, with one underscore between its words."""
+    told = name.lower().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u")
+    return re.sub(r"[^a-z0-9]+", "_", told).strip("_")
+
+
 def _unit(name: str, units: Mapping[str, Any]) -> Any:
     """Value in ``units`` of the unit at the end of a name (before a joint's number); None: none."""
-    told = name.lower().replace("°", "deg").replace("\u00b5", "u").replace("\u03bc", "u")
-    words = re.sub(r"[^a-z0-9]+", "_", told).strip("_")
-    words = re.sub(r"_?\d+$", "", words)
+    words = re.sub(r"_?\d+$", "", _words(name))
     return next((said for unit, said in units.items() if f"_{words}".endswith(f"_{unit}")), None)
 
 

@@ -133,16 +133,21 @@ def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
 
 
 @pytest.mark.parametrize("parts", [("sec", "nanosec"), ("stamp_s", "stamp_ns"), ("t", "t_usec")])
-def test_a_time_in_two_columns_is_refused(parts):
-    names = [*parts, *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12")]
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_time_in_two_columns_is_refused(parts, first):
+    names = [
+        parts[first],
+        parts[1 - first],
+        *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12"),
+    ]
     table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
     t = 100 + 0.03125 * np.arange(50)
-    table[:, 0] = np.floor(t)
-    table[:, 1] = 1e9 * (t % 1)
+    table[:, first] = np.floor(t)
+    table[:, 1 - first] = 1e9 * (t % 1)
     with pytest.raises(ValueError, match=f"columns {parts[0]} and {parts[1]}: parts of one time"):
         recognised(names, table)
-    table[:, 0] = t  # a second clock is no part
-    assert recognised(names, table).t == parts[0]
+    table[:, first], table[:, 1 - first] = t, 1e9 * t  # a second clock is no part
+    assert recognised(names, table).t in parts
 
 
 @pytest.mark.parametrize("unit", ["rpm", "mrad/s", "turns", "rev_per_s"])
@@ -150,6 +155,28 @@ def test_angles_in_other_units_are_refused(unit):
     names = ["t", *(f"{kind}{k}" for kind in ("q", f"velocity_{unit}_", "current") for k in "12")]
     with pytest.raises(ValueError, match=f"column velocity_{unit}_1: expected radians or degrees"):
         recognised(names, np.ones((5, 7)) * np.arange(5)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("torque_# [lbf in]", "unit lbf in is not known, expected one of mnm, .*nm, n m; convert"),
+        (
+            "current_# (counts)",
+            "unit counts is not known, expected one of milliamperes, .* a; convert",
+        ),
+        ("torque_# (measured)", ""),
+        ("torque_#", ""),
+    ],
+)
+def test_a_unit_in_brackets_that_is_not_known_is_refused(name, said):
+    names = ["t", *(kind.replace("#", k) for kind in ("q#", "qd#", name) for k in "12")]
+    table = np.ones((5, 7)) * np.arange(5)[:, None]
+    if not said:
+        assert recognised(names, table).torque_scale == 1.0
+        return
+    with pytest.raises(ValueError, match=f"column {name[:7]}.*{said}"):
+        recognised(names, table)
 
 
 def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):
