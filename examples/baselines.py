@@ -5,11 +5,11 @@
 Prints a Markdown table of means over episodes of 5 s: success with its 95 % interval, targets,
 reward, largest force divided by its limit, and cost [N s] (`info["cost_sum"]`). The last column
 counts the episodes in which some force exceeded its limit.
-`fast` goes straight to the target. The others do so too, and differ in what they do about people:
+`fast` moves straight to the target. The other controllers do so, too, but protect people:
 
 * `power and force`: limits the speed, so that an impact with any region and a lasting push stay
   below the region's quasi-static limit (two-mass model of ISO 10218-2).
-* `separation`: stands while somebody is within the protective distance.
+* `separation`: stops while somebody is within the protective distance.
 * `admittance`: yields to the force that the momentum observer finds at the tool.
 * `ppo`, `ppo, budget`: trained by `examples/learn.py`, loaded from `examples/policies`.
 """
@@ -29,7 +29,7 @@ from tauguard.models import standard_mass
 from tauguard.report import rate
 
 TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
-#: Tool velocities, 20 actions a second.
+#: Tool velocities, 20 actions per second.
 KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 100}
 POLICIES = Path(__file__).with_name("policies")
 #: Tool speed where no region limits it [m/s].
@@ -104,9 +104,9 @@ def learned(file):
 
 
 def baselines(task, files=(), robot="cura6"):
-    """By name: what acts, keywords and a wrapper of the environment; policy files come last.
+    """By name: the policy, and keywords and wrapper of its environment; policy files come last.
 
-    The shipped policies belong to the package's arm.
+    The files in `examples/policies` are for the arm cura6.
     """
     found = {
         "zero": (zero, {}, None),
@@ -174,7 +174,9 @@ def main(episodes, first, names, robot):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("episodes", nargs="?", type=int, default=20)
-    parser.add_argument("first", nargs="?", type=int, default=1000, help="seed of the first")
+    parser.add_argument(
+        "first", nargs="?", type=int, default=1000, help="seed of the first episode"
+    )
     parser.add_argument("names", nargs="*", help="tasks (default: all), and policy files")
     parser.add_argument("--robot", default="cura6", help="arm: a name, or a file")
     main(**vars(parser.parse_args()))

@@ -21,7 +21,7 @@ def main(picture=None, seconds=8.0):
     arm, goal, forces = env.unwrapped, 0, []
     largest = np.array([entry.high for entry in arm.batch.actions])
     for _ in range(round(seconds * 100)):
-        left = PLACES[goal] - arm.batch.observation[0, 18:21]  # of the tool, after 3 rows of joints
+        left = PLACES[goal] - arm.batch.observation[0, 18:21]  # from the tool
         goal = (goal + 1) % len(PLACES) if np.linalg.norm(left) < 0.03 else goal
         action = np.clip(0.05 * np.append(left, np.zeros(3)) / largest, -1, 1)
         info = env.step(action)[4]

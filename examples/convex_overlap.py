@@ -25,7 +25,7 @@ drop = sweep(table, parts, displacement=[0, 0, -0.25])  # the parts fall by 0.25
 for height, time, normal in zip(heights, drop.time_of_impact, drop.normal, strict=True):
     print(f"from {height:.1f}: time of impact {time:.3f}, normal {normal}")
 
-cache = PlaneCache(len(parts))  # frame after frame: the last planes first
+cache = PlaneCache(len(parts))  # tries the planes of the last frame first
 for frame in range(3):
     falling = Tetrahedra(parts.vertices - [0, 0, 0.02 * frame])
     hits = cache.overlap(falling, table).hit

@@ -2,17 +2,17 @@
 
     uv run --extra learn python examples/learn.py Reach-v0 --out policy.npz
     uv run tauguard watch Reach-v0 --policy policy.npz
-    uv run python examples/baselines.py 20 1000 Reach-v0 policy.npz    # beside the baselines
+    uv run python examples/baselines.py 20 1000 Reach-v0 policy.npz    # and the baselines
 
 `--set NAME=VALUE` gives keywords of the environment, as in `--set objects=cell.toml`.
 
-With a budget it is PPO-Lagrangian (Ray, Achiam & Amodei, "Benchmarking safe exploration in deep
-reinforcement learning", 2019): each step's reward is reduced by lambda times its cost over the
-budget, at most 1, so that a hard blow does not drown what was learned; lambda grows while an
-episode's mean cost is above the budget, else it falls. The cost is the environment's,
-`info["cost"]` [N s]: the impulse of forces beyond the limits of whom the arm presses, and of two
-arms on one another. The file that it writes loads with `tauguard.envs.policies.MlpPolicy.load`,
-without PyTorch.
+With a budget the method is PPO-Lagrangian (Ray, Achiam & Amodei, "Benchmarking safe exploration in
+deep reinforcement learning", 2019). The reward of a step is reduced by lambda * min(1, cost /
+budget); the minimum limits the effect of a hard impact. lambda grows while the mean cost of an
+episode is above the budget, and falls otherwise. The cost is `info["cost"]` [N s]: the impulse of
+forces beyond the limits of people and objects, and of forces between two arms.
+
+`tauguard.envs.policies.MlpPolicy.load` loads the policy file without PyTorch.
 """
 
 import argparse
@@ -29,12 +29,12 @@ from tauguard.cli.watch import parsed
 from tauguard.envs.policies import MlpPolicy
 from tauguard.envs.stable_baselines import NativeVecEnv
 
-#: Keywords of every baseline: tool velocities, 20 actions a second, episodes of 5 s.
+#: Keywords of every baseline: tool velocities, 20 actions per second, episodes of 5 s.
 KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 100}
 #: Time step of the training [s], coarser than that of the evaluation.
 COARSE = 2e-3
-#: Lessons of a task: fraction of the steps, steps of a copy between two updates, and keywords. A
-#: cloth makes a step ten times as slow, so reaching is learned without it first.
+#: Phases of a task's training: fraction of the steps, steps of a copy between updates, keywords.
+#: A step with cloth takes ten times as long, so reaching is learned without cloth first.
 LESSONS = {"ClothReach-v1": ((0.8, 256, {"cloth": None}), (0.2, 64, {}))}
 USUAL = ((1.0, 256, {}),)
 TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
@@ -59,12 +59,12 @@ class Priced(VecEnvWrapper):
 
 
 class Budget(BaseCallback):
-    """Raises lambda while the mean cost of the last episodes is above the budget."""
+    """Raises lambda if the mean cost of the last episodes is above the budget, else lowers it."""
 
     def __init__(self, priced, rate=0.1):
         super().__init__()
         self.priced, self.rate = priced, rate
-        self.found = float("nan")  # cost of the last episodes, a mean [N s]
+        self.found = float("nan")  # mean cost of the last episodes [N s]
 
     def _on_step(self):
         return True
@@ -138,7 +138,7 @@ def main():
     parser.add_argument(
         "--budget", type=float, help="mean cost of an episode of 5 s [N s] (default: none)"
     )
-    parser.add_argument("--start", type=Path, help="policy file to go on from (default: none)")
+    parser.add_argument("--start", type=Path, help="policy file to continue from (default: none)")
     parser.add_argument("--robot", default="cura6", help="arm: a name, or a file (%(default)s)")
     parser.add_argument(
         "--set", nargs="+", default=[], metavar="NAME=VALUE", help="keywords of the environment"
@@ -146,13 +146,13 @@ def main():
     parser.add_argument(
         "--steps", type=int, default=200_000, help="actions to learn from (%(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of everything drawn (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of all random numbers (%(default)s)")
     parser.add_argument(
         "--out", type=Path, default=Path("policy.npz"), help="file to write (%(default)s)"
     )
     options = parser.parse_args()
     if options.budget is not None and options.task == "ClothReach-v1":
-        parser.error("--budget: nobody stands in ClothReach-v1, so nothing has a cost there")
+        parser.error("--budget: ClothReach-v1 has no people, so no action has a cost")
     if options.budget is not None and not options.budget > 0:
         parser.error(f"--budget {options.budget:g}: expected more than 0 N s")
     policy, price, _ = train(

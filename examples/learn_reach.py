@@ -1,4 +1,4 @@
-"""Learn to reach by the cross-entropy method: no deep-learning stack, better within a minute.
+"""Learn to reach by the cross-entropy method, in a minute and without a deep-learning library.
 
 A policy is a matrix: joint velocities = tanh(W e), where e is the vector from tool to target in
 the frame of the first joint. Every generation draws matrices around the best of the last one,
@@ -14,12 +14,12 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 
-PRICE = 1.0  # of a newton second beyond the limits, beside 1 for a reached target
+PRICE = 1.0  # penalty per N s beyond the limits; a reached target is worth 1
 EPISODES, ELITE = 4, 0.25
 
 
 def act(weights, observation, joints):
-    """Actions of one policy a row: weights (N, n, 3), observations (N, ...) -> (N, n)."""
+    """Actions, one policy per row: weights (N, n, 3), observations (N, ...) -> (N, n)."""
     x, y, z = observation[:, 3 * joints + 3 : 3 * joints + 6].T / 0.1
     cos, sin = np.cos(observation[:, 0]), np.sin(observation[:, 0])
     error = np.column_stack([cos * x + sin * y, cos * y - sin * x, z])
@@ -40,7 +40,7 @@ def returns(envs, weights, seeds, steps, joints):
 
 
 def learn(generations=30, population=24, steps=250, seed=0):
-    """The learned matrix (n, 3) and, a generation each: return, targets, seconds."""
+    """The learned matrix (n, 3), and for each generation: return, targets, seconds."""
     rng = np.random.default_rng(seed)
     envs = gym.make_vec(
         "tauguard:tauguard/Reach-v0",
@@ -56,7 +56,7 @@ def learn(generations=30, population=24, steps=250, seed=0):
     curve, start = [], time.perf_counter()
     for generation in range(generations):
         drawn = mean + spread * rng.standard_normal((population, *mean.shape))
-        drawn[0] = mean  # the policy that would be kept now: its return is the curve
+        drawn[0] = mean  # the present policy, whose return is plotted
         seeds = rng.integers(2**31, size=EPISODES)
         value, reached = returns(envs, drawn, seeds, steps, joints)
         best = drawn[np.argsort(-value)[: round(ELITE * population)]]
@@ -91,7 +91,7 @@ def main():
     parser.add_argument("--generations", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("learned"))
-    parser.add_argument("--record", action="store_true", help="leave an episode of the policy")
+    parser.add_argument("--record", action="store_true", help="record an episode of the policy")
     options = parser.parse_args()
     weights, curve = learn(options.generations, seed=options.seed)
     options.out.mkdir(parents=True, exist_ok=True)

@@ -18,9 +18,9 @@ def ball(radius: float, rows: int = 24) -> tuple[np.ndarray, np.ndarray]:
     return radius * vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
 
-tree = MeshTree(*ball(0.1))  # one tree a mesh; its volume changes the speed, never the answer
+tree = MeshTree(*ball(0.1))  # one tree per mesh
 poses = np.tile(np.eye(4), (3, 1, 1))
-poses[:, 0, 3] = [0.15, 0.19, 0.21]  # of the other mesh, in this one's frame
+poses[:, 0, 3] = [0.15, 0.19, 0.21]  # poses of the second ball in the frame of the first
 first = tree.overlap(tree, poses)
 print("balls 0.2 m across, at", poses[:, 0, 3], "hit", first.hit)
 

@@ -18,9 +18,9 @@ from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.replay.video import frames
 
-SPAN, STEP = (-0.2, 0.3), 0.008  # [s] about the onset; a frame
+SPAN, STEP = (-0.2, 0.3), 0.008  # time shown about the onset, time per frame [s]
 SLOWER = 8
-#: Of the camera, so that nothing hides the ball: azimuth, elevation [deg], distance.
+#: Azimuth, elevation [deg] and distance of the camera, at which nothing hides the ball.
 VIEW = (215.0, -12.0, 1.8)
 
 

@@ -25,8 +25,8 @@ from urllib.parse import quote, unquote
 HOST, PATIENCE = "127.0.0.1", 20.0
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
-#: Content policy: a page runs no script, and neither loads from nor sends to another host. A script
-#: could send data to another host. The script of the report runs only in pages opened as files.
+#: Content security policy: pages run no script, which could send data to another host, and load
+#: only from this server. (The report's script runs only if its page is opened as a file.)
 POLICY = (
     "default-src 'self' data:; script-src 'none'; style-src 'unsafe-inline'; form-action 'none'; "
     "base-uri 'none'"
@@ -80,7 +80,7 @@ class BrowserReplay:
         self._files.server_close()
 
     def __enter__(self) -> BrowserReplay:
-        """The servers, running."""
+        """Return this object; the servers run already."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -89,7 +89,7 @@ class BrowserReplay:
 
 
 class _Server(http.server.ThreadingHTTPServer):
-    """The folder's server, which knows the viewer's address."""
+    """The folder's server, with the viewer's address."""
 
     daemon_threads = True
     viewer = address = ""
@@ -131,7 +131,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     def _own_file(self) -> bool:
         """Whether the path is a regular file inside the folder, not behind a symbolic link."""
         file, folder = Path(self.translate_path(self.path)), Path(self.directory)
-        if self.path.partition("?")[0] == "/":  # other names of the folder would be redirected
+        if self.path.partition("?")[0] == "/":  # the only name of the folder
             file = folder / "index.html"
         if file.suffix not in SERVED or not file.is_relative_to(folder):
             return False
@@ -170,7 +170,7 @@ def _free_port() -> int:
 
 
 def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
-    """rerun's web viewer, once it answers; ``files`` keeps it from opening a port for data."""
+    """Start rerun's web viewer and wait for it; the file keeps it from opening a data port."""
     program = Path(sys.executable).with_name("rerun")
     options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"{files}/none.rrd"]
     quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}

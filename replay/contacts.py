@@ -38,7 +38,7 @@ def write_contacts_rrd(
     Args:
         path: The ``.rrd`` file; written atomically.
         model: ``mujoco.MjModel``.
-        t: Times, rising [s]. Shape (T,).
+        t: Increasing times [s]. Shape (T,).
         positions: Positions of the bodies. Shape (T, nbody, 3), m.
         rotations: Rotation matrices of the bodies. Shape (T, nbody, 3, 3).
         vertices: Vertices of the flexes. Shape (T, nflexvert, 3), m.
@@ -96,7 +96,7 @@ def _eye(
     target = np.median(np.concatenate(points), axis=0)
     normal = np.nan_to_num(np.concatenate(normals)).mean(axis=0)
     across = np.array([normal[1], -normal[0], 0.0])
-    if np.linalg.norm(across) < 0.1:  # a floor: any direction will do
+    if np.linalg.norm(across) < 0.1:  # vertical normal: any direction will do
         across = np.array([1.0, 0.0, 0.0])
     moving = positions[:, 1:] if vertices is None else vertices
     spread = moving.max(axis=(0, 1)) - moving.min(axis=(0, 1)) if moving.size else np.ones(3)
@@ -159,7 +159,7 @@ def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
 def _log_marks(
     recording: Any, name: str, colour: NDArray[np.uint8], t: Array, marks: Marks
 ) -> None:
-    """Show the contacts of each interval between two states at its end."""
+    """Show the contacts of each interval between two states at the interval's end."""
     when, points, normals = marks
     row = np.searchsorted(t, when)
     known = np.flatnonzero((row < len(t)) & np.isfinite(points).all(axis=1))

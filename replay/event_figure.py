@@ -20,8 +20,8 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         path: path of the picture.
         trace: the part, with its truth.
         detection: detection of that part.
-        held: the score that was reached during the whole confirmation time, shape (T,) of that
-            part. It is an alarm if it exceeds the threshold.
+        held: lowest score of the last confirmation time at each sample of the part, shape (T,). It
+            is an alarm if it exceeds the threshold.
         title: title of the picture.
 
     Raises:

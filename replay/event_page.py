@@ -30,7 +30,7 @@ def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[st
         event: of this trace.
         trace: with truth.
         threshold: threshold of the score.
-        held: the score that was reached during the whole confirmation time, shape (T,).
+        held: lowest score of the last confirmation time at each sample, shape (T,).
     """
     import numpy as np
 
@@ -116,19 +116,19 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
             "window": f"from the onset until {WINDOW} s after it; of a clamp, until it ends.",
             "alarm": f"the score has been above the threshold throughout the {time}. Alarms "
             f" less than {MERGE_GAP} s apart are one.",
-            "missed": "no alarm starts in the collision's window, or one was up at its onset.",
+            "missed": "no alarm starts in the collision's window, or one was active before.",
             "late": f"the first alarm in the window starts more than {ms} after the onset; "
             "delay: how long after.",
             "false alarm": "an alarm that starts in no collision's window.",
-            "largest score": f"that was held throughout the {time}: in the collision's window, or "
-            "while the false alarm was up.",
+            "largest score": f"largest value that the score kept throughout the {time}, in the "
+            "collision's window or during the false alarm.",
             "peak torque": "largest external torque of the collision over joints 1 to 4.",
             "speed": "planned, in percent of the joints' largest; the pictures show the "
             "measured speed of the fastest joint.",
-            "payload": "mass carried at the event; the detector is given none.",
+            "payload": "mass carried at the event; it is not given to the detector.",
             "recording": "the file, or SPLIT/NUMBER of a dataset as tauguard inspect --episode "
-            "takes it. A bare number is a test motion's. All count from 0.",
-            "not counted": f"what starts in a recording's {begin}, in which the detector settles.",
+            "takes it. A number alone is a test motion's. Numbers count from 0.",
+            "not counted": f"events in a recording's {begin}, in which the detector starts up.",
         }.items()
     )
 

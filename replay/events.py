@@ -93,7 +93,7 @@ class EventFolder:
         Args:
             folder: new, or a folder that this class has written before.
             late: a detection with a longer delay is an event [s].
-            alarm: the detector, whose confirmation time applies; without it, it is 0.
+            alarm: the detector, for its confirmation time (default: a confirmation time of 0).
 
         Raises:
             ValueError: the folder contains other files.
@@ -137,7 +137,7 @@ class EventFolder:
                 self._rows.append(row)
 
     def _held(self, trace: Trace, detection: Detection) -> Array:
-        """The score that was reached during the whole confirmation time, shape (T,)."""
+        """The lowest score of the last confirmation time at each sample, shape (T,)."""
         from tauguard.detectors.events import confirmation_samples, sustained
 
         if self._alarm is None:

@@ -59,7 +59,7 @@ def write_rrd(
 
     Args:
         path: the ``.rrd`` file; written atomically.
-        trace: what to show.
+        trace: the trace to show.
         detection: a detector's output for it.
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
@@ -128,7 +128,7 @@ def extremes(values: Array, starts: NDArray[np.int64]) -> Array:
 
 
 def times(t: Array) -> list[Any]:
-    """The only timeline: seconds of the trace."""
+    """The recording's only timeline: times of the trace [s]."""
     return [rr.TimeColumn(TIMELINE, duration=t)]
 
 
@@ -202,7 +202,7 @@ def drawn(piece: Shape) -> Any:
             triangle_indices=piece.triangles,
             albedo_factor=colour[0],
         )
-    if piece.kind == "capsule":  # rerun's begins at its origin and goes along z
+    if piece.kind == "capsule":  # rerun's capsule begins at its origin and extends along z
         start = piece.position - matrix(piece.quat_wxyz) @ np.array([0.0, 0.0, half])
         return rr.Capsules3D(lengths=[2 * half], radii=[radius], translations=[start], **common)
     centres = [piece.position]

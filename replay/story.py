@@ -87,9 +87,9 @@ def page(
     if detection is not None:
         lines += [
             "- **Residual**: the observer's estimate of the external torque of each joint.",
-            f"- **Score**: the output of the {detection.detector} detector; above the red line, "
-            f"at {detection.threshold:.3g}, is a raw alarm. High scores leave the chart.",
-            "- **Alarm and truth**: when the alarm was up, and when there really was a contact.",
+            f"- **Score**: the output of the {detection.detector} detector. Scores above the red "
+            f"line, at {detection.threshold:.3g}, lead to an alarm. High scores leave the chart.",
+            "- **Alarm and truth**: when the alarm was active, and when there was a contact.",
         ]
     lines += [
         "- **Current**: the measured motor currents, the only input.",

@@ -31,9 +31,9 @@ def frames(
     size: tuple[int, int] = (480, 640),
     view: tuple[float, float, float] = VIEW,
 ) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of a recording that holds its scene, shape (height, width, 3).
+    """Pictures of a recording that contains its scene, shape (height, width, 3).
 
-    They show targets as balls, and an arrow for the strongest contact since the last picture.
+    They show targets as balls, and the strongest contact since the last picture as an arrow.
 
     Args:
         trace: as returned by :func:`tauguard.traces.read_mcap`.
@@ -166,7 +166,7 @@ def _placer(model: Any, data: Any, trace: Trace) -> Any:
 
 
 def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) -> int:
-    """Write pictures of shape (height, width, 3), ``rate`` a second; returns how many.
+    """Write pictures of shape (height, width, 3), ``rate`` per second; returns their number.
 
     Raises:
         ValueError: an ending that is not known, or MP4 without the extra ``video``.

@@ -71,7 +71,7 @@ def cell(value: object, brief: bool = False) -> str:
         if "p95" in value:
             return f"{middle:{form}}, {value['p95']:{form}}"
         if "median" in value and value["low"] == value["high"]:
-            return f"{middle:{form}}"  # of one repeat
+            return f"{middle:{form}}"  # measured once
         return f"{middle:{form}} [{value['low']:{form}}, {value['high']:{form}}]"
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -18,8 +18,8 @@ print(trace)
 print(trace.truth.collisions[0])
 
 # %%
-# The residual follows the truth with the lag of the observer. What it shows while nothing touches
-# the arm is friction and model error: a detector has to tell the two apart.
+# The residual follows the truth with the lag of the observer. While nothing touches the arm, it
+# shows friction and model error. A detector has to distinguish these from contact.
 
 residual = tauguard.residual(trace)
 figure, panels = plt.subplots(

@@ -2,8 +2,9 @@
 A detector of your own
 ======================
 
-A detector has a name and ``fit``; what it returns gives a score for each sample. Thresholds, alarms
-and metrics are the same for all detectors, so yours stands beside the built-in ones.
+A detector has a name and ``fit``, which returns an object that gives a score for each sample.
+Thresholds, alarms and metrics are the same for all detectors, so yours can be compared with the
+built-in ones.
 """
 
 from dataclasses import dataclass

@@ -2,8 +2,8 @@
 Tell a clamp from an impact
 ===========================
 
-An alarm says that something touched the arm. The diagnosis says which link, how hard, and what kind
-of contact it was: an impact is over when the arm moves on, a clamped person needs the arm to open.
+An alarm says that something touched the arm. The diagnosis names the link, the force and the kind
+of contact. An impact ends by itself, but a clamped person has to be released.
 """
 
 import matplotlib.pyplot as plt

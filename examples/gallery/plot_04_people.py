@@ -2,8 +2,8 @@
 A person beside the arm
 =======================
 
-A person of capsules reaches, walks and draws back from a touch. The environment says with which
-force the arm touches which region, over that region's limit.
+A person made of capsules reaches, walks and draws back after a touch. The environment reports the
+force on each region of the body, and the largest ratio of a force to its limit.
 """
 
 import gymnasium as gym

@@ -3,7 +3,7 @@ A policy under a cost budget
 ============================
 
 The cost of a step is the impulse of the arm beyond the limits of the body regions. A controller
-that slows down near people pays less, and reaches less. Where is the trade-off?
+that slows down near people has less cost, but reaches fewer targets. What is the trade-off?
 """
 
 import gymnasium as gym
@@ -23,7 +23,7 @@ joints = 6
 
 
 def play(near):
-    """Mean targets and cost of an episode, and their errors; slower within ``near`` of a person."""
+    """Mean targets and cost of an episode, and errors; slower within ``near`` [m] of a person."""
     observation, info = envs.reset(seed=[1000 + k for k in range(COPIES)])
     reached = np.zeros(COPIES)
     for _ in range(STEPS):

@@ -2,9 +2,9 @@
 A twin from a log
 =================
 
-Some minutes of free motion show an arm's friction, ripple and noise. Identified from them, a
-simulated arm reports currents like the real one's. Here a second simulated arm, whose numbers are
-hidden, plays the real one.
+A few minutes of collision-free motion show an arm's friction, ripple and noise. A simulated arm
+with these numbers, a twin, reports currents like those of the real arm. Here another simulated arm,
+whose numbers are not given to the identification, stands in for the real one.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +23,7 @@ print("Coulomb friction [N m]:", twin.drive.friction.coulomb.round(2))
 print(*twin.notes, sep="\n")
 
 # %%
-# The last log was not used. The twin plays along its motion.
+# The last log was not used. The twin repeats its motion.
 
 log = logs[5]
 current = played(twin.arm, twin.drive, log)

@@ -2,9 +2,8 @@
 A live log: free, collision or fault
 ====================================
 
-A detector beside a running robot answers at every sample. When samples repeat or stop, the answer
-is a fault, never silence. Here a recording plays the robot, and its encoder freezes for half a
-second.
+A detector of a running robot gives a state for every sample. If samples repeat or stop, the state
+is a fault. Here a recording stands in for the robot, and its signals freeze for half a second.
 """
 
 from dataclasses import replace

@@ -2,7 +2,8 @@
 A data set in polars
 ====================
 
-A description of ten lines becomes a folder of Parquet files with a card. Any library reads them.
+A description of ten lines becomes a folder of Parquet files with a card. Data-frame libraries such
+as polars, pandas and DuckDB read them.
 """
 
 import tempfile

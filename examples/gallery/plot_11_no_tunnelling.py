@@ -3,7 +3,7 @@ A step that does not tunnel
 ===========================
 
 A ball at 50 m/s moves 25 cm in a step of 5 ms and the cloth is 2 mm thick. MuJoCo looks for
-contacts at the end of a step, so the ball passes. The guarded step stops it, and says where.
+contacts at the end of a step, so the ball passes through. The guarded step stops it and says where.
 """
 
 import matplotlib.pyplot as plt

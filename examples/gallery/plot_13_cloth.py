@@ -2,8 +2,8 @@
 Collisions of a cloth
 =====================
 
-Every vertex-face and edge-edge collision of a draped skirt in each step. No collision is missed and
-none is invented; the first time of impact tells a solver how far the step may go.
+``MeshCCD`` finds every vertex-face and edge-edge collision of a draped skirt in each step. None is
+missed and none is invented. The first time of impact tells a solver how far the step may go.
 """
 
 import time

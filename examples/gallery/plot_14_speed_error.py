@@ -2,9 +2,9 @@
 Speed beside error
 ==================
 
-The dissertation compares AB2PF with earlier methods. All of them get the same frames of a cloth,
-and the same candidate pairs: how long does a frame take, and how many collisions are missed or
-invented?
+The dissertation compares AB2PF with earlier methods. Here all methods get the same frames of a
+cloth and the same candidate pairs. How long does a frame take, and how many collisions are missed
+or invented?
 """
 
 import time
@@ -16,7 +16,7 @@ from tauguard.cloth.scenes import SCENES
 
 
 def frames(scene, method):
-    """Milliseconds a frame, the faster one of two runs, and the set of collisions."""
+    """Milliseconds per frame (the faster of two runs), and the set of collisions."""
     steps, best = list(scene.steps(6)), float("inf")
     for _ in range(2):
         mesh = comparators.ComparedMeshCCD(scene.faces, groups=scene.groups, method=method)
@@ -36,7 +36,7 @@ for panel, (name, size) in zip(
     panels, (("crumpling", 6_000), ("packed_cubes", 1_500)), strict=True
 ):
     scene = SCENES[name](size, 0)
-    truth = frames(scene, "exact")[1]  # integers decide everything
+    truth = frames(scene, "exact")[1]  # in exact integer arithmetic
     for method in ("ab2pf", "iccd", "dnf", "scd", "vcd"):
         cost, found = frames(scene, method)
         missed, false = len(truth - found), len(found - truth)

@@ -2,7 +2,7 @@
 Hard cases
 ==========
 
-Named cases with exact answers, asked of every library that is installed. Add your own with an
+Named cases with exact answers are given to every installed library. Add your own library by an
 adapter of a few lines.
 """
 
@@ -15,7 +15,7 @@ from tauguard.hard_cases import adapters, load_cases, run
 
 
 class EndOfStep:
-    """Looks at the bounding boxes at the end of the step alone, as many simulators do."""
+    """Compares only the bounding boxes at the end of the step."""
 
     name = "end of step"
 
