@@ -98,6 +98,7 @@ class Alarm {
 
   std::size_t joints() const { return scores_->joints(); }
   double dt() const { return set_.dt; }
+  const Estimator* estimator() const { return scores_->estimator(); }
   double score() const { return score_; }
 
   void reset() {

@@ -2,10 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace tauguard::detectors {
 
 using Link = Workspace::Link;
+
+bool Chain::operator==(const Chain& other) const {
+  static_assert(sizeof(Joint) == offsetof(Joint, axis) + 47 * sizeof(double), "numbers only");
+  const auto same = [](const Joint& a, const Joint& b) {
+    return a.parent == b.parent && a.prismatic == b.prismatic &&
+           std::memcmp(&a.axis, &b.axis, sizeof a - offsetof(Joint, axis)) == 0;
+  };
+  return gravity == other.gravity &&
+         std::equal(joints.begin(), joints.end(), other.joints.begin(), other.joints.end(), same);
+}
 
 // The frame of link i in its parent's.
 void Chain::place(int i, double q, Workspace& work) const {
@@ -223,12 +234,28 @@ void Chain::rnea(const double* q, const double* qd, const double* qdd, double* t
 
 void Chain::mass_matrix(const double* q, double* m, Workspace& work) const {
   const int n = size();
-  std::vector<double> one(n, 0.0), beta(n), column_of(n);
+  for (int i = 0; i < n; ++i) place(i, q[i], work);
   for (int j = 0; j < n; ++j) {
-    one[j] = 1.0;
-    momentum(q, one.data(), column_of.data(), beta.data(), work);
-    for (int i = 0; i < n; ++i) m[i * n + j] = column_of[i];
-    one[j] = 0.0;
+    for (int i = j; i < n; ++i) {  // links before j are at rest
+      const Joint& joint = joints[i];
+      Link& link = work.links[i];
+      const bool carried = i > j && joint.parent >= j;
+      const Vec3 w = carried ? work.links[joint.parent].w : Vec3{};
+      const Vec3 v = carried ? work.links[joint.parent].v + cross(w, link.origin) : Vec3{};
+      link.w = transposed(link.rotation, w);
+      link.v = transposed(link.rotation, v);
+      if (i == j) (joint.prismatic ? link.v : link.w) += joint.axis;
+      link.h = joint.inertial.angular_momentum(link.w, link.v);
+      link.k = joint.inertial.linear_momentum(link.w, link.v);
+    }
+    for (int i = 0; i < j; ++i) work.links[i].h = work.links[i].k = Vec3{};
+    for (int i = n - 1; i >= 0; --i) {
+      const Joint& joint = joints[i];
+      const Link& link = work.links[i];
+      m[i * n + j] = dot(joint.axis, joint.prismatic ? link.k : link.h) +
+                     joint.armature * static_cast<double>(i == j);
+      if (joint.parent >= 0) hand_over(link, work.links[joint.parent]);
+    }
   }
 }
 

@@ -70,6 +70,7 @@ class Chain {
   std::vector<Joint> joints;
   Vec3 gravity;
 
+  bool operator==(const Chain& other) const;
   int size() const { return static_cast<int>(joints.size()); }
 
   // p = M(q) qd and beta = C(q, qd)^T qd - g(q), so that dp/dt = tau + beta + tau_ext; n doubles
@@ -93,7 +94,7 @@ class Chain {
   void rnea(const double* q, const double* qd, const double* qdd, double* tau,
             Workspace& work) const;
 
-  // M(q), n x n, armature on its diagonal.
+  // M(q), n x n, armature on its diagonal; column j is the momentum of a unit velocity of joint j.
   void mass_matrix(const double* q, double* m, Workspace& work) const;
 
  private:

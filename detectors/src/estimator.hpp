@@ -35,10 +35,16 @@
 // half the difference of the two samples, because a brake acts at an unknown time between them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
+//
+// Two estimators of one arm at the same sample need the same momentum, and the same drive torques
+// if their friction has seen the same motion. An estimator without unknowns takes them from the
+// other.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <memory>
 #include <vector>
 
 #include "chain.hpp"
@@ -88,16 +94,14 @@ class Estimator {
         adapts_(errors_.any()),
         carrying_(chain_),
         mass_(n_ * n_) {
-    for (auto* v : {&p_,        &beta_,           &p_before_,         &beta_before_,
-                    &tau_,      &tau_before_,     &residual_,         &decay_,
-                    &plain_,    &plain_tau_,      &plain_tau_before_, &smooth_,
-                    &usual_,    &inertia_,        &change_,           &acceleration_,
-                    &one_,      &column_of_mass_, &unused_,           &moved_,
-                    &half_step_})
+    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
+                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_, &usual_, &inertia_,
+                    &change_, &acceleration_, &moved_, &half_step_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
     for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(per_joint * n_);
+    memory_before_ = memory_;
   }
 
   std::size_t joints() const { return n_; }
@@ -117,17 +121,38 @@ class Estimator {
     decay_dt_ = -1.0;
   }
 
+  // Finds out whether `other` is of the same arm, so that a step can take from it.
+  void compare(const Estimator& other) {
+    if (arm_ != other.arm_ && chain_ == other.chain_ && basis_ == other.basis_ &&
+        set_.drive_gain == other.set_.drive_gain && set_.weights == other.set_.weights)
+      arm_ = other.arm_;
+  }
+
   // One sample. It gives the observer's residual r, the part of it that the unknowns do not
   // explain, and the quantities with which its noise grows (motion_numbers rows of n).
-  // Accelerations are velocities differentiated at the rate acceleration_rate.
+  // Accelerations are velocities differentiated at the rate acceleration_rate. `other` has just
+  // stepped with the same q, qd and current, or is null.
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
-            double* unexplained, double* motion) {
+            double* unexplained, double* motion, const Estimator* other = nullptr) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
-    chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
+    if (other && !(!adapts_ && arm_ == other->arm_ && same_speeds(*other))) other = nullptr;
+    if (other) {
+      p_ = other->p_before_;
+      beta_ = other->beta_before_;
+    } else {
+      chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
+    }
     if (adapts_)
       chain_.load_columns(static_cast<int>(n_) - 1, load_p_.data(), load_beta_.data(), work_);
-    drive(q, qd, current);
+    if (other && !basis_.modelled && same(memory_, other->memory_before_)) {
+      memory_before_.swap(memory_);
+      memory_ = other->memory_;
+      plain_tau_ = tau_ = other->tau_before_;
+    } else {
+      memory_before_ = memory_;
+      drive(q, qd, current);
+    }
     if (started_) filter(dt);
     remember();
     for (std::size_t j = 0; j < n_; ++j) {
@@ -156,6 +181,14 @@ class Estimator {
   }
 
  private:
+  static bool same(const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() &&
+           (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0);
+  }
+  bool same_speeds(const Estimator& other) const {
+    return fusion_.active() == other.fusion_.active() && same(fusion_.all(), other.fusion_.all());
+  }
+
   void begin(const double* q, const double* qd) {
     std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
@@ -168,22 +201,20 @@ class Estimator {
     if (adapts_) weigh(q);
   }
 
-  // The mass matrix of arm and tracked payload, its entries' sizes, and the norms of its rows.
+  // The sizes of the entries of the mass matrix of arm and tracked payload, the norms of its rows.
   void weigh(const double* q) {
     Inertial& held = carrying_.joints.back().inertial;
     const Inertial& empty = chain_.joints.back().inertial;
     held.mass = empty.mass - theta()[0];
     held.moment = empty.moment - Vec3{theta()[1], theta()[2], theta()[3]};
     std::fill(inertia_.begin(), inertia_.end(), 0.0);
-    for (std::size_t k = 0; k < n_; ++k) {
-      one_[k] = 1.0;
-      carrying_.momentum(q, one_.data(), column_of_mass_.data(), unused_.data(), work_);
-      one_[k] = 0.0;
-      for (std::size_t j = 0; j < n_; ++j) {
-        mass_[j * n_ + k] = std::fabs(column_of_mass_[j]);
-        inertia_[j] += column_of_mass_[j] * column_of_mass_[j];
+    carrying_.mass_matrix(q, mass_.data(), work_);
+    for (std::size_t j = 0; j < n_; ++j)
+      for (std::size_t k = 0; k < n_; ++k) {
+        double& entry = mass_[j * n_ + k];
+        inertia_[j] += entry * entry;
+        entry = std::fabs(entry);
       }
-    }
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
@@ -225,7 +256,9 @@ class Estimator {
 
   void filter(double dt) {
     if (dt != decay_dt_) {
-      for (std::size_t j = 0; j < n_; ++j) decay_[j] = observer_decay(set_.gain[j], dt);
+      for (std::size_t j = 0; j < n_; ++j)
+        decay_[j] = j > 0 && set_.gain[j] == set_.gain[j - 1] ? decay_[j - 1]
+                                                              : observer_decay(set_.gain[j], dt);
       smooth_decay_ = observer_decay(acceleration_rate, dt);
       plain_decay_ = observer_decay(set_.plain_gain, dt);
       change_decay_ = std::exp(-dt / change_lasts);
@@ -293,7 +326,7 @@ class Estimator {
   EstimatorSettings set_;
   std::size_t n_;
   Workspace work_;
-  std::vector<double> memory_, column_;
+  std::vector<double> memory_, memory_before_, column_;
   VelocityFusion fusion_;
   SlowErrors errors_;
   bool adapts_;
@@ -301,8 +334,9 @@ class Estimator {
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
   std::vector<double> own_now_, own_before_, own_, smooth_, usual_, moved_, half_step_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
-  Chain carrying_;  // the arm with the tracked payload
-  std::vector<double> mass_, inertia_, change_, acceleration_, one_, column_of_mass_, unused_;
+  std::shared_ptr<int> arm_ = std::make_shared<int>();  // one for all estimators of one arm
+  Chain carrying_;                                      // the arm with the tracked payload
+  std::vector<double> mass_, inertia_, change_, acceleration_;
   double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0, change_decay_ = 0.0;
   double since_ = 0.0;  // last correction [s]
   bool started_ = false;

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <tuple>
 #include <vector>
 
 namespace tauguard::detectors {
@@ -85,6 +86,14 @@ class FrictionBasis {
       *out++ = std::sin(phase);
     }
     if (saturation) *out++ = tau * std::fabs(tau);
+  }
+
+  bool operator==(const FrictionBasis& other) const {
+    const auto all = [](const FrictionBasis& b) {
+      return std::tie(b.bristles, b.stops, b.stribeck, b.slopes, b.loaded, b.saturation, b.modelled,
+                      b.cycles, b.ripples, b.play);
+    };
+    return all(*this) == all(other);
   }
 };
 

@@ -44,10 +44,14 @@ class Monitor {
         n_(observer_.joints()),
         last_(3 * n_),
         between_(3 * n_),
-        out_((2 + motion_numbers) * n_) {}
+        out_((2 + motion_numbers) * n_) {
+    if (alarm_.estimator()) observer_.compare(*alarm_.estimator());
+  }
 
   std::size_t joints() const { return n_; }
   bool settled() const { return time_ >= ready_; }
+  // The detector's estimator if it has stepped with the last sample as it was, else null.
+  const Estimator* fed() const { return bad_ ? nullptr : alarm_.estimator(); }
 
   const Thought& step(double t, const double* q, const double* qd, const double* current) {
     const Verdict verdict = check_.step(t, q, qd, current);
@@ -88,7 +92,8 @@ class Monitor {
   }
 
   Verdict judge_torques(const double* q, const double* qd, const double* current, double dt) {
-    observer_.step(q, qd, current, dt, out_.data(), out_.data() + n_, out_.data() + 2 * n_);
+    observer_.step(q, qd, current, dt, out_.data(), out_.data() + n_, out_.data() + 2 * n_,
+                   alarm_.estimator());
     return torques_.step(out_.data(), current, dt);
   }
 

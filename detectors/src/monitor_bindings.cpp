@@ -127,7 +127,8 @@ nb::typed<nb::tuple, int, int, double, bool> steps(Monitor& monitor, In1 t, In2 
     alarms.data()[i] = said.alarm;
     if (first.why.fault == Fault::none) first = said;
     if (finite(a, n) && finite(b, n) && finite(c, n)) {
-      estimator.step(a, b, c, dt, out.data(), out.data() + n, out.data() + 2 * n);
+      if (monitor.fed()) estimator.compare(*monitor.fed());
+      estimator.step(a, b, c, dt, out.data(), out.data() + n, out.data() + 2 * n, monitor.fed());
       std::copy_n(out.data(), n, last.data());
     }
     std::copy_n(last.data(), n, residuals.data() + i * n);

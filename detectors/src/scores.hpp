@@ -22,6 +22,8 @@ class Scores {
   virtual double step(const double* q, const double* qd, const double* current, double dt) = 0;
   // The score of the plain thresholds that this detector contains, at the same sample.
   virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
+  // The estimator that steps at each sample as it is; null: none does.
+  virtual const Estimator* estimator() const { return nullptr; }
 };
 
 // The largest of some numbers; NaN if one is NaN.
@@ -58,6 +60,7 @@ class ScaledResidual {
         motion_(motion_rows * residual_.size()),
         row_(scaling_.columns()) {}
 
+  const Estimator& estimator() const { return estimator_; }
   std::size_t joints() const { return estimator_.joints(); }
   std::size_t columns() const { return row_.size(); }
   void reset() { estimator_.reset(); }
@@ -91,6 +94,7 @@ class LimitScores final : public Scores {
       : residual_(std::move(residual)), limits_(std::move(limits)), ratio_(limits_.size()) {}
 
   std::size_t joints() const override { return residual_.joints(); }
+  const Estimator* estimator() const override { return &residual_.estimator(); }
   void reset() override { residual_.reset(); }
   double step(const double* q, const double* qd, const double* current, double dt) override {
     const double* scaled = residual_.step(q, qd, current, dt);
@@ -130,6 +134,7 @@ class KernelScores final : public Scores {
         ratio_(floor_.limits.size()) {}
 
   std::size_t joints() const override { return residual_.joints(); }
+  const Estimator* estimator() const override { return &residual_.estimator(); }
   void reset() override {
     residual_.reset();
     window_.reset();

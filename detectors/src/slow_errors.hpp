@@ -72,7 +72,10 @@ class SlowErrors {
 
   // Time update over `elapsed` seconds.
   void fade(double elapsed) {
-    for (std::size_t a = 0; a < m_; ++a) row_[a] = std::exp(-elapsed / persistence_[a]);
+    for (std::size_t a = 0; a < m_; ++a)
+      row_[a] = a >= per_joint && persistence_[a] == persistence_[a - per_joint]
+                    ? row_[a - per_joint]
+                    : std::exp(-elapsed / persistence_[a]);
     for (std::size_t a = 0; a < m_; ++a) {
       state_[a] *= row_[a];
       for (std::size_t b = 0; b < m_; ++b) covariance_[a * m_ + b] *= row_[a] * row_[b];

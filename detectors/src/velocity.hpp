@@ -42,6 +42,7 @@ class VelocityFusion {
   }
 
   const double* last() const { return velocity_.data(); }
+  const std::vector<double>& all() const { return velocity_; }
 
  private:
   std::vector<double> gains_, state_, velocity_;

@@ -99,6 +99,42 @@ int estimators(Random& random, int rounds) {
   return 10 * rounds * 600;
 }
 
+// What an estimator takes from another one of its arm is what it would compute, also if the other
+// missed samples, began later, or is of another arm.
+int companions(Random& random, int rounds) {
+  constexpr std::size_t samples = 300;
+  for (int round = 0; round < 10 * rounds; ++round) {
+    const std::size_t n = 1 + random() % 7;
+    const Chain chain = chain_of(random, n), other_chain = chain_of(random, n);
+    const FrictionBasis basis = basis_of(random, n);
+    EstimatorSettings set = settings_of(random, n, basis.columns(), true);
+    Estimator leader(round % 4 ? chain : other_chain, basis, set);
+    set.deviation.assign(set.deviation.size(), 0.0);
+    set.gain = uniforms(random, n, 10, 200);
+    if (round % 5 == 0) set.weights = uniforms(random, set.weights.size(), 0, 1);
+    Estimator alone(chain, basis, set), follower(chain, basis, set);
+    follower.compare(leader);
+    const Motion m(random, n, samples, round % 2);
+    Numbers out[3];
+    for (Numbers& o : out) o.resize((2 + motion_numbers) * n);
+    for (std::size_t k = 0; k < samples; ++k) {
+      const auto step = [&](Estimator& one, Numbers& o, const Estimator* other = nullptr) {
+        one.step(&m.q[k * n], &m.qd[k * n], &m.current[k * n], m.dt[k], o.data(), o.data() + n,
+                 o.data() + 2 * n, other);
+      };
+      const bool led = random() % 10 != 0;
+      if (random() % 50 == 0) leader.reset();
+      if (random() % 50 == 0) alone.reset(), follower.reset();
+      if (led) step(leader, out[0]);
+      step(alone, out[1]);
+      step(follower, out[2], led ? &leader : nullptr);
+      check(!std::memcmp(out[1].data(), out[2].data(), 8 * out[1].size()),
+            "what it takes from another is not what it computes");
+    }
+  }
+  return 10 * rounds * 300;
+}
+
 int free_motions(Random& random, int rounds) {
   constexpr std::size_t samples = 500;
   for (int round = 0; round < 10 * rounds; ++round) {
@@ -169,8 +205,8 @@ int monitors(Random& random, int rounds) {
 int main(int argc, char** argv) {
   const int effort = argc > 1 ? std::atoi(argv[1]) : 20;
   Random random(5);
-  const int estimated = estimators(random, effort), judged = free_motions(random, effort),
-            watched = monitors(random, effort);
+  const int estimated = estimators(random, effort) + companions(random, effort),
+            judged = free_motions(random, effort), watched = monitors(random, effort);
   std::printf("estimator samples %d, free-motion samples %d, monitor samples %d: %d wrong\n",
               estimated, judged, watched, failures);
   return failures != 0;

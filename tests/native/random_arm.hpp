@@ -87,6 +87,7 @@ inline FreeMotion free_motion_of(Random& random, const Chain& chain, const Frict
   return {std::move(estimator),
           {uniforms(random, n, 0.1, 1), uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 1),
            uniforms(random, RegimeBounds::terms * n, 0, 1), uniforms(random, n, 0, 1),
+           uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 2), uniforms(random, n, 1, 20),
            uniforms(random, n, 0, 1), Numbers(n, -1e6), uniforms(random, n, 1, 2e6)}};
 }
 
