@@ -1,7 +1,6 @@
-"""Arms by name: the source of their model, and the numbers that no model file states.
+"""Arms by name: their model files, and numbers that no model file states, with their sources.
 
-Every number names its source. Numbers that a row leaves out are derived, see
-:mod:`tauguard.models.derive`.
+Numbers that a row leaves out are derived, see :mod:`tauguard.models.derive`.
 """
 
 import importlib.util
@@ -28,7 +27,7 @@ class KnownRobot:
     robot: Robot  #: description, whose ``file`` is the arm's name
     own: str | None  #: file in :data:`PUBLISHED`
     urdf: str | None  #: path below ``robots`` of example-robot-data
-    menagerie: str | None
+    menagerie: str | None  #: name in mujoco-menagerie
     sources: Mapping[str, str]  #: source of each field that the row states
 
 
@@ -51,7 +50,7 @@ _UR_SIZES = {
     "max_speed": "Universal Robots' own ROS 2 description, joint_limits.yaml",
 }
 
-#: The table; ``cura6`` is not in it, its description is :mod:`tauguard.models.cura6`.
+#: The table; ``cura6`` is described in :mod:`tauguard.models.cura6` instead.
 ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
     dict(
         [

@@ -5,13 +5,13 @@ in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1. Statu
 Huston, "Principles of Biomechanics" (2009). The radii are estimates from girths of adults (no
 source was found): verify them if a clearance depends on them.
 
-Each capsule hangs in a frame that follows the person's motion exactly (a MuJoCo mocap body) and
-may give way in it: three slides with the region's effective mass behind them, held by a weak
-spring. An impact then involves the two masses and the spring of ISO 10218-2, and its peak is the
-standard's. A frame alone would act as an infinite mass: a hand's peak would be 2.8 times too
-high against an arm of 4 kg. The effective mass of a chain of driven links would depend on the
-pose, and the limits do not hold for that. Pelvis and legs carry the person and do not give way.
-With their 40 to 75 kg, the error is at most 6 % more force for an arm of 5 kg.
+Each capsule is a body with its region's effective mass. Three slide joints with weak springs
+connect it to a frame (a MuJoCo mocap body) that follows the person's motion exactly. So an impact
+has the two masses and the spring of ISO 10218-2, and the standard's peak force. Fixed to the frame,
+a capsule would have infinite mass: the peak force between a hand and an arm of 4 kg would be 2.8
+times too high. The effective mass of a chain of driven links would depend on the pose, and the
+limits do not hold for that. Pelvis and legs carry the person and have no such joints. As they have
+40 to 75 kg, their force on an arm of 5 kg is at most 6 % too high.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ LENGTHS = {
     "head": 0.130, "upper_arm": 0.186, "lower_arm": 0.146, "hand": 0.108, "grip": 0.054,
     "thigh": 0.245, "shank": 0.246, "foot": 0.039,
 }  # fmt: skip
-#: A region gives way against this spring [N/m] (a heavy one: at this frequency [rad/s]) with this
-#: fraction of critical damping, much more slowly than an impact. A hand held still has 300 N/m
-#: (Mussa-Ivaldi, Hogan & Bizzi 1985); the rest are estimates.
+#: Least stiffness of a region's springs [N/m]: that of a hand held still (Mussa-Ivaldi, Hogan &
+#: Bizzi 1985). Least natural frequency on the springs [rad/s], much slower than an impact, and
+#: fraction of critical damping (both are estimates).
 GIVE_STIFFNESS, GIVE_FREQUENCY, GIVE_DAMPING = 300.0, 2 * np.pi, 0.5
 
 
@@ -51,10 +51,10 @@ class Segment:
 
     name: str
     region: str
-    half: float  #: of the capsule's straight part
+    half: float  #: half length of the capsule's straight part
     radius: float
-    height: float  #: of its centre above the floor, standing
-    gives: bool = True  #: yields to a force
+    height: float  #: height of the centre above the floor, standing
+    gives: bool = True  #: on springs, so that it yields to a force
 
 
 def _limbs(side: str) -> tuple[Segment, ...]:
@@ -70,7 +70,7 @@ def _limbs(side: str) -> tuple[Segment, ...]:
     )
 
 
-#: In the order of the native motion; left and right are the person's own.
+#: In the order of the capsules in envs/src/anatomy.hpp; left and right are the person's own.
 SEGMENTS = (
     Segment("skull", "skull", 0.020, 0.047, 0.93),
     Segment("neck", "neck", 0.020, 0.034, 0.84),
@@ -84,7 +84,7 @@ SEGMENTS = (
 
 @dataclass(frozen=True)
 class Person:
-    """One person; every number has a default, and the environment chooses the place."""
+    """One person; all fields have defaults."""
 
     position: tuple[float, float] = (1.0, 0.0)  #: work place: the point below the hips [m]
     facing: float = np.pi  #: heading about z [rad]; 0: along x
@@ -92,8 +92,8 @@ class Person:
     stature: float = STATURES["male 50"]  #: [m]
     posture: str = "standing"  #: one of :data:`POSTURES`
     motion: str = "walk"  #: one of :data:`MOTIONS`; a seated person does not walk
-    hand_speed: float = 1.6  #: peak of a reach [m/s], as ISO 13855 has it
-    walk_speed: float = 1.0  #: peak of a walk [m/s]
+    hand_speed: float = 1.6  #: peak speed of a reach [m/s], from ISO 13855
+    walk_speed: float = 1.0  #: peak speed of a walk [m/s]
     reacts: bool = True  #: whether they draw back after a touch
     reaction_time: float = 0.2  #: from touch to motion [s]
     damping: float = 0.0  #: of the contacts [N s/m]; the standard's spring has none
@@ -124,15 +124,15 @@ class Person:
 
     @property
     def hip_height(self) -> float:
-        """Above the floor [m]: seated, the thighs lie on a seat at the height of the knees."""
+        """Height of the hips above the floor [m]; if seated, the height of the knees."""
         return self.length("hip") if not self.seated else self.length("shank") + self.length("foot")
 
     def chest_height(self) -> float:
-        """Of the middle of the chest above the floor [m]."""
+        """Height of the middle of the chest above the floor [m]."""
         return self.hip_height + 0.78 * self.length("trunk")
 
     def parts(self, number: int = 0) -> Iterator[PersonPart]:
-        """The capsules of the scene's person of a number, in the order of :data:`SEGMENTS`."""
+        """The capsules of the scene's person ``number``, in the order of :data:`SEGMENTS`."""
         for segment in SEGMENTS:
             yield PersonPart(self, segment, prefix(number))
 
@@ -147,7 +147,7 @@ class PersonPart:
 
     @property
     def name(self) -> str:
-        """Of its body and geom."""
+        """Name of its body and geom."""
         return self.prefix + self.segment.name
 
     @property
@@ -157,12 +157,12 @@ class PersonPart:
 
     @property
     def stiffness(self) -> float:
-        """Of the contact [N/m]."""
+        """Stiffness of the contact [N/m]."""
         return self.limits.stiffness
 
     @property
     def damping(self) -> float:
-        """Of the contact [N s/m]."""
+        """Damping of the contact [N s/m]."""
         return self.person.damping
 
     @property
@@ -183,7 +183,7 @@ _COLOURS = {"pelvis": _TROUSERS, "thigh": _TROUSERS, "lower_leg": _TROUSERS, "ch
 
 
 def prefix(number: int) -> str:
-    """What the names of the parts of a scene's first, second, ... person begin with."""
+    """Prefix of the names of the parts of a scene's person ``number`` (from 0)."""
     return f"person{number + 1}_" if number else "person_"
 
 

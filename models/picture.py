@@ -114,7 +114,7 @@ def check_opengl() -> None:
 
 
 def _choose_opengl() -> None:
-    """Without a display and a choice in MUJOCO_GL take EGL, else OSMesa, not a window's OpenGL."""
+    """If there is no display and MUJOCO_GL is not set, choose EGL, else OSMesa."""
     chosen = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
     if sys.platform != "linux" or any(os.environ.get(name) for name in chosen):
         return
@@ -131,10 +131,10 @@ def _choose_opengl() -> None:
 
 @contextmanager
 def opengl() -> Iterator[None]:
-    """Choose an OpenGL, and turn an error of its start into one line.
+    """Context for drawing: chooses an OpenGL, and turns any error into one line.
 
     Raises:
-        RuntimeError: the line, with what to install or to set.
+        RuntimeError: one line that says what to install or to set.
     """
     _choose_opengl()
     try:

@@ -18,7 +18,7 @@ Numbers = tuple[float, ...]
 #: One number per joint and harmonic.
 Rows = tuple[Numbers, ...]
 
-#: Treatment of the joints below the flange.
+#: Treatment of a gripper's joints: welded, or moving without a drive.
 GRIPPERS = ("weld", "passive")
 
 
@@ -37,7 +37,7 @@ class RobotRipple:
             if name != "cycles":
                 rows = tuple(tuple(np.atleast_1d(_numbers(row, name)).tolist()) for row in rows)
                 if any(len(row) != len(self.cycles) for row in rows):
-                    raise ValueError(f"{name}: expected {len(self.cycles)} numbers a joint")
+                    raise ValueError(f"{name}: expected {len(self.cycles)} numbers per joint")
             else:
                 rows = tuple(np.atleast_1d(_numbers(rows, name)).tolist())
             object.__setattr__(self, name, rows)
@@ -52,7 +52,7 @@ class RobotSensors:
     position_quantum: float = 0.0  #: [rad]
     velocity_noise: float = 0.0  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
-    rate: float = 0.0  #: samples a second; 0: one at every physics step
+    rate: float = 0.0  #: samples per second; 0: one at every physics step
     jitter: float = 0.0  #: standard deviation of a sample's time [s]
     left_over: str | None = None  #: CSV file, see :class:`tauguard.models.left_over.LeftOver`
 
@@ -69,12 +69,12 @@ class RobotSensors:
 class RobotDrive:
     """Drives from a data sheet or an identification; a single number holds for every joint.
 
-    The gain is ``gain``, or ``gear`` times ``torque_constant``. ``rotor_inertia`` is the
-    motor's own (the joint feels gear^2 times it). Friction is that at the joint, in the terms of
+    The gain is ``gain``, or ``gear`` times ``torque_constant``. ``rotor_inertia`` is the motor's;
+    at the joint it is multiplied by gear^2. Friction is that at the joint, as defined in
     :class:`tauguard.models.Friction`.
     """
 
-    gain: float | Numbers | None = None  #: at the joint [N m/A]; not beside torque_constant
+    gain: float | Numbers | None = None  #: at the joint [N m/A]; not together with torque_constant
 
     gear: float | Numbers | None = None
     torque_constant: float | Numbers | None = None  #: of the motor [N m/A]
@@ -87,7 +87,7 @@ class RobotDrive:
     presliding: float | Numbers | None = None  #: Coulomb friction over bristle stiffness [rad]
     load: float | Numbers | None = None  #: rise of the level per transmitted torque [1/(N m)]
     slope: Rows | None = None  #: rises of the level with the speed [N m], shape (n, k)
-    slope_velocity: Numbers | None = None  #: over which [rad/s], shape (k,)
+    slope_velocity: Numbers | None = None  #: speed scales of these rises [rad/s], shape (k,)
     ripple: RobotRipple | None = None
     sensors: RobotSensors | None = None
     like: str | None = None
@@ -129,17 +129,17 @@ class RobotDrive:
 
 @dataclass(frozen=True)
 class Robot:
-    """One serial arm; what is ``None`` comes from the file or is derived (``tauguard robot``).
+    """One serial arm; a field that is ``None`` is read from the file or derived.
 
-    ``file`` is an MJCF or URDF file, or the name of an arm that :data:`tauguard.models.ROBOTS`
-    knows.
+    ``file`` is an MJCF or URDF file, or the name of an arm in :data:`tauguard.models.ROBOTS`.
+    ``tauguard robot`` prints the source of each number.
     """
 
     file: str
     joints: tuple[str, ...] | None = None
     """Names of the arm's joints, base to tip, or ``FIRST..LAST`` for all between two of them; all
     others are welded. Default: the only chain."""
-    gripper: str = "weld"  #: treatment of joints below the flange, one of :data:`GRIPPERS`
+    gripper: str = "weld"  #: treatment of the gripper's joints, one of :data:`GRIPPERS`
     home: Numbers | None = None  #: [rad]
     tool: str | None = None  #: name of a site or body
     torque_limit: float | Numbers | None = None  #: [N m]

@@ -157,7 +157,7 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
 
 
 def _without_joints(text: str, held: set[str]) -> str:
-    """MJCF with some joints removed, and with them all that may act on joints."""
+    """MJCF without some joints, and without all sections that refer to joints."""
     root = ElementTree.fromstring(text)
     for section in ("actuator", "equality", "tendon", "keyframe", "sensor"):
         for element in root.findall(section):

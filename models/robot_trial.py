@@ -1,6 +1,6 @@
-"""MuJoCo compiles an untrusted robot in a process of its own first, with limited memory and time.
+"""Compile an untrusted robot in a separate process first, with limited memory and time.
 
-One process is kept for a while: it has loaded MuJoCo, and forks a child for each robot.
+A process that has loaded MuJoCo forks a child for each robot, and ends after a time without work.
 """
 
 import contextlib
@@ -12,10 +12,10 @@ import sys
 import threading
 from select import select
 
-#: Limits of one trial beyond MuJoCo's own use [bytes, s].
+#: Limits of one trial: memory beyond that of the loaded MuJoCo [bytes], and time [s].
 MOST_MEMORY, MOST_SECONDS = 1 << 30, 10.0
-#: Processor time of one trial [s]. A model that passes is compiled again, up to twice, so that all
-#: of it stays below ``MOST_SECONDS`` on an idle processor.
+#: Limit of the processor time of one trial [s]. A model that passes is compiled up to twice more;
+#: the sum stays below ``MOST_SECONDS`` on an idle processor.
 MOST_WORK = 3
 #: Time limit for loading MuJoCo on a busy machine [s].
 LOADING = 60.0
@@ -107,7 +107,7 @@ class Trial:
                     process.stdin.flush()
                     return self._answer(process)
                 self._end()
-        return "its process does not start"
+        return "the process that compiles it first does not start"
 
     def _answer(self, process: subprocess.Popen[bytes]) -> str | None:
         assert process.stdout is not None

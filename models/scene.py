@@ -1,4 +1,4 @@
-"""The scene composer: a :class:`SceneSpec` lists what a scene holds; nothing else is compiled."""
+"""The scene composer: a :class:`SceneSpec` lists the parts of a scene, and only these are added."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -42,11 +42,11 @@ INTEGRATORS = {
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """What a scene holds."""
+    """The parts of a scene, and the settings of its simulation."""
 
     timestep: float = 1e-3
     """[s]. At 1 ms the peak force of an impact is within 2 % of the two-mass model; at 2 ms it is
-    7 % off at half the cost. ``tauguard bench impact`` is the source of this choice, of the
+    7 % off at half the cost. ``tauguard bench simulation`` is the source of this choice, of the
     integrator and of the contact parameters."""
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  #: [m/s^2]
     mismatch: Mismatch | None = None  #: how the simulated arm differs from the nominal one
@@ -56,7 +56,9 @@ class SceneSpec:
     labels: bool = True  #: a contact sensor on every link
     floor: bool = False  #: a plane at height 0
     arm: str | Robot = "cura6"  #: a name, a file or a robot, see :func:`load_arm`
-    base_pose: tuple[tuple[float, ...], ...] | None = None  #: pose of the arm's world, (4, 4)
+    base_pose: tuple[tuple[float, ...], ...] | None = (
+        None  #: pose of the file's world frame, (4, 4)
+    )
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
     people: tuple[Person, ...] = ()
@@ -65,7 +67,7 @@ class SceneSpec:
     cloth: Cloth | None = None
     objects: tuple[SceneObject, ...] = ()  #: your own objects
     drive: Drive | None = field(default=None, compare=False)
-    """The nominal drive; without it the arm has its own, see :class:`tauguard.models.arm.Facts`."""
+    """The nominal drive; default: the arm's own, see :class:`tauguard.models.arm.Facts`."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is out of range."""
@@ -89,7 +91,7 @@ class SceneSpec:
 
 @dataclass(frozen=True)
 class Scene:
-    """A compiled scene and where its parts are."""
+    """A compiled scene, with ids and addresses of its parts."""
 
     __repr__ = in_a_line
 
@@ -140,7 +142,7 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
     """Compile what ``spec`` lists.
 
     Args:
-        spec: what the scene holds.
+        spec: parts and settings of the scene.
         visuals: keep visual shapes. Without them a physics step is a fifth cheaper, with the same
             bits; ``Scene.xml`` always has them.
 
@@ -275,7 +277,7 @@ def region_names(spec: SceneSpec) -> tuple[str, ...]:
 
 
 def label_region(whole: mujoco.MjSpec, spec: SceneSpec, name: str, arm: str = "") -> None:
-    """Add a contact sensor to a region; on an object, of contacts with ``arm`` and below."""
+    """Add a contact sensor to a region; an object's senses only contacts with the arm."""
     own = any(obj.name == name for obj in spec.objects)
     _add_label(whole, name, f"contact_{name}", subtree=own, against=arm if own else "")
 
@@ -297,11 +299,11 @@ def _add_label(
 ) -> None:
     """Add a sensor of the net external contact wrench on a link: found, force, torque, position.
 
-    Its ten numbers are how many contacts there are (1), the force (3) and torque (3) that the
-    *link* exerts, in the world frame, about the position (3): the centroid of the contacts weighted
-    by force. The wrench on the arm is its negative. MuJoCo's normal points from the sensor's body
-    to the other one, hence the sign. The arm's geoms cannot touch one another (contype 1,
-    conaffinity 2), so all of it is external.
+    Its ten numbers are the number of contacts (1), force (3) and torque (3) that the *link* exerts,
+    in the world frame, and the position (3) to which the torque refers, the force-weighted centroid
+    of the contacts. The wrench on the arm has the opposite sign, because MuJoCo's normal points
+    from the sensor's body to the other one. The arm's geoms cannot touch one another (contype 1,
+    conaffinity 2), so the whole wrench is external.
     """
     fields = [
         mujoco.mjtConDataField.mjCONDATA_FOUND,

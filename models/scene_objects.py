@@ -70,7 +70,7 @@ class SceneObject:
     """A user's object: its shapes or an MJCF fragment, and its motion.
 
     Contacts with the arm have the given stiffness, are labelled, and count against the
-    limits like those with people. An object is a region of the environment, by its name.
+    limits like those with people. Environments treat an object as a region of its name.
     """
 
     __repr__ = in_a_line
@@ -78,8 +78,8 @@ class SceneObject:
     name: str
     shapes: tuple[Shape, ...] = ()
     mjcf: Any = ""
-    """Text or file of an MJCF fragment instead of shapes, a ``mujoco.MjSpec`` or a root of
-    dm_control's ``mjcf``; kept as text with its meshes inside. Its bodies may have joints."""
+    """Instead of shapes: an MJCF fragment as text or file, a ``mujoco.MjSpec``, or a root of
+    dm_control's ``mjcf``. It is stored as text that includes meshes. Its bodies may have joints."""
     position: Vector = (0.0, 0.0, 0.0)  #: in the world, or in the frame of the holding tool [m]
     quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
     motion: str = "fixed"  #: one of :data:`MOTIONS`
@@ -87,8 +87,8 @@ class SceneObject:
     """Rows of time [s] and position [m], from 0 on; after the last row it repeats. It replaces
     ``position``."""
     belt: Vector | None = None
-    """Velocity of the surface of a conveyor in its own frame [m/s]: it stays where it is and
-    carries what lies on it."""
+    """Velocity of a conveyor's surface in the object's frame [m/s]. The object does not move; what
+    lies on it does."""
     mass: float = 1.0  #: mass of a free or held object [kg]
     stiffness: float = 1e5  #: of its contact with the arm [N/m]
     damping: float = 100.0  #: of its contact with the arm [N s/m]

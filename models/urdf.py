@@ -27,7 +27,7 @@ SHOWN_CELLS, SHOWN_FACES = (64, 45, 32, 24), 5000
 FLATTEST = 1e-3
 #: Colour of a mesh without one.
 GREY = (0.7, 0.72, 0.75, 1.0)
-#: A prefix of an element or attribute; xacro leaves undeclared ones.
+#: A namespace prefix of an element or attribute; xacro may leave undeclared ones.
 _PREFIX = re.compile(r"(</?|\s)([A-Za-z_][\w.-]*):(?=[A-Za-z_][\w.-]*[\s=/>])")
 
 
@@ -37,7 +37,7 @@ class UrdfFile:
 
     spec: Any = None  #: the MjSpec, with its meshes
     mended: tuple[str, ...] = ()  #: links whose inertia was corrected
-    unread: dict[str, str] = field(default_factory=dict)  #: link: its omitted shape, and why
+    unread: dict[str, str] = field(default_factory=dict)  #: by link: omitted shape and reason
 
 
 def is_urdf(path: Path) -> bool:
@@ -46,7 +46,7 @@ def is_urdf(path: Path) -> bool:
 
 
 def xml_root(text: str) -> ElementTree.Element:
-    """The root of a robot's XML; prefixes of names count as part of them.
+    """The root of a robot's XML; namespace prefixes become part of the names.
 
     Raises:
         ValueError: not XML.
@@ -125,7 +125,7 @@ def _without_meshes(root: ElementTree.Element) -> ElementTree.Element:
 
 
 def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
-    """The mesh of a shape; a visual one is simplified, and without a material has its own colour.
+    """The mesh of a shape; a visual one is simplified, and gives its colour to the shape.
 
     Raises:
         ValueError: the file cannot be used; the message leaves out its name.
@@ -147,7 +147,7 @@ def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
 
 
 def _find(urdf: Path, inside: Path) -> Path | None:
-    """A mesh file by its package's name, going up from the URDF's folder."""
+    """Find a mesh file by its path in a package, from the URDF's folder upwards."""
     tails = [inside, Path(*inside.parts[1:]), Path(inside.name)]
     for folder in urdf.resolve().parents:
         for tail in tails[: 2 if folder != urdf.resolve().parent else 3]:

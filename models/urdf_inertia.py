@@ -6,9 +6,10 @@ import numpy as np
 
 from tauguard.arrays import Array
 
-#: Smallest principal moment over the largest, for a file whose moment is not above 0.
+#: Smallest principal moment over the largest one, in a corrected inertia.
 LEAST_MOMENT = 0.01
-#: MuJoCo takes moments below 1e-14 for 0 [kg m^2]; lighter links are left as they are [kg].
+#: Smallest corrected moment [kg m^2] (MuJoCo takes those below 1e-14 for 0). Links without inertia
+#: and below this mass [kg] are not corrected.
 SMALLEST, LIGHTEST = 1e-12, 1e-5
 #: A body with a mass but no inertia becomes a ball of this density [kg/m^3].
 DENSITY = 1000.0
@@ -54,7 +55,7 @@ def possible_inertia(tensor: Array, mass: float) -> Array:
     """A physically possible inertia near ``tensor`` [kg m^2], shape (3, 3)."""
     moments, axes = np.linalg.eigh(tensor)
     if moments[2] <= 0:
-        # MuJoCo names the link of a mass below 0.
+        # A mass below 0 gets no ball; MuJoCo then reports its link.
         ball = (3 * max(mass, 0.0) / (4 * np.pi * DENSITY)) ** (1 / 3)
         return np.diag(np.full(3, 0.4 * mass * ball**2))
     moments = np.maximum(moments, max(LEAST_MOMENT * moments[2], SMALLEST))

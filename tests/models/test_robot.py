@@ -260,7 +260,7 @@ left_over = "left.csv"
         ("[drive.sensors]\ncurrent_noise = -1.0", "expected 0 or more"),
         (
             "[drive.ripple]\ncycles = [1.0]\namplitude = [[1.0, 2.0]]\nphase = [[0.0]]",
-            "amplitude: expected 1 numbers a joint",
+            "amplitude: expected 1 numbers per joint",
         ),
     ],
 )
