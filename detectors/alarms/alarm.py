@@ -1,4 +1,4 @@
-"""From scores to alarms, the same way for every method, in batch and online."""
+"""Alarms from the scores of any detection method, for whole traces or sample by sample."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tauguard.detectors.thresholds.speed_normalisation import (
 )
 from tauguard.traces.trace import Detection, Trace
 
-#: Message after an absurd sample has made the detector's state infinite or NaN.
+#: Message when an extreme sample has made the detector's state infinite or NaN.
 LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"
 
 
@@ -38,18 +38,19 @@ LOST = "the score is not a number: a sample was out of any arm's range; begin an
 class CollisionAlarm(Frozen):
     """A fitted detector with its threshold, normalisation and confirmation time.
 
-    The alarm is up where the score, normalised over the speed, has stayed above the threshold for
-    the confirmation time; never before the detector has settled.
+    The alarm is on while the normalised score has been above the threshold for at least the
+    confirmation time. It is always off until the detector has settled.
     """
 
     detector: FittedDetector
     threshold: float  #: of the normalised score
-    confirmation: float = CONFIRMATION  #: t_c [s]
-    normalisation: SpeedNormalisation | None = None  #: None: the score is compared as it is
-    inputs: UsualInput | None = None  #: limits of usual samples; None: not known
+    confirmation: float = CONFIRMATION  #: confirmation time [s]
+    normalisation: SpeedNormalisation | None = None  #: None: the score is not normalised
+    inputs: UsualInput | None = None  #: limits of usual samples; None: unknown, no fault checks
     floor: SpeedNormalisation | None = None
-    """Normalisation of the plain thresholds beneath a learned score (``detector.floor``). The
-    larger of both normalised scores counts. None: the learned score alone."""
+    """Normalisation of the score of ``detector.floor``, the plain thresholds that a learned
+    detector has as well. The larger of the two normalised scores is used. None: only the learned
+    score is used."""
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
@@ -70,7 +71,7 @@ class CollisionAlarm(Frozen):
         return confirmation_samples(self.confirmation, self.detector.dt)
 
     def normalised(self, score: Array, trace: Trace) -> Array:
-        """Scores of a trace relative to the speed normalisation, shape (T,)."""
+        """The normalised ``score`` of a trace, or that of the floor where larger, shape (T,)."""
         if self.normalisation is None:
             return score
         speed = recent_speed(trace.qd, trace.dt)
@@ -84,29 +85,29 @@ class CollisionAlarm(Frozen):
         return self.normalised(_finite(self.detector.scores(trace), trace), trace)
 
     def sustained(self, trace: Trace, score: Array | None = None) -> Array:
-        """Least normalised score within the last t_c, shape (T,).
+        """Least normalised score within the last confirmation time, shape (T,).
 
-        Above the threshold is an alarm; -inf before the detector has settled.
+        The alarm is on where it is above the threshold. -inf before the detector has settled.
 
         Args:
             trace: of the detector's arm.
-            score: score of the detector, before it is normalised, where it is known.
+            score: the detector's score before normalisation (default: computed).
         """
         known = self.detector.scores(trace) if score is None else score
         level = self.normalised(known, trace)
         return sustained(np.where(self._settled(trace), level, -np.inf), self.samples)
 
     def free_scores(self, trace: Trace, score: Array | None = None) -> FreeScores:
-        """The scores of a trace's collision-free rows, for a threshold.
+        """Scores of the collision-free rows of a trace, from which a threshold is chosen.
 
-        Where this alarm does not normalise them, those of the detector's floor are beside them.
+        Without a normalisation, the result also has the scores of the detector's floor.
 
         Args:
             trace: of the detector's arm.
-            score: score of the detector, before it is normalised, where it is known.
+            score: the detector's score before normalisation (default: computed).
 
         Raises:
-            ValueError: the trace is over before the detector has settled.
+            ValueError: the trace ends before the detector has settled.
         """
         found = FreeScores.of(self.sustained(trace, score), trace, self.settle)
         plain = floor_of(self)
@@ -119,14 +120,14 @@ class CollisionAlarm(Frozen):
         return np.asarray(trace.t - trace.t[0] > self.settle - self.detector.dt / 2)
 
     def detect(self, trace: Trace) -> Detection:
-        """The alarms of a trace; its residual is the plain momentum observer's.
+        """Alarms of a trace, with the residual of the plain momentum observer.
 
         Raises:
-            ValueError: another number of joints or another sample rate.
+            ValueError: number of joints or sample rate differs from the training's.
         """
         score = self.scores(trace)
         samples = self.samples
-        if not same_rate(trace.dt, self.detector.dt):  # a detector that takes other rates
+        if not same_rate(trace.dt, self.detector.dt):  # some detectors accept other rates
             samples = confirmation_samples(self.confirmation, trace.dt)
         alarm = confirmed((score > self.threshold) & self._settled(trace), samples)
         return Detection(
@@ -140,13 +141,13 @@ class CollisionAlarm(Frozen):
         )
 
     def stream(self) -> AlarmStream:
-        """The alarm sample by sample, from the next sample on."""
+        """A new stream, which computes the alarm sample by sample."""
         return AlarmStream(self)
 
 
 def floor_of(alarm: CollisionAlarm) -> FittedThresholds | None:
-    """The plain thresholds beneath a learned score; None: it has none."""
-    plain = getattr(alarm.detector, "floor", None)  # of another's detector it may be anything
+    """The plain thresholds that a learned detector has as well; None if it has none."""
+    plain = getattr(alarm.detector, "floor", None)  # any type in a user's own detector
     return plain if isinstance(plain, FittedThresholds) else None
 
 
@@ -157,10 +158,10 @@ def _finite(score: Array, trace: Trace) -> Array:
 
 
 class AlarmStream:
-    """An alarm as the samples of one recording come in.
+    """An alarm computed sample by sample along one recording.
 
     Attributes:
-        native: the stream in C++.
+        native: the C++ stream.
     """
 
     def __init__(self, alarm: CollisionAlarm) -> None:
@@ -184,17 +185,17 @@ class AlarmStream:
         return self.native.score
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> bool:
-        """Whether the alarm is up at this sample; equal to :meth:`CollisionAlarm.detect`.
+        """Whether the alarm is on at this sample, as :meth:`CollisionAlarm.detect` computes it.
 
         Args:
             q: [rad], float64, shape (n,).
             qd: [rad/s], shape (n,).
             current: [A], shape (n,).
-            dt: time since the last sample [s] (default: that of the training traces).
+            dt: time since the last sample [s] (default: sample interval of the training traces).
 
         Raises:
-            ValueError: wrong shapes, numbers that are not finite, or another sample rate than the
-                training's.
+            ValueError: wrong shapes, numbers that are not finite, or a sample interval that differs
+                from the training's.
         """
         interval = self._dt if dt is None else dt
         if not self._first and not same_rate(interval, self._dt):
@@ -219,7 +220,7 @@ def _levels(speed: SpeedNormalisation | None) -> _observer.Levels:
 
 
 def native_scores(detector: FittedDetector) -> _observer.Scores:
-    """A new native stream of the detector; it calls a stream that is written in Python."""
+    """A new native stream of the detector; it wraps the detector's stream if that is in Python."""
     stream = detector.stream()
     if isinstance(stream, NativeStream):
         return stream.native

@@ -1,4 +1,4 @@
-"""A learned alarm and the free-motion detector of one arm: an alarm is up if either raises it."""
+"""A free-motion detector and a learned alarm of one arm: an alarm of either is an alarm."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class BesideFreeMotion(Frozen):
-    """The larger of two scores: that of free motion, and a learned one over its threshold.
+    """The larger of the free-motion score and the learned score divided by its threshold.
 
-    The threshold of both is 1. The learned score counts while its own alarm is up. So nothing that
-    free motion finds is lost; false alarms are those of both.
+    The threshold is 1. The learned score counts only while the learned alarm is on. So every
+    collision that free motion finds is found, and the false alarms of both occur.
     """
 
     free: FittedFreeMotion
@@ -35,7 +35,7 @@ class BesideFreeMotion(Frozen):
 
     @property
     def name(self) -> str:
-        """Both methods."""
+        """Names of both methods."""
         return f"{self.free.name} and {self.learned.detector.name}"
 
     @property
@@ -54,7 +54,7 @@ class BesideFreeMotion(Frozen):
         return self.free.settle
 
     def carrying(self, load: Load) -> BesideFreeMotion:
-        """The same detector of the arm with a load in its gripper; the learned one tracks loads."""
+        """The detector for the arm with a load; the learned alarm estimates loads itself."""
         return BesideFreeMotion(self.free.carrying(load), self.learned)
 
     def scores(self, trace: Trace) -> Array:
@@ -69,7 +69,7 @@ class BesideFreeMotion(Frozen):
         return larger
 
     def stream(self) -> BothStreams:
-        """The same, sample by sample."""
+        """A new stream of the scores, sample by sample."""
         return BothStreams(self)
 
 

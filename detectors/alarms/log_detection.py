@@ -1,4 +1,4 @@
-"""What a detector saw in a real arm's log: alarms, faults, and doubts about the log."""
+"""Alarms and faults in a real arm's log, and notes on why they may be wrong."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tauguard.detectors.features.motion_regimes import motion_regimes, unseen_te
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Detection, Trace
 
-STRANGE = 0.2  # fraction of a log in alarm above which the log is taken for another arm's
+STRANGE = 0.2  # fraction of a log in alarm above which it may be the log of another arm
 
-BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
+BEFORE = 0.2  # time before an alarm at which the residual that changes is taken [s]
 
-AROUND = 1.0  # [s] around an alarm in which a contact may change the torques
+AROUND = 1.0  # time before and after an alarm in which a contact may change the torques [s]
 
 
 @dataclass(frozen=True)
@@ -28,25 +28,25 @@ class LogDetection:
     """Alarms and faults of a log."""
 
     detection: Detection
-    noise: Array  #: of each joint's residual [N m], to name the loudest joint, shape (n,)
-    begin: float  #: [s]; alarms are counted from here on
+    noise: Array  #: standard deviation of each joint's residual without contacts [N m], shape (n,)
+    begin: float  #: time from which the detector can raise alarms [s]
     notes: tuple[str, ...]
-    faults: tuple[Span, ...] = ()  #: faults of the samples, in which no alarm is given
-    fault_seconds: float = 0.0  #: time in faults, in which collisions may be missed [s]
+    faults: tuple[Span, ...] = ()  #: faults of the samples; no alarm starts during a fault
+    fault_seconds: float = 0.0  #: duration of the faults [s]; collisions may be missed in them
 
 
 def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
     """Find collisions in a log.
 
     Raises:
-        ValueError: another number of joints or another sample rate than it was trained at, a log
-            that ends before the detector has settled, or torques that its motion does not explain.
+        ValueError: number of joints or sample rate differs from the training's, the log ends
+            before the detector has settled, or its motion does not explain its torques.
     """
     settled = float(trace.t[0] + alarm.settle)
     if not trace.t[-1] > settled:
         raise ValueError(
-            f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
-            f"{alarm.settle:g} s on"
+            f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector raises alarms only "
+            f"after {alarm.settle:g} s"
         )
     arm, rows = alarm.detector.arm, trace.t >= settled
     tau = drive_torque(arm, trace)
@@ -60,23 +60,23 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
     notes = [] if strange else list(doubts)
     if strange:
         notes.append(
-            "alarms fill much of this log; if it was not touched as often as that, tell what the "
-            "arm carried (--payload), and check that model, robot file and log are of one arm"
+            "alarms fill much of this log; if the arm was not touched that often, give the load "
+            "that it carried (--payload), and check that model, robot file and log are of one arm"
         )
     if isinstance(alarm.detector, FittedFreeMotion):
         seconds, names = alarm.detector.unwatched(trace)
         if names:
             notes.append(
-                f"{', '.join(names)}: moves here, but in none of the training logs: nothing is "
-                f"watched in {seconds:.1f} s of this log"
+                f"{', '.join(names)}: moves here, but in none of the training logs: no collision "
+                f"is detected in {seconds:.1f} s of this log"
             )
         notes += _prior_knowledge(alarm.detector, trace)
         seconds, levels = alarm.detector.beyond(trace)
         if levels:
             text = ", ".join(f"{name} {level:.0f} N m" for name, level in levels.items())
             notes.append(
-                f"for {seconds:.1f} s joints are faster, or accelerate harder, than the training "
-                f"logs show: a torque there has to exceed up to {text}, whatever the card says"
+                f"for {seconds:.1f} s joints are faster, or accelerate more, than in the training "
+                f"logs: only torques above {text} raise an alarm there, whatever the card says"
             )
     return LogDetection(
         detection,
@@ -89,7 +89,7 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
 
 
 def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
-    """A note on the regimes that the training logs do not show."""
+    """A note on motion regimes that are in this log, but not in the training logs."""
     if not detector.unseen:
         return []
     names, here = detector.arm.robot.joint_names, motion_regimes(trace)
@@ -114,7 +114,7 @@ def _near(detection: Detection) -> Bools:
 
 
 def loudest_joint(found: LogDetection, start: float, end: float) -> int:
-    """Index of the joint whose residual changes most in an alarm, in units of its noise."""
+    """Index of the joint whose residual changes most in an alarm, relative to its noise."""
     detection = found.detection
     rows = (detection.t >= start - BEFORE) & (detection.t <= end)
     change = detection.residual[rows] - detection.residual[rows][0]

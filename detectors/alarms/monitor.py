@@ -1,4 +1,4 @@
-"""Free, collision or fault: a detector on samples that may be faulty."""
+"""The state of a robot, free, collision or fault, from samples that may be faulty."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from tauguard.traces.trace import Detection, Trace
 
 FREE, COLLISION, FAULT = "free", "collision", "fault"
 
-#: Reasons by the native monitor's number.
+#: States by the native monitor's number.
 STATES = (FREE, COLLISION, FAULT)
 
-#: This number of successive missing or faulty samples, or as many as SPAN holds, are interpolated;
-#: after more the detector starts again.
+#: Gaps of at most this many missing or faulty samples, or of at most the time ``SPAN``, are
+#: interpolated. After a longer gap the detector is reset.
 BRIDGED = 2
 
-#: Time after a bridged fault until its samples have left the detector's window [s]; no alarms then.
+#: Time after an interpolated gap until its samples have left the detector's window [s]. No alarm
+#: starts in this time.
 WINDOW = 0.1
 
 
@@ -34,21 +35,24 @@ class Answer(NamedTuple):
     """The state of the robot at one sample."""
 
     state: str  #: "free", "collision" or "fault"
-    alarm: bool  #: a collision's alarm is up; during a fault: it was up when the fault began
-    score: float  #: score of the detector, the last known one
+    alarm: bool  #: a collision's alarm is on; during a fault: it was on when the fault began
+    score: float  #: last score that the detector computed
     reason: str  #: what is wrong with the input; empty without a fault
 
 
 class Monitor:
     """A detector that reports a fault when its samples cannot be used.
 
-    A sample with a fault never reaches the detector. While faults last, and afterwards until the
-    detector has settled again, the state is ``fault``. A collision whose alarm was up before the
-    fault stays a collision. An alarm that starts within 20 ms before the fault is attributed to
-    the fault. Torques that are impossible for this arm are a fault as well. A contact looks the
-    same, so the detector continues, an alarm that is up stays a collision with that reason, and
-    the torques are judged anew when it ends. A sample takes one native call that allocates only
-    the answer, unless the detector's stream is written in Python.
+    A faulty sample is not passed to the detector. The state is ``fault`` during faults and then
+    until the detector has settled again. A collision whose alarm was on before the fault stays a
+    collision. An alarm that starts within 20 ms before the fault is attributed to the fault.
+
+    Torques that are impossible for this arm are a fault, too. A contact can cause the same
+    torques. So the detector continues, and if an alarm is on, the state stays ``collision``, with
+    the fault as its reason. When the alarm ends, the check of the torques starts again.
+
+    A step is one native call that allocates only the answer, unless the detector's stream is
+    written in Python.
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
@@ -102,13 +106,13 @@ class Monitor:
         Args:
             t: time stamps [s], shape (T,).
             signals: q [rad], qd [rad/s] and current [A], shape (T, n) each.
-            estimator: gives the residuals that are written; it steps at finite samples.
-            last: its last residual [N m], shape (n,); updated.
-            residuals: written, shape (T, n).
-            alarms: written, shape (T,).
+            estimator: computes the residuals; samples that are not finite are not passed to it.
+            last: the estimator's last residual [N m], shape (n,); updated.
+            residuals: output [N m], shape (T, n).
+            alarms: output, shape (T,).
 
         Returns:
-            The reason of the first fault, "" without one.
+            The reason of the first fault, or "" if there is none.
 
         Raises:
             ValueError: wrong shapes.
@@ -126,13 +130,13 @@ class Monitor:
         return f"settling again after {fault}" if settling else fault
 
 
-#: Spans of one state less than this apart are one [s].
+#: Two spans of the same state are joined if the time between them is shorter than this [s].
 MERGED = 0.2
 
 
 @dataclass
 class Span:
-    """A stretch of collision or fault, by the robot's clock."""
+    """A time interval of collision or fault, in the robot's clock."""
 
     state: str  #: "collision" or "fault"
     start: float  #: [s]
@@ -143,10 +147,10 @@ class Span:
 
 @dataclass
 class Spans:
-    """The spans so far.
+    """The collisions and faults until now.
 
-    A collision that began within 20 ms before a fault is attributed to the fault. If the clock
-    begins anew, open spans end, and a state that lasts opens a new one.
+    A collision that began within 20 ms before a fault is attributed to the fault. If the robot's
+    clock is reset, current spans end, and a state that continues begins a new span.
     """
 
     found: list[Span] = field(default_factory=list)
@@ -197,18 +201,18 @@ class Spans:
 
 @dataclass(frozen=True)
 class Monitored:
-    """The answers of a detector and its fault checks on a log."""
+    """Results of a detector and its fault checks on a log."""
 
     detection: Detection
-    faults: tuple[Span, ...]  #: in order; while one lasts, no alarm is looked for
-    fault_seconds: float  #: in which the state is "fault": collisions may be missed there
+    faults: tuple[Span, ...]  #: in order of time; no alarm starts during a fault
+    fault_seconds: float  #: time in state "fault" [s]; collisions may be missed in it
 
 
 def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
-    """Alarms and faults of a log, as :class:`Monitor` gives them sample by sample.
+    """Alarms and faults of a log, as :class:`Monitor` computes them sample by sample.
 
-    Without faults this equals ``alarm.detect`` bit for bit. A detector without checks of its input
-    names no faults.
+    Without faults the alarms equal those of ``alarm.detect`` bit for bit. If ``alarm.inputs`` is
+    None, no faults are found.
 
     Raises:
         ValueError: another number of joints or another sample rate.
@@ -222,7 +226,7 @@ def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
     usual = alarm.inputs
     detection = alarm.detect(trace)
     torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
-    spans, seconds, dt = Spans(), 0.0, trace.dt  # a median: asked once
+    spans, seconds, dt = Spans(), 0.0, trace.dt  # trace.dt is a median: computed once
     for k, t in enumerate(trace.t):
         interval = None if k == 0 else float(t - trace.t[k - 1])
         if k and detection.alarm[k - 1] and not detection.alarm[k]:
@@ -236,7 +240,7 @@ def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
 
 
 def _broken(alarm: CollisionAlarm, trace: Trace) -> bool:
-    """Whether any sample is at fault, missing, or late enough to be interpolated."""
+    """Whether any sample is faulty, missing, or late enough to be interpolated."""
     assert alarm.inputs is not None
     check, steps = FaultCheck(alarm.inputs), np.diff(trace.t) / alarm.inputs.dt
     if (np.abs(steps - 1) > 0.2).any():
@@ -268,7 +272,7 @@ def _by_sample(alarm: CollisionAlarm, trace: Trace) -> Monitored:
 
 
 def _kept(trace: Trace, answers: list[Answer], spans: Spans) -> np.ndarray:
-    """The alarms, less those that were taken back."""
+    """Alarms except those that were attributed to a fault afterwards, shape (T,)."""
     kept = np.zeros(len(trace.t), dtype=np.bool_)
     for span in spans.of("collision"):
         kept |= (trace.t >= span.start) & (trace.t <= span.end)

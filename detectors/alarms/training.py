@@ -1,9 +1,9 @@
-"""From collision-free motion to a threshold, for the command line and all studies.
+"""Training of detectors, and thresholds from collision-free motion.
 
-Scores are reduced to the peaks of pieces (:mod:`.free_scores`) and normalised over the speed
-(:mod:`.speed_normalisation`). The threshold is where the tail of the peaks has the accepted rate of
-false alarms (:mod:`.tail_model`), or the one that a calibration set guarantees (:mod:`.guarantee`).
-:mod:`.expected_rate` gives the interval of the rate.
+Scores are reduced to peaks of short pieces of motion (:mod:`.free_scores`) and normalised by
+speed (:mod:`.speed_normalisation`). The threshold is the score that peaks exceed at the accepted
+rate of false alarms, by a tail model (:mod:`.tail_model`), or one that calibration episodes
+guarantee (:mod:`.guarantee`). :mod:`.expected_rate` computes an interval of the rate.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_thresh
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.traces.trace import Trace
 
-#: Fraction of the collision-free training traces that is held out for the threshold, without folds.
+#: Fraction of the collision-free traces that is held out for the threshold without folds.
 HELD_OUT = 0.34
 
-#: Parts of the training motion that are left out in turn.
+#: Number of folds of the cross-validation.
 FOLDS = 3
 
 #: Probability that the highest score of a log unlike the others is above the least threshold beside
@@ -55,7 +55,7 @@ def held_out(
     count = min(len(free) - 1, max(1, round(fraction * len(free)))) if len(free) > 1 else 0
     if count == 0:
         return list(traces), list(traces)
-    # Evenly through the list, which often goes through speeds and payloads in turn.
+    # Evenly spaced, because traces are often listed by speed or payload.
     kept = {free[round((k + 0.5) * len(free) / count - 0.5)] for k in range(count)}
     return [t for i, t in enumerate(traces) if i not in kept], [traces[i] for i in sorted(kept)]
 
@@ -67,21 +67,22 @@ def train(
     per_hour: float = 10.0,
     folds: int = FOLDS,
 ) -> CollisionAlarm:
-    """Fit a detector and choose its threshold by motion that it was not trained on.
+    """Fit a detector and choose its threshold from motion that it was not trained on.
 
     Args:
         detector: settings of a method.
         traces: with truth, of one arm at one sample rate.
-        arm: the model before training; the default is the one attached to simulated traces.
-        per_hour: accepted false alarms per hour of motion like the training's.
+        arm: arm model before training (default: the one attached to simulated traces).
+        per_hour: accepted false alarms per hour of motion like that of the training traces.
         folds: folds of the cross-validation (at most one per collision-free trace). The detector is
-            trained on all traces. The threshold comes from the collision-free ones: each is scored
-            by a detector that was trained without its load or, with fewer loads than folds, without
-            this trace. This takes ``folds`` more fits. With 1, which is quicker, a third of the
-            collision-free traces is reserved for the threshold.
+            trained on all traces. The threshold comes from the collision-free traces: each is
+            scored by a detector that was trained without its load or, if there are fewer loads than
+            folds, without this trace. This needs ``folds`` more fits. With 1, a third of the
+            collision-free traces is held out for the threshold instead, which is faster.
 
     Raises:
-        ValueError: traces that do not fit or lack what the method needs, or ``folds`` below 1.
+        ValueError: traces of different arms or rates, or without data that the method needs;
+            ``per_hour`` not above 0, or ``folds`` below 1.
     """
     believed = nominal_arm(traces) if arm is None else arm
     return train_and_score(detector, traces, believed, per_hour, folds)[0]
@@ -92,7 +93,7 @@ def free_alarm(fitted: FittedFreeMotion, traces: Sequence[Trace]) -> CollisionAl
 
     Args:
         fitted: the detector.
-        traces: the logs that it learned from; they show what usual samples look like.
+        traces: the logs that it was trained on; the limits of usual samples come from them.
     """
     usual = UsualInput.of(traces, fitted.arm)
     return CollisionAlarm(fitted, 1.0, FREE_CONFIRMATION, inputs=usual)
@@ -161,15 +162,16 @@ def train_beside(
 
 
 def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
-    """Which traces are left out together: all of some loads, so that the threshold bounds motion
-    with loads that a detector has not seen.
+    """Indices of the traces of each fold of a cross-validation.
 
-    With fewer loads than folds, collision-free traces are left out one by one. Collisions are left
-    out with their load, unless no other load has any.
+    All traces with the same load are in one fold, so that the threshold also holds for loads that
+    the detector was not trained with. A fold that would contain all traces with collisions contains
+    only its collision-free ones. If there are fewer loads than folds, the collision-free traces
+    are distributed over the folds, whatever their load, and traces with collisions are in none.
 
     Args:
         traces: at least ``folds`` of them collision-free.
-        folds: number of parts.
+        folds: number of folds.
     """
     free = [i for i, t in enumerate(traces) if not _collisions(t)]
     struck = set(range(len(traces))) - set(free)
@@ -181,7 +183,7 @@ def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
 
 
 def _load(trace: Trace) -> float:
-    """Mass of its heaviest load [kg]; 0 if unknown."""
+    """Mass of the heaviest load in a trace [kg]; 0 if unknown."""
     return float(trace.truth.payload.max(initial=0.0)) if trace.truth else 0.0
 
 
@@ -192,7 +194,7 @@ def _collisions(trace: Trace) -> int:
 def _cross_fitted(
     detector: Detector, traces: Sequence[Trace], arm: ArmModel, parts: Sequence[set[int]]
 ) -> list[FreeScores]:
-    """Scores of every collision-free trace, by detectors that were trained without its part."""
+    """Scores of each collision-free trace, by a detector that was trained without its fold."""
     found: list[FreeScores] = []
     for part in parts:
         own = [t for i, t in enumerate(traces) if i not in part]
@@ -207,16 +209,16 @@ def with_rate(
     per_hour: float,
     confirmation: float = CONFIRMATION,
 ) -> CollisionAlarm:
-    """Speed levels and the threshold for a rate of false alarms.
+    """The alarm of a fitted detector with a speed normalisation and a threshold for a rate.
 
     Args:
         detector: fitted.
-        traces: their collision-free rows count; motion that the detector was not trained on.
-        per_hour: false alarms to accept in an hour of such motion.
-        confirmation: t_c [s].
+        traces: traces that the detector was not trained on; only collision-free rows are used.
+        per_hour: accepted false alarms per hour of such motion.
+        confirmation: confirmation time [s].
 
     Raises:
-        ValueError: no collision-free motion, or a rate that is not above 0.
+        ValueError: no collision-free motion, or ``per_hour`` not above 0.
     """
     found = _free_scores(detector, traces, confirmation)
     return _with_rate(detector, found, per_hour, confirmation)[0]
@@ -241,12 +243,12 @@ def _with_rate(
 def normalised(
     detector: FittedDetector, found: Sequence[FreeScores], confirmation: float = CONFIRMATION
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
-    """An alarm without a threshold yet (infinite), and the scores to choose one from.
+    """An alarm with infinite threshold, and the scores from which the threshold is chosen.
 
     Args:
         detector: fitted.
-        found: its scores over collision-free motion, not normalised.
-        confirmation: t_c [s].
+        found: scores of the detector in collision-free motion, not normalised.
+        confirmation: confirmation time [s].
 
     Returns:
         The alarm with its normalisation, and the normalised scores.
@@ -259,21 +261,21 @@ def normalised(
 def with_guarantee(
     alarm: CollisionAlarm, traces: Sequence[Trace], per_hour: float, confidence: float = 0.95
 ) -> tuple[CollisionAlarm, Guarantee]:
-    """The same alarm with a threshold that calibration episodes guarantee.
+    """The alarm with a threshold whose false alarm rate calibration episodes guarantee.
 
     Args:
         alarm: its threshold is replaced; its speed normalisation must not come from ``traces``.
         traces: collision-free motion episodes that the detector was not trained on.
-        per_hour: false alarms per hour to accept.
+        per_hour: accepted false alarms per hour.
         confidence: see :func:`~tauguard.detectors.thresholds.guarantee.guaranteed_threshold`.
 
     Raises:
-        ValueError: an episode with collisions, or too few for the guarantee.
+        ValueError: an episode with collisions, or too few episodes for the guarantee.
     """
     for trace in traces:
         if count := _collisions(trace):
             raise ValueError(
-                f"an episode with {count} collisions: calibration takes collision-free motion"
+                f"an episode with {count} collisions: calibration needs collision-free motion"
             )
     scores = [alarm.free_scores(trace) for trace in traces]
     guarantee = guaranteed_threshold(scores, per_hour, confidence)
@@ -281,7 +283,7 @@ def with_guarantee(
 
 
 def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:
-    """Traces that last until the detector has settled.
+    """Traces that are longer than settling and confirmation time together.
 
     Raises:
         ValueError: there are none.
@@ -296,11 +298,13 @@ def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:
 
 
 def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
-    """The same alarm for an arm with a load in its gripper.
+    """The alarm for the arm with a load in its gripper.
 
     Raises:
-        ValueError: a detector of another kind: it takes no load.
+        ValueError: not a free-motion detector: other detectors cannot be given a load.
     """
     if not isinstance(alarm.detector, FittedFreeMotion | BesideFreeMotion):
-        raise ValueError(f"{alarm.detector.name}: takes no load; only free-motion detectors do")
+        raise ValueError(
+            f"{alarm.detector.name}: a load can be given only to free-motion detectors"
+        )
     return replace(alarm, detector=alarm.detector.carrying(load))

@@ -1,4 +1,4 @@
-"""A calibrated arm as a robot file: its inertial numbers in the links, the rest in a note."""
+"""Calibrated arms as robot files: inertial numbers in the links, all else in a comment."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def save_arm(arm: ArmModel, source: str | Path, target: str | Path, **about: obj
     """Write a calibrated robot file.
 
     Args:
-        arm: identified; its joints are those of ``source``.
+        arm: identified, with the joints of ``source``.
         source: the robot file that it was identified from.
         target: the new file, in the same format.
-        about: whatever else to keep, ready for JSON.
+        about: further entries of the comment, of types that JSON can represent.
 
     Raises:
         ValueError, OSError: see :func:`~tauguard.models.robot_file.write_robot_file`.
@@ -66,7 +66,7 @@ def load_arm(path: str | Path) -> ArmModel | None:
         if tuple(note["joints"]) != robot.joint_names:
             raise ValueError(f"joints {', '.join(note['joints'])}")
         friction = None if note["friction"] is None else FrictionModel(**note["friction"])
-        # The file may hold fewer digits than the note.
+        # The links may have fewer digits than the comment.
         inertial, armature = (np.array(note[k], np.float64) for k in ("inertial", "armature"))
         robot = replace(robot, inertial=inertial, armature=armature)
         return ArmModel(robot, note["drive_gain"], friction, note["noise"])

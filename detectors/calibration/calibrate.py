@@ -1,10 +1,11 @@
 """Calibration of an arm model from collision-free motion, by one regularised least squares.
 
 The residual of the nominal observer is linear in the errors of the inertial numbers, in the weights
-of the friction columns, in the relative errors of the drive gains and in the payloads carried (four
-numbers a trace, not known). All pass through the same causal filter as in detection, so no
-acceleration is needed. Priors determine what motion does not excite, and the scale: without them
-the gains collapse to zero. They weigh as much as thousands of samples.
+of the friction columns, in the relative errors of the drive gains and in the unknown payloads (four
+numbers per trace). All of them pass through the causal filter of the observer, so no acceleration
+is needed. Priors determine the numbers that the motion does not excite, and the scale of the
+torques: without priors, the gains converge to zero. The priors weigh as much as thousands of
+samples.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from tauguard.detectors.estimation.velocity import SLOWEST, SensorNoise
 from tauguard.detectors.events import free_rows
 from tauguard.traces.trace import Trace
 
-#: The columns of friction where none are named.
+#: Default friction columns.
 DEFAULT = FrictionModel()
 
 
@@ -44,7 +45,7 @@ class Priors:
     friction: float = 20.0  #: of every friction weight [N m per unit]
     payload: float = 3.0  #: [kg]
     moment: float = 0.3  #: of the payload [kg m]
-    softness: float = 30.0  #: a sample counts 1/softness^2: model errors are not white
+    softness: float = 30.0  #: a sample has the weight 1/softness^2, as model errors are not white
 
 
 @dataclass(frozen=True)
@@ -53,16 +54,16 @@ class Calibration:
 
     arm: ArmModel
     payloads: Array  #: mass and first moment of each trace's payload [kg, kg m], (traces, 4)
-    rms: Array  #: of the residual that is left on the traces used [N m], shape (n,)
+    rms: Array  #: root mean square of the remaining residual [N m], shape (n,)
 
 
 def _deviations(robot: RobotNumbers, priors: Priors, columns: int, traces: int) -> Array:
-    """Standard deviations of all unknowns; 0 for those that keep their nominal value."""
+    """Standard deviations of all unknowns; 0 for unknowns fixed at their nominal value."""
     n = robot.joints
     return np.concatenate(
         [
             body_deviations(robot, priors.mass, priors.centre, priors.inertia),
-            np.zeros(n),  # of the rotors' inertias
+            np.zeros(n),  # rotor inertias
             np.full(n * columns, priors.friction),
             np.full(n, priors.drive_gain),
             np.tile([priors.payload, *[priors.moment] * 3, *[0.0] * 6], traces),
@@ -82,13 +83,13 @@ def calibrate(
     """Identify inertial numbers, friction, drive gains and the traces' payloads together.
 
     Args:
-        arm: what is believed; its friction model, if any, gives only the columns.
+        arm: nominal arm; of its friction model, if any, only the columns are used.
         traces: motion of at least 4 s in all (200 rows of 0.02 s), better minutes; rows of known
             collisions are left out.
-        friction: columns to use (default: those of ``arm.friction``, or the default model).
-        priors: how far to trust what is believed.
-        rate: rate of the filter that residual and columns pass through [1/s].
-        rounds: the second round weighs each joint by the residual that the first left.
+        friction: friction columns (default: those of ``arm.friction``, or the default model).
+        priors: standard deviations of the unknowns around the nominal arm.
+        rate: rate of the filter of residual and columns [1/s].
+        rounds: each round weights the joints by the residuals of the round before.
 
     Returns:
         The calibrated arm with its friction model and noise levels.
@@ -127,9 +128,10 @@ _COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel, float], Filtered]] = {}
 
 
 def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> Filtered:
-    """The columns of the trace's free rows, cached with the last settings while the trace lives.
+    """The columns of the collision-free rows of a trace.
 
-    The folds of a cross-validation use the same columns.
+    They are cached for the last settings as long as the trace exists, because all folds of a
+    cross-validation need them.
     """
     key, found = _COLUMNS.get(id(trace), (None, None))
     if found is None or key is None or key[0] is not arm or key[1:] != (model, rate):
@@ -144,7 +146,7 @@ def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> 
 def _solved(
     data: Sequence[Filtered], robot: RobotNumbers, model: FrictionModel, priors: Priors, rounds: int
 ) -> tuple[System, Array, Array]:
-    """The last round's equations, their solution, and each joint's RMS with it [N m]."""
+    """The last round's equations, their solution, and each joint's RMS residual [N m]."""
     deviations = _deviations(robot, priors, model.columns, len(data))
     squares = [((one.torque - one.current) ** 2).mean(axis=0) for one in data]
     level: Array = np.maximum(np.sqrt(np.mean(squares, axis=0)), 1e-6)

@@ -26,20 +26,19 @@ from tauguard.models import (
 )
 from tauguard.traces import Trace
 
-#: Slopes of a robot file's ``frictionloss`` [rad/s]: MuJoCo's constraint has no presliding, and
-#: slips from some 1e-3 rad/s times that loss over the inertia [N m, kg m^2].
+#: Speeds over which the friction columns for a robot file's ``frictionloss`` rise [rad/s]. MuJoCo's
+#: constraint has no presliding; it slips at about 1e-3 rad/s times frictionloss [N m] divided by
+#: inertia [kg m^2].
 DRY = (0.003, 0.01)
-#: The Coulomb level of :func:`residual` rises around standstill over this speed [rad/s].
+#: Speed over which the Coulomb friction of :func:`residual` changes its sign [rad/s].
 STANDSTILL = 0.05
 
 
 def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
-    """The arm model of recordings before training.
-
-    It comes from the attachments of the recordings, never from a robot file.
+    """The arm model before training, from the attachments of the first recording.
 
     Raises:
-        ValueError: no nominal arm is attached to the recordings.
+        ValueError: no nominal arm is attached.
     """
     if "arm.xml" not in traces[0].attachments:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
@@ -57,13 +56,13 @@ def _attached(trace: Trace) -> tuple[str, Drive]:
     if name in cura6.NAMES:
         return attached["arm.xml"], cura6_drive(name)
     raise ValueError(
-        f"arm {name}: an earlier tauguard made these recordings, which did not keep the "
-        "numbers of its drive (drive.json) with them; make them again"
+        f"arm {name}: an earlier version of tauguard made these recordings without the numbers "
+        "of the drive (drive.json); make them again"
     )
 
 
 def nominal_design(name: str = "cura6") -> ArmModel:
-    """The same of an arm by its name.
+    """The arm model before training of an arm given by its name.
 
     Raises:
         ValueError: no such arm.
@@ -77,11 +76,11 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
 
     Args:
         trace: of an arm.
-        robot: a name, a file or a robot; the default is what tauguard attached to the trace.
+        robot: a name, a file or a robot (default: the arm attached to the trace).
         gain: gain of the observer [1/s], a number or one per joint.
 
     Raises:
-        ValueError: nothing is attached and no robot is named, or a robot of other joints.
+        ValueError: neither ``robot`` nor an attached arm, or a robot with other joints.
         FileNotFoundError: no such robot.
     """
     if robot is None:

@@ -1,4 +1,4 @@
-"""Collision-free logs of a real arm with the loads that it carried."""
+"""Collision-free logs of a real arm, and the loads that it carried."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tauguard.arrays import Array, Bools
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
 
-#: An axis slower than this in every sample of a log does not move in it [rad/s].
+#: A joint moves in a log if its speed is above this in some sample [rad/s].
 MOVING = 0.01
-#: A joint whose position changes less is moved by noise, or yields to a touch [rad].
+#: A joint whose position varies by less does not move: the cause is noise or a touch [rad].
 SHIFTED = 0.01
-#: Shortest part of a log that is cut [s].
+#: Least length of the parts into which a log is cut [s].
 SHORTEST = 8.0
 #: Least motion for an identification, and least length of logs of an arm that only stands [s].
 LEAST, LEAST_STANDING = 10.0, 2.0
@@ -27,7 +27,7 @@ class Load:
 
     mass: float = 0.0  #: [kg]
     centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]. None: unknown, and identified with the arm's numbers."""
+    """In the last link's frame [m]. None: unknown; it is identified with the arm's parameters."""
 
     def __post_init__(self) -> None:
         """``ValueError`` for a mass below 0 or numbers that are not finite."""
@@ -41,7 +41,7 @@ class Load:
 
 @dataclass(frozen=True)
 class LoadDeviation:
-    """How uncertain the carried load is."""
+    """Uncertainty of the load."""
 
     mass: float = 0.0  #: standard deviation [kg]
     moment: float = 0.0  #: of each axis of the first moment [kg m]
@@ -53,14 +53,14 @@ UNKNOWN_LOAD = LoadDeviation(3.0, 0.3)
 
 @dataclass(frozen=True)
 class Recording:
-    """A collision-free log and the load in it."""
+    """A collision-free log and the load that the arm carried."""
 
     trace: Trace
-    load: Load | None = Load()  #: None: something unknown was carried
+    load: Load | None = Load()  #: None: an unknown load
 
 
 def moves(trace: Trace) -> bool:
-    """Whether any joint ever moves: faster than :data:`MOVING`, and not to and fro by noise."""
+    """Whether a joint exceeds :data:`MOVING` and its position varies by :data:`SHIFTED`."""
     quick = (np.abs(trace.qd) > MOVING).any(axis=0)
     return bool((quick & (np.ptp(trace.q, axis=0) > SHIFTED)).any())
 
@@ -68,14 +68,14 @@ def moves(trace: Trace) -> bool:
 def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
     """Rows from the first motion of any joint to the last one, shape (T,).
 
-    Before and after, static friction takes an unknown fraction of the torque.
+    Before and after, static friction takes up an unknown fraction of the torque.
 
     Args:
         trace: the log.
-        margin: seconds at the log's beginning that are left out in any case.
+        margin: time at the beginning of the log that is always left out [s].
 
     Raises:
-        ValueError: no joint ever moves, or only in what is left out.
+        ValueError: no joint moves, or only within ``margin``.
     """
     moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
     if not len(moves):
@@ -91,7 +91,7 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
 
 
 def motion_length(recordings: Sequence[Recording]) -> float:
-    """Seconds from each recording's first motion to its last one, in all."""
+    """Sum over the recordings of the time from the first motion to the last one [s]."""
     moving = [r.trace for r in recordings if moves(r.trace)]
     return sum(float(moving_span(trace, 0.0).sum()) * trace.dt for trace in moving)
 
@@ -111,19 +111,22 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
 
 
 def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:
-    """Whether there are two or more, and without each one :data:`LEAST` of motion is left."""
+    """Whether at least :data:`LEAST` of motion is left whichever recording is removed."""
     rests = ([*recordings[:k], *recordings[k + 1 :]] for k in range(len(recordings)))
     return len(recordings) > 1 and all(motion_length(rest) >= LEAST for rest in rests)
 
 
 def is_known(recording: Recording) -> bool:
-    """Whether mass and centre of what was carried are known."""
+    """Whether mass and centre of the load are known."""
     load = recording.load
     return load is not None and (load.mass == 0 or load.centre is not None)
 
 
 def known_load(load: Load | None) -> Array:
-    """Inertial numbers of a load as far as it is known, as in ``Identified.loads``, (10,)."""
+    """Inertial numbers of a point mass at the load's centre, as in ``Identified.loads``, (10,).
+
+    An unknown load counts as none, an unknown centre as the origin.
+    """
     load = load or Load()
     x, y, z = load.centre or (0.0, 0.0, 0.0)
     spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
@@ -144,9 +147,9 @@ def laden(arm: ArmModel, load: Load | None) -> tuple[ArmModel, LoadDeviation]:
 def pieces(
     recordings: Sequence[Recording], count: int, shortest: float = SHORTEST
 ) -> list[Recording]:
-    """Cut recordings until there are at least ``count``.
+    """Halve the longest recording repeatedly until there are at least ``count`` recordings.
 
-    The longest are halved first, none below ``shortest`` [s].
+    It ends earlier if the halves would be shorter than ``shortest`` [s].
     """
     parts = list(recordings)
     while len(parts) < count:
@@ -161,6 +164,6 @@ def pieces(
 
 
 def cut(trace: Trace, rows: slice) -> Trace:
-    """Some successive rows of a log, without its truth."""
+    """The given rows of a log, without its truth."""
     q, qd, current = trace.q[rows], trace.qd[rows], trace.current[rows]
     return Trace(trace.joint_names, trace.t[rows], q, qd, current, meta=trace.meta)

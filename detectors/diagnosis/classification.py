@@ -1,4 +1,4 @@
-"""What kind of event an alarm was: an impact, a clamping, an intended push or a payload change.
+"""The kind of event behind an alarm: an impact, a clamping, an intended push or a payload change.
 
 Three questions, each with a measure that has a physical meaning:
 
@@ -23,40 +23,43 @@ from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 
 #: The kinds of events. A payload change is no collision; a push is an intended contact.
 KINDS = ("impact", "clamp", "push", "payload")
-#: An event lasts if this fraction of its level remains; width of the decision.
+#: An event lasts if this fraction of its peak residual remains at the end of the window. The second
+#: number is the width of the logistic function of the decision.
 LASTS, LASTS_WIDTH = 0.5, 0.05
-#: An event is a load if a load explains this fraction of the residual; width of the decision.
+#: An event is a payload change if a payload explains this fraction of the residual. The second
+#: number is the width of the logistic function of the decision.
 LOAD, LOAD_WIDTH = 0.9, 0.01
-#: A payload is within this reach of the last joint [m] and no heavier than this [kg].
+#: Largest distance of a payload from the last joint [m], and largest mass of a payload [kg].
 REACH, HEAVIEST = 0.5, 7.0
 #: Length of the end of the window that decides whether an event lasts [s].
 END = 0.03
-#: The fraction of a load is computed from samples that are later than this after the alarm [s], and
-#: than this number of lags of the observer, since the arm still moves before.
+#: The fraction that a payload explains is computed from samples later than both times after the
+#: alarm, a time [s] and a number of lags of the observer. Before, the arm still moves.
 SETTLING, SETTLING_LAGS = 0.025, 3.0
-#: Log odds of an intended push: constant, per decade of N/s, per unit of the cosine. Fitted by
-#: logistic regression to simulated clampings and pushes, on arms and seeds that no study uses.
+#: Log odds that an event that lasts is an intended push: constant, change per decade of the rise
+#: [N/s], change per unit of the cosine. Fitted by logistic regression to simulated clampings and
+#: pushes, on arms and seeds that no study uses.
 INTENT = (4.2, -1.2, 3.6)
-#: Shortest rise that is counted [s].
+#: Least duration of the rise of the force; shorter ones are set to it [s].
 SHORTEST = 1e-3
-#: Levels between which the rise is measured, fractions of the highest.
+#: Fractions of the peak between which the rise is measured.
 RISE = (0.25, 0.75)
 
 
 @dataclass(frozen=True)
 class Signs:
-    """The measures that decide."""
+    """Measures that determine the kind of an event."""
 
     lasting: float  #: residual at the end of the window along its peak, as a fraction of the peak
     load: float  #: fraction of the residual that a constant payload explains, 0 to 1
-    mass: float  #: that payload [kg]; negative: put down
-    reach: float  #: its distance from the last joint [m]
+    mass: float  #: mass of that payload [kg]; negative if the arm put it down
+    reach: float  #: distance of that payload from the last joint [m]
     rise: float  #: rate of the force between a quarter and three quarters of its peak [N/s]
     along: float  #: cosine between force and velocity of the touched point, -1 to 1
     speed: float  #: of the touched point before the alarm [m/s]
 
     def probabilities(self, load_known: bool = False) -> dict[str, float]:
-        """Of each of :data:`KINDS`; they sum to 1. A load that is known does not change."""
+        """Probability of each of :data:`KINDS`; that of "payload" is 0 if ``load_known``."""
         from scipy.special import expit
 
         lasts = float(expit((self.lasting - LASTS) / LASTS_WIDTH))
@@ -70,12 +73,12 @@ class Signs:
 
 
 def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
-    """Measure what came with an alarm.
+    """Compute the measures of an event from the samples around its alarm.
 
     Args:
-        after: the residual around it.
-        force: on the arm, at its peak [N], shape (3,).
-        velocity: velocity of the touched point before it [m/s], shape (3,).
+        after: the residual around the alarm.
+        force: peak force on the arm [N], shape (3,).
+        velocity: velocity of the touched point before the alarm [m/s], shape (3,).
     """
     level = after.level
     highest = float(level.max())

@@ -1,4 +1,4 @@
-"""From a residual to a contact: probability and force at every point of the arm's surface.
+"""Probability and force of a contact at every point of the arm's surface, given a residual.
 
 A force f on a link at point p gives the joint torques J_p^T f. Fewer than six joints carry most
 links, so a residual alone does not fix f and p (Haddadin, De Luca, Albu-Schaeffer 2017, IV-C).
@@ -21,15 +21,15 @@ from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: Prior of the force: standard deviations along the normal [N], all equally likely.
+#: Equally likely standard deviations of the force along the normal, in the prior [N].
 SCALES = (10.0, 30.0, 100.0, 300.0)
-#: Expected tangential force over the normal one: friction, and pushes at an angle.
+#: Standard deviation of the tangential force divided by that of the normal force.
 FRICTION = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class LinkPoses:
-    """Where the links are, world frame."""
+    """Poses of the links and axes of the joints in the world frame."""
 
     rotation: Array  #: shape (n, 3, 3)
     origin: Array  #: [m], shape (n, 3)
@@ -76,7 +76,7 @@ def _turn(axis: Array, angle: float) -> Array:
 def point_jacobians(
     robot: RobotNumbers, poses: LinkPoses, link: NDArray[np.int64], point: Array
 ) -> Array:
-    """Velocities of points per joint velocity, shape (K, 3, n).
+    """Jacobians of points that are fixed to links, shape (K, 3, n).
 
     Args:
         robot: the arm.
@@ -93,16 +93,16 @@ def point_jacobians(
 
 @dataclass(frozen=True, eq=False)
 class ContactBelief:
-    """Probability and force of a contact at every sampled point of the surface; a row per point."""
+    """Probability and force of a contact at every sampled point of the surface, one row each."""
 
     link: NDArray[np.int64]  #: 0-based, shape (K,)
     point: Array  #: world frame [m], shape (K, 3)
-    probability: Array  #: of a contact there, sums to 1, shape (K,)
+    probability: Array  #: probability that the contact is at the point, sums to 1, shape (K,)
     force: Array  #: mean force on the arm if the contact is there, world frame [N], shape (K, 3)
-    prior: Array  #: probability before the residual was seen, shape (K,)
+    prior: Array  #: probability of the point without the residual, shape (K,)
 
     def weighted(self, probability: Array) -> ContactBelief:
-        """The same points and forces, with other knowledge of the point."""
+        """The same points and forces with another probability of each point, shape (K,)."""
         return replace(self, probability=probability)
 
     def links(self, count: int) -> Array:
@@ -111,7 +111,7 @@ class ContactBelief:
         return fractions
 
     def on(self, link: int) -> tuple[Array, Array]:
-        """Expected force [N] and the surface point [m] nearest to the expected one, given a link.
+        """Mean force [N] of a contact on a link, and the surface point next to its mean point [m].
 
         Raises:
             ValueError: a link without surface.
@@ -136,7 +136,7 @@ def contact_belief(
     scales: tuple[float, ...] = SCALES,
     friction: float = FRICTION,
 ) -> ContactBelief:
-    """Judge every surface point by how well a push there explains a residual.
+    """Probability and force of a contact at every surface point, given a residual.
 
     A priori all links are equally likely, and so are the points of a link and the scales of the
     force.
@@ -146,7 +146,7 @@ def contact_belief(
         surface: its sampled surface.
         q: positions [rad], shape (n,).
         residual: estimate of tau_ext [N m], shape (n,).
-        noise: its standard deviation without contact [N m], shape (n,).
+        noise: standard deviation of the residual without contact [N m], shape (n,).
         scales: standard deviations of the force along the normal [N].
         friction: standard deviation of the tangential force over that of the normal one.
 
@@ -165,7 +165,7 @@ def contact_belief(
     inward = -np.einsum("kij,kj->ki", turn, surface.normal).T
     jacobian = point_jacobians(robot, poses, surface.link, point)
     torque = np.ascontiguousarray(jacobian.transpose(2, 1, 0)) / sigma[:, None, None]  # (n, 3, K)
-    # Divided by their standard deviations, forces are alike in all directions.
+    # Forces in units of their standard deviations are isotropic.
     normal = np.einsum("nik,ik->nk", torque, inward)
     torque = friction * torque + (1 - friction) * normal[:, None] * inward
     log, force = _explain(torque, y / sigma, inward, np.array(scales))
@@ -179,9 +179,9 @@ def contact_belief(
 def _explain(torque: Array, y: Array, inward: Array, scales: Array) -> tuple[Array, Array]:
     """Log evidence (K,) and mean standardised force (3, K) of every point.
 
-    The force is Gaussian in the standardised directions, with one of ``scales`` as its deviation,
-    and cut at the plane of the surface: it pushes. The mean and the mass of a Gaussian cut by one
-    plane are exact; the scales, equally likely before, are weighed by their own evidence.
+    The standardised force is Gaussian with one of ``scales`` as its standard deviation, restricted
+    to forces that push inward. Probability and mean of a Gaussian that one plane truncates have
+    closed forms. The scales are equally likely a priori, and weighted by their evidence.
 
     Args:
         torque: joint torques in units of the noise for a unit force, shape (n, 3, K).
@@ -195,7 +195,7 @@ def _explain(torque: Array, y: Array, inward: Array, scales: Array) -> tuple[Arr
     loose = 1 / scales[:, None] ** 2
     xx, yy, zz = ((torque[:, i] ** 2).sum(axis=0) + loose for i in range(3))
     xy, xz, yz = ((torque[:, i] * torque[:, j]).sum(axis=0) for i, j in ((0, 1), (0, 2), (1, 2)))
-    # Inverses of many 3 x 3 matrices by cofactors: a tenth of the time of factorisations.
+    # Cofactors invert many 3 x 3 matrices in a tenth of the time of factorisations.
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
     determinant = xx * a + xy * b + xz * c

@@ -1,4 +1,4 @@
-"""After the alarm: the link, point, force and kind of the event."""
+"""Diagnosis of an alarm: link, point, force and kind of the event."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
-#: A link that is less likely than this is called not identifiable.
+#: Least probability of the most likely link for it to be called identifiable.
 SURE = 0.8
-#: Link and point are found from samples in this time after and before the alarm [s]. With a slow
-#: observer, the time after it is this number of lags.
+#: Link and point are found from samples between ``EARLY`` before the alarm and ``ISOLATE`` after it
+#: [s], or ``ISOLATE_LAGS`` lags of the observer after it if that is longer.
 ISOLATE, EARLY, ISOLATE_LAGS = 0.1, 0.01, 3.0
 
 
@@ -35,26 +35,26 @@ class Diagnosis:
     alarm: Alarm
     link: int  #: the most likely link, 1-based: link i moves with joint i
     links: Array  #: probability of each link, shape (n,)
-    last_joint: int  #: link by the usual rule: the last joint with a significant residual
-    time: float  #: of the force [s]: its peak within the look
-    force: Array  #: on the arm at that time, world frame [N], shape (3,)
-    point: Array  #: where, at that time, world frame [m], shape (3,)
+    last_joint: int  #: last joint with a significant residual, the usual rule for the link
+    time: float  #: time of the peak force within the observed window [s]
+    force: Array  #: force on the arm at that time, world frame [N], shape (3,)
+    point: Array  #: contact point at that time, world frame [m], shape (3,)
     kind: str  #: the most likely of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: the measures that decided the kind
     severity: Severity  #: impulse and peak force, each with an interval
     since: float  #: start of the observed window [s]; with ``at_tool`` shortly before the contact
     until: float  #: end of the observed window [s]
-    joints: tuple[str, ...]  #: their names
+    joints: tuple[str, ...]  #: names of the joints
 
     @property
     def collision(self) -> bool:
-        """Whether something touched the arm: a payload change is no collision."""
+        """Whether something touched the arm, so that the event is no payload change."""
         return self.kind != "payload"
 
     @property
     def summary(self) -> str:
-        """The diagnosis in a few words, with intervals that hold 90 %."""
+        """The diagnosis in a few words, with 90 % intervals."""
         if not self.collision:
             return f"payload changed by {self.signs.mass:+.2f} kg, no collision"
         size = self.severity.text(self.kind, self.joints)
@@ -65,10 +65,10 @@ class Diagnosis:
 
     @property
     def link_identifiable(self) -> bool:
-        """Whether one link is much more likely than all others, and can load the leading joint.
+        """Whether one link is much more likely than all others, and consistent with the torques.
 
-        A force on a link acts on no joint beyond it. Where the joint with the largest torque is
-        beyond the most likely link, the torques are not those of one contact that the model knows.
+        A force on a link causes no torque at joints beyond the link. So a most likely link before
+        the joint with the largest torque is not consistent: the model of one contact is wrong.
         """
         leading = int(np.abs(self.severity.torque.peak).argmax()) + 1
         return bool(self.links[self.link - 1] >= SURE) and leading <= self.link
@@ -81,26 +81,26 @@ def diagnose(
     robot: str | Path | LinkSurface | None = None,
     after: float = AFTER,
 ) -> list[Diagnosis]:
-    """Explain every alarm of a detector on a trace.
+    """Diagnose every alarm of a detector on a trace.
 
     Args:
         alarm: a fitted detector with its threshold.
-        trace: of its arm.
-        detection: the alarms of the trace, where they are known already.
+        trace: of the detector's arm.
+        detection: the alarms of the trace (default: computed).
         robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
-            the ``arm.xml`` that simulated traces carry).
+            the ``arm.xml`` that is attached to simulated traces).
         after: length of the observed window [s].
 
     Returns:
         A diagnosis for each alarm, in order.
 
     Raises:
-        ValueError: no shapes to look for a contact on, or another arm.
+        ValueError: no collision shapes, or another arm.
     """
     found = detection or alarm.detect(trace)
     if robot is None:
         if "arm.xml" not in trace.attachments:
-            raise ValueError("the trace has no arm.xml: give the robot's file with its shapes")
+            raise ValueError("the trace has no arm.xml: give a robot file with collision shapes")
         robot = trace.attachments["arm.xml"]
     surface = robot if isinstance(robot, LinkSurface) else link_surface(robot)
     return Diagnoser.of(alarm.detector.arm, surface).diagnose(trace, found.alarms, after)
@@ -108,14 +108,14 @@ def diagnose(
 
 @dataclass(frozen=True, eq=False)
 class Diagnoser:
-    """Explains alarms of one arm."""
+    """Diagnoses alarms of one arm."""
 
     arm: ArmModel
     surface: LinkSurface
-    noise_model: NoiseModel | None = None  #: of free motion; None: the arm's noise at every speed
+    noise_model: NoiseModel | None = None  #: None: ``arm.noise`` at every speed
     trust: Trust = field(default_factory=Trust)
     at_tool: bool = False  #: all contacts are at the tool, see :func:`tool_severity`
-    load_known: bool = False  #: what the arm carries is known and does not change
+    load_known: bool = False  #: the load is known and does not change
 
     @classmethod
     def of(
@@ -125,16 +125,16 @@ class Diagnoser:
         at_tool: bool = False,
         load_known: bool = False,
     ) -> Diagnoser:
-        """With the noise model that the arm's detector has learned, if there is one.
+        """A diagnoser with the noise model that the arm's detector has learned, if there is one.
 
-        A detector that reduces the residual of joints with an uncertain payload has a smaller
-        deviation than the residual itself, so the sensors' noise is a lower bound.
+        Some detectors scale down the residual of joints with an uncertain payload. Their noise
+        model is then smaller than the noise of the residual, so ``arm.noise`` is a lower bound.
 
         Args:
             arm: the arm model.
-            surface: its sampled surface.
-            at_tool: contacts are known to be at the tool; their force is then sharper.
-            load_known: what the arm carries is known, so no alarm is a change of it.
+            surface: sampled surface of the arm.
+            at_tool: all contacts are at the tool, which makes the force more certain.
+            load_known: the load is known and does not change, so no alarm is a payload change.
         """
         known = arm.noise_model
         least = None if known is None or arm.noise is None else known.at_least(arm.noise)
@@ -147,8 +147,8 @@ class Diagnoser:
     ) -> list[Diagnosis]:
         """A diagnosis for each alarm, in order.
 
-        It is judged in the time ``after`` the alarm [s]; a force at the tool from the beginning of
-        the contact, which may be before the alarm, until the alarm ends.
+        The window ends ``after`` [s] after the alarm. With ``at_tool``, the force comes from a
+        window from the beginning of the contact, which may precede the alarm, to the alarm's end.
         """
         looked = PostAlarmWindows(self.arm, self.noise_model, trace)
         found, since = [], -np.inf
@@ -164,9 +164,9 @@ class Diagnoser:
         """The diagnosis from the residual around an alarm.
 
         Args:
-            alarm: explained.
-            after: what came with it shortly after.
-            whole: what came with the whole contact, for the force (default: ``after``).
+            alarm: the alarm to diagnose.
+            after: samples shortly after the alarm starts.
+            whole: samples of the whole contact, for the force (default: ``after``).
         """
         whole = after if whole is None else whole
         robot, level = self.arm.robot, after.level
@@ -209,7 +209,7 @@ class Diagnoser:
         return self.trust.noise(after.residual, after.deviation)
 
     def _velocity(self, link: int, point: Array, after: PostAlarmWindow, peak: int) -> Array:
-        """Of the touched point with the joint speeds before the alarm [m/s]."""
+        """Velocity of the touched point with the joint speeds before the alarm [m/s]."""
         poses = link_poses(self.arm.robot, after.q[peak])
         jacobian = point_jacobians(self.arm.robot, poses, np.array([link]), point[None])[0]
         velocity: Array = jacobian @ after.qd[0]

@@ -1,4 +1,4 @@
-"""Which link was touched: every surface point judged over several moments, and the usual rule."""
+"""The touched link, from the evidence of surface points over several samples or the usual rule."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tauguard.detectors.diagnosis.contact_force import ContactBelief, contact_be
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: The usual rule counts torques above this number of deviations and this fraction of the largest
-#: torque. These values were best on simulated arms that no study uses.
+#: A torque is significant in the usual rule if it exceeds this number of standard deviations and
+#: this fraction of the largest torque. Both were best on simulated arms that no study uses.
 SIGNIFICANT, NOTICED = 6.0, 0.05
-#: Number of moments that are used besides the strongest one, and the fraction of its level that
-#: they need.
+#: Number of samples that are used besides the sample with the strongest residual, and the least
+#: level of such a sample, as a fraction of the strongest.
 MOMENTS, FRACTION = 3, 0.4
 
 
@@ -24,11 +24,11 @@ MOMENTS, FRACTION = 3, 0.4
 class Trust:
     """Uncertainty of a residual while something touches the arm.
 
-    The noise of free motion is one part. A contact adds errors that grow with it: friction that
-    changes sign, errors of the gain, and motion of the links.
+    It consists of the noise of free motion and of errors that grow with the contact's torque:
+    friction that changes its sign, errors of the gains, and motion of the links.
     """
 
-    free: float = 3.0  #: deviations of free motion
+    free: float = 3.0  #: factor of the standard deviation in free motion
     own: float = 0.05  #: fraction of the joint's own residual
     largest: float = 0.03  #: fraction of the largest residual of all joints
 
@@ -49,23 +49,23 @@ def isolate(
     residual: Array,
     noise: Array,
 ) -> ContactBelief:
-    """Combine several moments of one contact.
+    """Combine the residuals of several samples of one contact.
 
-    The point stays the same on its link while the force may change, so the evidences of a point
-    multiply. A moment with little information changes little.
+    The contact point is fixed on its link, while the force can change. So the evidences of each
+    point are multiplied. A sample with little information has little influence.
 
     Args:
         robot: the arm.
         surface: its sampled surface.
         q: positions [rad], shape (M, n).
         residual: estimates of tau_ext [N m], shape (M, n).
-        noise: their standard deviations [N m], shape (M, n).
+        noise: standard deviations of the residuals [N m], shape (M, n).
 
     Returns:
-        The belief: points and forces are those of the last moment.
+        The belief, with the points and forces of the last sample.
 
     Raises:
-        ValueError: no moment, or shapes that do not fit.
+        ValueError: no sample, or shapes that do not fit.
     """
     if not len(q) or not len(q) == len(residual) == len(noise):
         raise ValueError(
@@ -80,7 +80,7 @@ def isolate(
 
 
 def moments(level: Array, most: int = MOMENTS, fraction: float = FRACTION) -> NDArray[np.int64]:
-    """Choose samples: spread over those near the highest level, which comes last.
+    """Choose samples with a level near the highest one; the sample of the highest level is last.
 
     Args:
         level: strength of the residual, shape (M,).
@@ -97,13 +97,13 @@ def last_joint(
 ) -> int:
     """The usual rule: the link of the last joint with a significant residual, 1-based; 0 if none.
 
-    A contact on a link moves no joint behind it (De Luca et al. 2006).
+    A contact on a link causes no torque at the joints beyond the link (De Luca et al. 2006).
 
     Args:
         residual: [N m], shape (n,).
-        deviation: its standard deviation in free motion [N m], shape (n,).
+        deviation: standard deviation of the residual in free motion [N m], shape (n,).
         significant: threshold in standard deviations.
-        fraction: threshold as a fraction of the largest residual; both are combined.
+        fraction: threshold as a fraction of the largest residual; both have to be exceeded.
     """
     least = np.hypot(significant * deviation, fraction * np.abs(residual).max())
     found = np.flatnonzero(np.abs(residual) > least)

@@ -1,8 +1,8 @@
-"""The residual around an alarm, with payload, offsets and friction errors fixed before it.
+"""The residual around an alarm, with payload, offsets and friction errors fixed before the alarm.
 
-The estimator goes on adapting during a contact, and soon takes a lasting contact for a payload. A
-diagnosis therefore fixes payload, offsets and friction errors at the moment before the alarm, so
-that the torque of a contact stays visible for as long as the contact lasts.
+The estimator continues to adapt during a contact, and would soon explain a long contact by a
+payload. A diagnosis therefore uses payload, offsets and friction errors from shortly before the
+alarm, so that the contact's torque stays in the residual until the contact ends.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
 from tauguard.traces.trace import Alarm, Trace
 
-#: Largest observer gain, as a fraction of a log's rate.
+#: Largest observer gain, as a fraction of the sample rate.
 PER_SAMPLE = 0.2
 
 #: Time before the alarm at which the estimates are fixed [s].
 BEFORE = 0.02
 
-#: Length of the window after the alarm [s], and its least length in lags of the observer.
+#: Length of the window after the alarm [s], and its least length in time constants of the observer.
 AFTER, LAGS = 0.3, 10.0
 
-#: Time constants of the observer after which the start of a payload's columns has no effect.
+#: Number of time constants of the observer after which its initial state has no effect.
 SETTLED = 10.0
 
-#: A contact may have begun this long before its alarm [s]: where the residual was last below this
-#: fraction of what it is at the alarm.
+#: A contact begins where the residual was last below ``RISE`` times its level at the alarm, but at
+#: most ``BEGUN`` before the alarm [s].
 BEGUN, RISE = 0.6, 0.2
 
 #: A contact is followed while its alarm lasts, at most this long [s].
@@ -41,16 +41,16 @@ LONGEST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class PostAlarmWindow:
-    """Samples from shortly before an alarm to some time after it; rows are samples."""
+    """Samples from shortly before an alarm to some time after it, one row each."""
 
-    rows: NDArray[np.int64]  #: of the trace, shape (M,)
-    t: Array  #: since the alarm [s], shape (M,)
+    rows: NDArray[np.int64]  #: rows of the trace, shape (M,)
+    t: Array  #: time since the alarm [s], shape (M,)
     q: Array  #: [rad], shape (M, n)
     qd: Array  #: [rad/s], shape (M, n)
-    residual: Array  #: that came with the alarm [N m], shape (M, n)
-    deviation: Array  #: its standard deviation in free motion [N m], shape (M, n)
+    residual: Array  #: part that came with the alarm [N m], shape (M, n)
+    deviation: Array  #: standard deviation of the residual in free motion [N m], shape (M, n)
     payload: Array  #: residual per unit of payload mass [kg] and moment [kg m], shape (M, n, 4)
-    lag: float = 1 / DETECTION_GAIN  #: of the observer [s]
+    lag: float = 1 / DETECTION_GAIN  #: time constant of the observer [s]
 
     @property
     def level(self) -> Array:
@@ -59,15 +59,15 @@ class PostAlarmWindow:
 
 
 class PostAlarmWindows:
-    """Looks at the alarms of one trace."""
+    """Windows around the alarms of one trace."""
 
     def __init__(self, arm: ArmModel, noise_model: NoiseModel | None, trace: Trace) -> None:
         """Run the estimator over the trace.
 
         Args:
             arm: the arm model.
-            noise_model: of its residual in free motion (default: the arm's noise at every speed).
-            trace: of this arm.
+            noise_model: of the residual in free motion (default: ``arm.noise`` at every speed).
+            trace: trace of this arm.
         """
         assert arm.noise is not None
         self.arm, self.trace = arm, trace
@@ -81,16 +81,16 @@ class PostAlarmWindows:
         """The samples of a contact from its beginning until its alarm ends.
 
         Args:
-            alarm: of the trace.
-            since: the contact has not begun before [s].
-            after: least time after the alarm's start [s].
+            alarm: an alarm of the trace.
+            since: earliest beginning of the contact [s].
+            after: least length of the window after the alarm's start [s].
         """
         before = alarm.start - max(self._begun(alarm.start), since) + BEFORE
         lasts = min(alarm.end - alarm.start, LONGEST)
         return self.at(alarm.start, max(after, lasts), max(before, BEFORE))
 
     def _begun(self, start: float) -> float:
-        """When the rise of the residual that led to an alarm began [s]."""
+        """Time at which the residual began the rise that caused the alarm [s]."""
         t = self.trace.t
         assert self.arm.noise is not None
         rows = slice(*np.searchsorted(t, (start - BEGUN, start + 0.5 * self.trace.dt)))
@@ -105,12 +105,13 @@ class PostAlarmWindows:
         """The samples around an alarm that starts at ``start`` [s].
 
         Args:
-            start: of the alarm [s].
-            after: time that is looked at after it [s].
-            before: what was known this long before it is held [s].
+            start: start of the alarm [s].
+            after: length of the window after ``start`` [s].
+            before: time before ``start`` at which payload, offsets and friction errors are fixed
+                [s].
 
         Raises:
-            ValueError: not within the trace.
+            ValueError: ``start`` is not within the trace.
         """
         trace, known, lag = self.trace, self._estimate, 1 / self._gain
         after = max(after, LAGS * lag)
@@ -120,7 +121,7 @@ class PostAlarmWindows:
         begin, first, at, last = np.searchsorted(
             trace.t, (start - before - SETTLED * lag, start - before, start, start + after)
         )
-        # Slow logs: at least the sample before the alarm's, where there is one.
+        # At low sample rates: begin at least one sample before the alarm, if there is one.
         first, begin = min(first, max(at - 1, 0)), min(begin, max(at - 1, 0))
         columns = self._payload_columns(slice(begin, last + 1))[first - begin :]
         rows = np.arange(first, first + len(columns))
@@ -138,7 +139,7 @@ class PostAlarmWindows:
         )
 
     def _payload_columns(self, rows: slice) -> Array:
-        """What an unknown payload at the last link adds to the residual."""
+        """Change of the residual by a payload at the last link, per unit, shape (M, n, 4)."""
         trace, n = self.trace, self.arm.robot.joints
         p, beta = momentum_regressor(
             self.arm.robot, trace.q[rows], trace.qd[rows], link=n - 1, count=PAYLOAD, threads=1

@@ -407,9 +407,9 @@ def test_a_standing_arm_alone_is_watched_while_it_stands(folder, tmp_path, capsy
     main(["detect", written(tmp_path, "pushed.csv", pushed), *flags(folder), "--model", model])
     said = capsys.readouterr().out
     assert "1 alarm in" in said
-    assert "nothing is watched" not in said
+    assert "no collision is detected" not in said
     main(["detect", written(tmp_path, "moves.csv", record(6)), *flags(folder), "--model", model])
-    assert "moves here, but in none of the training logs: nothing is watched" in (
+    assert "moves here, but in none of the training logs: no collision is detected" in (
         capsys.readouterr().out
     )
 
