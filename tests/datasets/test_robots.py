@@ -123,7 +123,7 @@ def test_an_older_dataset_is_read_and_trained_on_while_its_file_is_the_same(desc
     assert next(read(folder, arm="cura6")).attachments["arm.xml"] == text
     source.write_text(source.read_text() + "torque_constant = 0.3\n")
     (stored,) = read(folder, arm="other")
-    with pytest.raises(ValueError, match=r"arm other: an earlier version of tauguard .* make them again"):
+    with pytest.raises(ValueError, match=r"arm other: an earlier version .* make them again"):
         nominal_arm([stored])
     head["configuration"]["robots"][0]["source"] = "/" + 300 * "x"  # it cannot even be looked at
     (folder / HEAD).write_text(json.dumps(head))
