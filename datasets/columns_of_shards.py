@@ -94,9 +94,9 @@ def stored(trace: Trace, every: int) -> Trace:
     return Trace(
         joint_names=trace.joint_names,
         t=trace.t[rows].copy(),
-        q=_given(signal("q")),
-        qd=_given(signal("qd")),
-        current=_given(signal("current")),
+        q=given(signal("q")),
+        qd=given(signal("qd")),
+        current=given(signal("current")),
         q_des=signal("q_des"),
         qd_des=signal("qd_des"),
         qdd_des=signal("qdd_des"),
@@ -114,7 +114,7 @@ def rounded(name: str, signal: Array) -> Array:
 
 def table(trace: Trace, number: int, residual: Array | None, like: pa.Schema) -> pa.Table:
     """A stored trace as the rows of a shard."""
-    truth = _given(trace.truth)
+    truth = given(trace.truth)
     rows, joints = trace.q.shape
     wide = {name: getattr(trace, name) for name in JOINT_SIGNALS if name != "tau_ext"}
     wide |= {"tau_ext": truth.tau_ext, RESIDUAL: residual}
@@ -215,6 +215,7 @@ def collision_of(values: Mapping[str, Any]) -> Collision:
     return Collision(**{**values, **arrays})
 
 
-def _given(value: Any) -> Any:
+def given(value: Any) -> Any:
+    """``value``, which is not None (for the type checker)."""
     assert value is not None
     return value

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.datasets.columns_of_shards import collision_line, stored
+from tauguard.datasets.columns_of_shards import collision_line, given, stored
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import (
     CARD,
@@ -279,12 +279,7 @@ def same_again(
         np.array_equal(getattr(fresh, name), getattr(kept, name), equal_nan=True)
         for name in ("t", "q", "qd", "current", "q_des", "qd_des", "qdd_des")
     )
-    truths = (_given(fresh.truth), _given(kept.truth))
+    truths = (given(fresh.truth), given(kept.truth))
     same &= np.array_equal(truths[0].tau_ext, truths[1].tau_ext)
     same &= [collision_line(c) for c in truths[0].collisions] == line["collisions"]
     return trace, bool(same)
-
-
-def _given(value: Any) -> Any:
-    assert value is not None
-    return value

@@ -18,6 +18,7 @@ from tauguard.datasets.code_identity import code
 from tauguard.datasets.columns_of_shards import (
     RESIDUAL,
     collision_line,
+    given,
     rounded,
     schema,
     stored,
@@ -207,7 +208,7 @@ def _simulated(
         except (SimulationDiverged, ValueError) as error:
             yield one, None, None, f"failed: {' '.join(str(error).split())}"
             continue
-        happened, wanted = len(_given(trace.truth).collisions), len(one.episode.collisions)
+        happened, wanted = len(given(trace.truth).collisions), len(one.episode.collisions)
         outcome = "as planned"
         if happened != wanted:
             outcome = f"{happened} of {wanted} planned collisions happened"
@@ -239,7 +240,7 @@ def _line(
     one: Planned, trace: Trace | None, outcome: str, joints: tuple[str, ...]
 ) -> dict[str, Any]:
     episode = one.episode
-    collisions = () if trace is None else _given(trace.truth).collisions
+    collisions = () if trace is None else given(trace.truth).collisions
     return {
         "split": one.split,
         "number": one.number,
@@ -263,8 +264,3 @@ def _line(
 
 def _plain(values: Mapping[str, Any]) -> Any:
     return json.loads(json.dumps(values))
-
-
-def _given(value: Any) -> Any:
-    assert value is not None
-    return value

@@ -13,8 +13,8 @@ def reflected_mass(
 ) -> float:
     """Effective mass of the arm at a point of impact [kg]: 1 / (n^T J M^-1 J^T n).
 
-    M includes armature, because an impact is shorter than the response of any drive. (Khatib,
-    "Inertial properties in robotic manipulation", 1995.)
+    M includes the rotors' inertia (armature), because an impact is shorter than the response of any
+    drive. Source: Khatib, "Inertial properties in robotic manipulation", 1995.
 
     Args:
         scene: a composed scene.

@@ -226,12 +226,12 @@ def hold(
     carrier.explicitinertial, carrier.mass = True, obj.mass
     carrier.inertia = [obj.mass * 1e-3] * 3
     for geom in _fill(spec, carrier, obj):
-        at, way = np.zeros(3), np.zeros(4)
-        mujoco.mju_mulPose(at, way, place, turn, geom.pos, geom.quat)
+        at, quat = np.zeros(3), np.zeros(4)
+        mujoco.mju_mulPose(at, quat, place, turn, geom.pos, geom.quat)
         mesh, kind, size = geom.meshname, geom.type, geom.size.copy()
         rgba, name = geom.rgba.copy(), geom.name
         spec.delete(geom)
-        moved = link.add_geom(name=name, type=kind, size=size, pos=at, quat=way, rgba=rgba, mass=0)
+        moved = link.add_geom(name=name, type=kind, size=size, pos=at, quat=quat, rgba=rgba, mass=0)
         if mesh:
             moved.meshname = mesh
         moved.contype, moved.conaffinity = 1, 2

@@ -40,16 +40,16 @@ struct Script {
 constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
-constexpr double startle = 1.6;     // speed at which a touched hand withdraws, over its usual speed
-constexpr double quiet = 1.0;       // rest of a hand after that [s]
-constexpr double step_time = 0.6;   // duration of the step back after a touch [s]
+constexpr double startle = 1.6;    // speed of a touched hand's withdrawal, in units of `hand_speed`
+constexpr double quiet = 1.0;      // rest of a hand after that [s]
+constexpr double step_time = 0.6;  // duration of the step back after a touch [s]
 constexpr double step_lasts = 2.0;  // time that the person then stays back [s]
-constexpr double lean_back = 1.2;   // backward lean of a seated person over `step_back` [rad/m]
+constexpr double lean_back = 1.2;   // backward lean of a seated person per `step_back` [rad/m]
 constexpr double lean_rate = 1.2;   // largest rate of a lean [rad/s]
 constexpr double felt = 1.0;        // smallest force that a person feels [N]
 constexpr double turn_rate = 3.0;   // largest rate of a turn [rad/s]
 constexpr double comfort = 0.95;    // lean towards goals beyond this fraction of the arm's length
-constexpr double stretch = 0.985;   // largest extension of the arm over its length
+constexpr double stretch = 0.985;   // largest extension of the arm as a fraction of its length
 constexpr double most_lean = 0.7;   // largest forward lean [rad]
 
 constexpr double clearance = 0.005;    // distance of palms and arms from barriers [m]

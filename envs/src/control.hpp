@@ -18,8 +18,8 @@ enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
 // A brake is a spring and a damper, and slips at the torque limit.
-constexpr double brake_stiffness = 10.0;  // over the servo's kp
-constexpr double brake_damping = 3.0;     // over the servo's kd
+constexpr double brake_stiffness = 10.0;  // as a multiple of the servo's kp
+constexpr double brake_damping = 3.0;     // as a multiple of the servo's kd
 // Damping of the Cartesian mode's least squares; it bounds the joint step near a singular pose.
 constexpr double cartesian_damping = 0.02;
 
@@ -30,7 +30,7 @@ struct Table {
 };
 
 constexpr double end_margin = 0.01;  // distance of references from the ends of joint ranges [rad]
-constexpr double end_rate = 6.0;     // largest speed towards that limit over the distance [1/s]
+constexpr double end_rate = 6.0;     // largest speed towards that limit per distance from it [1/s]
 
 struct Command {
   std::vector<double> origin, speed, feed;  // reference [rad], its velocity [rad/s], torque [N m]
@@ -46,7 +46,7 @@ struct Controls {
   std::vector<double> torque_limit;  // [N m]
   std::vector<double> low, high;     // ends of the joints' ranges [rad]
   // The largest possible contact force F [N] satisfies F^2 = moving s^2 + driven, where s is the
-  // largest joint speed over max_speed.
+  // largest ratio of a joint's speed to its max_speed.
   double moving = INFINITY, driven = 0;
   Override override = Override::none;
   std::vector<double> override_speed;  // [rad/s]

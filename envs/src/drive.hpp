@@ -26,7 +26,8 @@ struct Joint {
   double rated_speed = 0.0, no_load_speed = 0.0;
   double known_coulomb = 0.0, known_viscous = 0.0;  // compensated by the servo; N m, N m s/rad
   std::vector<double> cycles, amplitude, phase;     // ripple: per motor revolution; A; rad
-  std::vector<double> slope, slope_velocity;        // rises of the friction level; N m, rad/s
+  std::vector<double> slope,
+      slope_velocity;  // rises of the friction level [N m], their speed scales
 };
 
 struct JointState {

@@ -182,7 +182,7 @@ class Plant {
   std::size_t row_ = 0;       // physics step of the action, or row of the table
   bool sound_ = true;
   bool impossible_ = false;  // unsound because of a force that the arm cannot exert
-  double fastest_ = 0;       // largest joint speed over max_speed, after the last action
+  double fastest_ = 0;       // largest ratio of joint speed to max_speed, after the last action
 
   template <class Visitor>
   void visit(Visitor&& each) {

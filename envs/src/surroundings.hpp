@@ -38,7 +38,7 @@ struct Rows {
   Held q, qd, current, tau;  // physics steps x joints
   Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
   Held tau_peak;             // joints
-  Touched touched;           // of the regions
+  Touched touched;           // peak contact of each region
   Held reaches, walks;       // the people's scripts: hands x rows x reach_width, rows x walk_width
 
   Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }

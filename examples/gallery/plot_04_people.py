@@ -16,8 +16,8 @@ names = [region.name for region in env.unwrapped.regions]
 joints = len(env.unwrapped.scene.joint_names)
 worst, ratio, picture = np.zeros(len(names)), [], env.render()
 for _ in range(400):
-    way = observation[3 * joints + 3 : 3 * joints + 6]  # from the tool to the target [m]
-    action = np.concatenate([np.clip(way / 0.1, -1, 1), np.zeros(3)])
+    path = observation[3 * joints + 3 : 3 * joints + 6]  # from the tool to the target [m]
+    action = np.concatenate([np.clip(path / 0.1, -1, 1), np.zeros(3)])
     observation, reward, terminated, truncated, info = env.step(action)
     worst = np.maximum(worst, info["region_force"])
     ratio.append(info["limit_ratio"])

@@ -28,12 +28,12 @@ def play(near):
     reached = np.zeros(COPIES)
     for _ in range(STEPS):
         tool = observation[:, 3 * joints : 3 * joints + 3]
-        way = observation[:, 3 * joints + 3 : 3 * joints + 6]
+        path = observation[:, 3 * joints + 3 : 3 * joints + 6]
         regions = observation[:, 3 * joints + 6 :].reshape(COPIES, -1, 6)[:, :, :3]
         distance = np.linalg.norm(tool[:, None] - regions, axis=2).min(axis=1)
         slow = np.clip(distance / near, 0.1, 1.0) if near else np.ones(COPIES)
         action = np.zeros((COPIES, 6))
-        action[:, :3] = np.clip(way / 0.1, -1, 1) * slow[:, None]
+        action[:, :3] = np.clip(path / 0.1, -1, 1) * slow[:, None]
         observation, *_, info = envs.step(action)
         reached += info["success"]
     both = np.array([reached, info["cost_sum"]])
