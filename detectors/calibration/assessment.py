@@ -24,33 +24,33 @@ from tauguard.detectors.estimation.observer import intervals, lagged, low_pass
 from tauguard.detectors.events import find_alarms
 from tauguard.traces.trace import Trace
 
-#: Fraction of a joint's torque that may stay unexplained before a log is refused, and before a note
-#: says so. Right logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3
-#: whose friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e.
-#: Between the two only a note is possible.
+#: If more than the first fraction of a joint's torque is unexplained, a log is refused; more than
+#: the second gives a note. Correct logs have 5 % on a UR10e, 17 % on a UR5, and 23 to 31 % at a
+#: wrist joint of a UR3 whose friction warms up. Two exchanged joints or currents give 14 to 25 %
+#: on the UR10e, so no single limit separates the two cases.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
-#: The first one for logs with a load, whose centre may not be known. A warm UR5 with a known load
-#: leaves 36 % unexplained; exchanged joints leave 46 to 130 % on three arms.
+#: ``UNEXPLAINED`` for logs with a load, whose centre may be unknown. A warm UR5 with a known load
+#: has 36 %; exchanged joints give 46 to 130 % on three arms.
 UNEXPLAINED_LADEN = 0.5
-#: Least torque of a joint in these fractions, relative to the arm's largest. A joint about a
-#: vertical axis needs hardly any torque, but its torque sensor has the same error.
+#: Least denominator of these fractions, relative to the largest torque of the arm. A joint with a
+#: vertical axis needs little torque, but the error of its torque sensor is not smaller.
 FAINT = 0.05
-#: If the residual of a held-out log is the first multiple of the others', the arm may have carried
-#: a load. If much torque is unexplained as well, the second multiple is enough. On a UR10e the
-#: multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of eight, 1.2
-#: without a load, and 4.5 where the others move single joints only.
+#: If the residual of a held-out log is the first multiple of the median of all others, the arm may
+#: have carried a load. If much torque is unexplained as well, the second multiple is enough. On a
+#: UR10e the multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of
+#: eight, 1.2 without a load, and 4.5 if only single joints move in all other logs.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
 #: A given load is refused if the load that the torques show differs by more than this [kg] and by
 #: more than this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
 WRONG_LOAD = (0.8, 0.3)
-#: Largest product of two numbers of a joint: the unexplained fraction of its torque, and the 99 %
-#: quantile over the median of the unexplained torque. It is up to 1.8 in 20 free logs of five arms,
-#: and 4 to 9 in three logs of arms that were pushed.
+#: Limit of the burst measure of a joint: unexplained fraction of its torque, times 99 % quantile of
+#: the unexplained torque, divided by its median. The measure is at most 1.8 in 20 free logs of five
+#: arms, and 4 to 9 in three logs of arms that were pushed.
 BURSTS = 2.5
-#: A residual above its median counts less by this fraction of the largest torque that accelerations
-#: took within so long [s]. A KUKA whose commands jerk has 4.2 without this and 0.9 with it.
+#: A residual above its median is reduced by ``SWING`` times the largest torque of accelerations
+#: within ``SWINGS`` [s]. For a KUKA with jerky commands this reduces the measure from 4.2 to 0.9.
 SWING, SWINGS = 0.5, 0.1
-#: Least motion of a joint for this check [s], and number of times that a message lists.
+#: Least motion of a joint for the check of bursts [s], and number of times that a message lists.
 ENOUGH, SAID = 3.0, 6
 #: Least speed of a checked joint [rad/s]; below it static friction hides the torque.
 FAST_ENOUGH = 0.05
@@ -74,16 +74,16 @@ def residual_rms(arm: ArmModel, trace: Trace) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Unexplained:
-    """The torque of a log that a calibration does not explain; rows are samples."""
+    """The torque of a log that a calibration does not explain, one row per sample."""
 
     trace: Trace
-    left: Array  #: not explained [N m], shape (T, n)
-    torque: Array  #: [N m], shape (T, n)
+    left: Array  #: unexplained torque [N m], shape (T, n)
+    torque: Array  #: drive torque [N m], shape (T, n)
     moves: Bools  #: where a joint is fast enough to be judged, shape (T, n)
     swing: Array  #: largest torque of accelerations within :data:`SWINGS` [N m], shape (T, n)
 
     def beside_swings(self) -> Array:
-        """Sizes of ``left``, less where accelerations can explain them [N m], shape (T, n)."""
+        """``|left|``, reduced where accelerations can explain it [N m], shape (T, n)."""
         size = np.abs(self.left)
         least = np.zeros(size.shape[1])
         for j in np.flatnonzero(self.moves.any(axis=0)):
@@ -95,7 +95,7 @@ class Unexplained:
 def unexplained(arm: ArmModel, recordings: Mapping[str, Recording]) -> dict[str, Unexplained]:
     """The unexplained torque of each log in which some joint moves.
 
-    A load that is not known is tracked, so only what no load explains is left.
+    An unknown load is estimated, so the torque that a load can explain does not count.
 
     Args:
         arm: identified.
@@ -129,21 +129,21 @@ def _swing(arm: ArmModel, trace: Trace) -> Array:
 
 
 def _size(values: Array, rows: Bools) -> Array:
-    """Root of the sum of squares of each column over its rows, shape (n,)."""
+    """Root of the sum of squares of each column over the rows where ``rows`` is True, (n,)."""
     return np.asarray(np.sqrt((np.where(rows, values, 0.0) ** 2).sum(axis=0)))
 
 
 def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None:
-    """Refuse logs whose unexplained torque comes in bursts, as that of contacts does.
+    """Refuse logs whose unexplained torque comes in bursts, as the torque of contacts does.
 
-    Friction, loads and wrong numbers leave an error all along; contacts leave little between them.
+    Errors of friction, loads and inertia are there all the time; torques of contacts are not.
 
     Args:
         joints: names.
-        logs: by name, under a calibration from them, see :func:`unexplained`.
+        logs: by name, from :func:`unexplained` with a calibration from these logs.
 
     Raises:
-        ValueError: names each such log and the seconds.
+        ValueError: a log with bursts; names each of them and the times.
     """
     found = []
     for name, log in logs.items():
@@ -180,11 +180,11 @@ def explained(
 
     Args:
         joints: names.
-        logs: what the calibration leaves of them, see :func:`unexplained`.
-        limit: fraction of a joint's torque that may be left.
+        logs: from :func:`unexplained`.
+        limit: largest unexplained fraction of a joint's torque.
 
     Raises:
-        ValueError: more than ``limit`` of a joint's torque is left.
+        ValueError: a fraction above ``limit``.
     """
     left, torque, rows = np.zeros(len(joints)), np.full(len(joints), 1e-12), np.zeros(len(joints))
     for log in logs:
@@ -207,15 +207,14 @@ def explained(
 
 
 def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float] | None:
-    """Find the log with by far the largest held-out error, and its multiple of the others'.
+    """Find a log whose held-out residual is much larger than that of all other logs.
 
     Args:
         held: held-out residual of each log [N m], shape (n,) each.
-        least: how many times worse.
+        least: least ratio of the largest residual's norm to the median of all other norms.
 
     Returns:
-        Its index, and its residual over the median of the others'; None: fewer than three logs, or
-        none is ``least`` times as far off.
+        Index of the log, and this ratio. None: fewer than three logs, or a smaller ratio.
     """
     if len(held) < 3:
         return None
@@ -231,12 +230,12 @@ def check_loads(
     """Refuse a given load that the torques of its log do not show.
 
     Args:
-        arm: nominal numbers, and gains whose scale holds.
+        arm: nominal numbers, and drive gains of correct scale.
         recordings: by name, with the loads given.
-        data: of :func:`filtered_logs`.
+        data: from :func:`filtered_logs`.
 
     Raises:
-        ValueError: names the log, what was given and what its torques show.
+        ValueError: names the log, the given load and the load that the torques show.
     """
     logs = list(recordings.values())
     for k, (name, recording) in enumerate(recordings.items()):
@@ -249,8 +248,8 @@ def check_loads(
         shown = float(identify(arm, asked, data=own).loads[k, 0])
         if abs(shown - given) > max(WRONG_LOAD[0], WRONG_LOAD[1] * given):
             raise ValueError(
-                f"{name}: {given:g} kg were given, its torques show {shown:.1f} kg beside the "
-                "other logs: give the load that was carried, in kg, or =unknown"
+                f"{name}: {given:g} kg were given, its torques show {shown:.1f} kg compared with "
+                "the other logs: give the load that was carried, in kg, or =unknown"
             )
 
 
@@ -263,11 +262,11 @@ def left_out(
 ) -> list[Array]:
     """Residual RMS of each recording under a calibration from the other recordings [N m].
 
-    Each array has the shape (n,). If gains are identified, they come from all recordings. One set
-    of gains makes the figures of the recordings comparable. ``data``: as in :func:`identify`.
+    Each array has the shape (n,). If gains are identified, they come from all recordings, so that
+    the residuals of the recordings are comparable. ``data``: as in :func:`identify`.
 
     Raises:
-        ValueError: fewer than two recordings, or what :func:`identify` raises.
+        ValueError: fewer than two recordings, or as :func:`identify`.
     """
     if len(recordings) < 2:
         raise ValueError("one log alone cannot be held out: give two or more")
@@ -282,9 +281,10 @@ def left_out(
 
 
 def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
-    """A first guess of torque per ampere from the robot file's inertial numbers, shape (n,).
+    """Initial torque per ampere from the robot file's inertial numbers [N m/A], shape (n,).
 
-    Joints whose current does not follow the rigid-body torque get the median of the others.
+    If the current of a joint does not follow the rigid-body torque, the joint gets the median of
+    the joints whose current does.
 
     Raises:
         ValueError: no joint's current follows the torque: wrong joints, signs or units.

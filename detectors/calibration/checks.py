@@ -1,4 +1,4 @@
-"""Whether logs can come from the arm: signs and order of the currents, and the arm's weight."""
+"""Checks that logs fit the arm: signs and order of the currents, and the weight of the arm."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import LOG_GAIN, intervals, lagged, low_pass
 from tauguard.traces.trace import Trace
 
-#: Least speed of a checked joint, and speed over which its direction changes [rad/s].
+#: Least speed of a checked joint, and speed over which the sign of friction changes [rad/s].
 FAST, REVERSAL = 0.05, 0.05
 
-#: A joint's current has the wrong sign if its drag is below this number of deviations of the
-#: unexplained current. Three real arms have at least 0.6 in every log and 2 to 8 in most. A current
-#: with the other sign has the negative of that.
+#: A joint's current has the wrong sign if :func:`drag` is below this. It is at least 0.6 in every
+#: log of three real arms and 2 to 8 in most of them. The wrong sign changes only its sign.
 AGAINST = -1.0
 
 #: Least motion of a joint that is checked [s].
 ENOUGH = 3.0
 
-#: Gravity torque of the calibrated arm over the robot file's. The right files of three real arms
-#: give 0.9 to 1.5, files of the other two 0.2 to 0.5 and 1.9 to 6.5.
+#: Limits of the ratio of the calibrated arm's gravity torque to that of the robot file's arm. It is
+#: 0.9 to 1.5 for three real arms with the correct file, and 0.2 to 0.5 or 1.9 to 6.5 with the file
+#: of another of these arms.
 LIGHTEST, HEAVIEST = 0.55, 1.8
 
 
 def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
-    """Refuse a log in which a joint's torque drives its friction instead of being braked by it.
+    """Refuse a log in which friction would push a joint instead of braking it.
 
     Args:
-        arm: its gains' signs count.
+        arm: only the robot and the signs of the gains are used.
         logs: by name, collision-free.
 
     Raises:
@@ -54,10 +54,11 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
 
 
 def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> Array:
-    """The part of each joint's current that follows the direction of motion, shape (n,).
+    """The part of each joint's current that depends on the direction of motion, shape (n,).
 
-    The unit is the deviation of the current that neither this nor the rigid-body torque explains.
-    Friction gives a value above 0. NaN for a joint that moves for less than :data:`ENOUGH`.
+    It is divided by the standard deviation of the current that neither this part nor the rigid-body
+    torque explains. Friction gives a value above 0. NaN for a joint that moves for less than
+    :data:`ENOUGH`.
     """
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
     torque = low_pass(rate, dt, *momentum_terms(robot, trace.q, trace.qd))
@@ -76,29 +77,30 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     return found
 
 
-#: Two joints are exchanged if an exchange lowers the logarithm of the unexplained variance by this
-#: much in long logs. Right logs of four real arms give at most 0.04. Exchanged logs give 0.3 and
-#: more, except if all columns of the last two joints of a UR5 or UR3 are exchanged.
+#: Two joints count as exchanged if exchanging them lowers the logarithm of the unexplained variance
+#: by this much in long logs. It is at most 0.04 for correct logs of four real arms. It is 0.3 or
+#: more for exchanged joints, except if all columns of the last two joints of a UR5 or UR3 are
+#: exchanged.
 EXCHANGED = 0.25
 
-#: Length of all logs together below which the order is not checked, and from which
-#: :data:`EXCHANGED` holds as it is [s].
+#: Least total length of logs for the check of the order [s]. For a total length T the limit is
+#: ``EXCHANGED hypot(1, LONG / T)``.
 SHORTEST, LONG = 30.0, 60.0
 
-#: Interval of the samples by which the order is checked [s].
+#: Sample interval in the check of the order [s].
 THINNED = 0.02
 
 
 def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
-    """Refuse logs in which two joints' columns are in each other's place.
+    """Refuse logs in which the columns of two joints are exchanged.
 
-    Each joint's current is fitted by the joint's torque in the robot file's arm, the direction of
-    motion and the speed, with weights of at least 0, and an offset. The unexplained variances are
-    compared with those after an exchange of two joints' currents, or of all their columns. Only
-    joints that move for :data:`ENOUGH` are checked.
+    Each joint's current is fitted by an offset and, with weights of at least 0, by the joint's
+    rigid-body torque, the direction of motion and the speed. The unexplained variances are compared
+    with those after exchanging the currents, or all columns, of two joints. Only joints that move
+    for :data:`ENOUGH` are checked.
 
     Args:
-        arm: of the robot file; its gains' signs count.
+        arm: arm of the robot file; of the gains, only the signs are used.
         logs: by name, collision-free.
 
     Raises:
@@ -118,7 +120,7 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
 
 
 def _exchanges(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
-    """Exchanges of two joints: change of the logarithm of the unexplained variance, both, what."""
+    """Exchanges of two joints: change of log unexplained variance, first, second, what."""
     n, sign = arm.robot.joints, np.sign(arm.drive_gain)
     steps = [slice(None, None, max(1, round(THINNED / trace.dt))) for trace in traces]
     span = np.concatenate([moving_span(trace)[s] for trace, s in zip(traces, steps, strict=True)])
@@ -160,9 +162,9 @@ def _exchanges(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, 
 
 
 def _unexplained(x: Array, current: Array) -> float:
-    """Logarithm of the fraction of a current's variance that columns x and an offset leave.
+    """Logarithm of the fraction of a current's variance that x and an offset do not explain.
 
-    The columns' weights are at least 0. NaN if the joint moves too little.
+    The weights of the columns of x are at least 0. NaN if the joint moves too little.
     """
     from scipy.optimize import nnls
 
@@ -176,11 +178,11 @@ def _unexplained(x: Array, current: Array) -> float:
 
 
 def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
-    """Root mean square of the drives' torque divided by that of the log's columns [N m/A].
+    """RMS of the drive torques divided by the RMS of the logs' current columns [N m/A].
 
-    It is taken over all joints and samples, so the joints that carry the arm dominate. A wrist
-    joint, whose gain is hardly identifiable, has little influence. Joint torques given as currents
-    have 0.9 to 1.1, currents 4 to 16.
+    Both are over all joints and samples, so the joints that carry the arm dominate, and wrist
+    joints, whose gains are hardly identifiable, have little influence. The ratio is 0.9 to 1.1 if
+    the columns contain joint torques, and 4 to 16 if they contain currents.
     """
     current = np.concatenate([trace.current for trace in traces])
     torque = current * arm.drive_gain
@@ -192,8 +194,8 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
 
     Args:
         file: the numbers of the robot file.
-        found: those that were identified, with the scale of the torques given.
-        traces: for poses.
+        found: the identified numbers, from torques of known scale.
+        traces: their positions are used.
 
     Raises:
         ValueError: an arm of another weight.
@@ -215,18 +217,19 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
     )
 
 
-#: Fraction of unexplained torque above which a log is refused, and above which a note says so. A
-#: UR10e with published gains and friction leaves 0.1 to 0.2, with gains alone up to 0.53, with two
-#: joints exchanged 0.5 to 1.4, with another sign 1 to 1.9, in milliamperes 1.
+#: A log is refused if the unexplained fraction of the torque is above the first number; above the
+#: second it gets a note. For a UR10e the fraction is 0.1 to 0.2 with published gains and friction,
+#: at most 0.53 with gains alone, 0.5 to 1.4 with two joints exchanged, 1 to 1.9 with a wrong sign,
+#: and 1 in milliamperes.
 REFUSED, DOUBTED = 0.7, 0.4
 
-#: Torques are compared with at least this fraction of the arm's largest gravity torque. In a pose
-#: without gravity torque only friction is left.
+#: Least denominator of this fraction, relative to the arm's largest gravity torque, because in a
+#: pose without gravity torque the drives give only friction.
 STRENGTH = 0.4
 
 
 def drive_torque(arm: ArmModel, trace: Trace) -> Array:
-    """Torque of the drives at the joints without friction [N m], shape (T, n)."""
+    """Torque of the drives at the joints minus friction [N m], shape (T, n)."""
     tau: Array = trace.current * arm.drive_gain
     if arm.friction is None:
         return tau
@@ -248,14 +251,14 @@ def check_torques(
     Args:
         robot: the arm.
         trace: a log.
-        tau: torques at the joints less friction [N m], shape (T, n).
-        residual: what an observer makes of them [N m], shape (T, n).
-        rows: in which nothing touches the arm, shape (T,).
+        tau: torques at the joints minus friction [N m], shape (T, n).
+        residual: residual of an observer [N m], shape (T, n).
+        rows: rows in which nothing touches the arm, shape (T,).
         rate: rate of that observer [1/s].
-        touched: contacts may be in these rows after all.
+        touched: True if there can be contacts in these rows.
 
     Raises:
-        ValueError: more than ``REFUSED`` of the torque is left over.
+        ValueError: an unexplained fraction above ``REFUSED``.
     """
     if not rows.any():
         return ()

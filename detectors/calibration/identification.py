@@ -1,4 +1,4 @@
-"""Identification of a real arm from collision-free logs, and what fixes the scale of its torques.
+"""Identification of a real arm, with the scale of its torques, from collision-free logs.
 
 The residual of the nominal observer is linear in the errors of the inertial numbers and of the
 reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
@@ -6,10 +6,9 @@ and in the payloads. All pass through the detector's own causal filter, so no ac
 needed. The solution is restricted to bodies that can exist
 (:mod:`~tauguard.detectors.dynamics.physical_consistency`).
 
-Currents alone fix torques only up to a factor for each joint: if every gain, mass and friction
-shrinks by the same factor, every current is explained as well. So other information has to fix
-the scale. The regression predicts currents from torques; the other direction would favour a
-small scale.
+Currents determine torques only up to a factor: if all gains, masses and friction are scaled by the
+same factor, the currents do not change. So other information has to determine the scale. The
+regression predicts currents from torques, because the reverse would favour a small scale.
 """
 
 from __future__ import annotations
@@ -38,10 +37,10 @@ from tauguard.detectors.dynamics.physical_consistency import solve_physically_co
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers, mass_matrix
 from tauguard.detectors.estimation.estimator import ArmModel
 
-#: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
-#: that flattens at speed, and load-dependent friction. A torque per ampere that changes with the
-#: current is left out. It would explain the torque by itself: half of it or more on a UR5 and a
-#: UR3.
+#: Friction columns of a real geared joint: presliding of several lengths, Stribeck friction,
+#: viscous friction that saturates at high speed, and load-dependent friction. A torque per ampere
+#: that depends on the current is not included, because on a UR5 and a UR3 it would explain half of
+#: the torque or more by itself.
 REAL_FRICTION = FrictionModel(
     bristles=(),
     stops=(1e-3, 3e-3, 1e-2, 3e-2),
@@ -60,23 +59,23 @@ class Beliefs:
     centre: float = 0.02  #: of the centre of mass, each axis [m]
     inertia: float = 0.1  #: relative to the link's largest entry
     armature: float = 1.0
-    """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's
-    largest. Behind its gear, the rotor of a wrist has more inertia than everything that it
-    turns."""
-    gain: float = 0.5  #: relative, where gains are identified
+    """Relative to the largest value of the joint's diagonal entry of the mass matrix, or to a
+    twentieth of the arm's largest if that is more, because the reflected rotor inertia of a wrist
+    joint exceeds the inertia of the links that it moves."""
+    gain: float = 0.5  #: relative, if gains are identified
     friction: float = 0.3
-    """Deviation of most friction weights, relative to the joint's largest median torque of any log,
-    over the log or over the joint's own motion in it.
-    With this prior, columns that are alike at the logged speeds share the torque that they explain.
-    Without it they could cancel there and be large at other speeds."""
-    loaded: float = 0.3  #: of friction per load [1]
+    """Of most friction weights, relative to the joint's largest median torque of any log, over the
+    log or over the joint's own motion in it. With this prior, columns that are similar at the
+    logged speeds get similar weights. Without it, weights could be large with opposite signs, and
+    wrong at other speeds."""
+    loaded: float = 0.3  #: of load-dependent friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
-    payload: float = 5.0  #: of a load that is not given [kg]
-    moment: float = 0.5  #: of its first moment [kg m]
-    spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
-    softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
+    payload: float = 5.0  #: mass of an unknown load [kg]
+    moment: float = 0.5  #: first moment of an unknown load [kg m]
+    spread: float = 0.2  #: inertia of a load about the last link's origin [kg m^2]
+    softness: float = 5.0  #: a sample has the weight 1/softness^2, as model errors are not white
     evenness: float = 0.15  #: least error level of a joint, as a fraction of the largest
-    rest: float = 0.5  #: samples of a joint that has stood for longer do not count [s]
+    rest: float = 0.5  #: samples of a joint that has been at rest for longer are not used [s]
 
 
 BELIEFS = Beliefs()
@@ -84,7 +83,7 @@ BELIEFS = Beliefs()
 #: Motion of a joint in a log from which the joint's median torque in motion counts [s].
 TURNS = 1.0
 
-#: Rate of the filter that everything passes through [1/s].
+#: Rate of the filter of residual and columns [1/s].
 RATE = 20.0
 
 
@@ -94,15 +93,15 @@ class Identified:
 
     arm: ArmModel
     loads: Array
-    """Inertial numbers of what each recording carried, in the last link's frame: mass [kg], first
+    """Inertial numbers of the load of each recording, in the last link's frame: mass [kg], first
     moment [kg m], inertia [kg m^2], shape (recordings, 10)."""
-    rms: Array  #: of the residual on the recordings used [N m], shape (n,)
-    scale: str  #: "gains", "payload" or "masses": what fixed the scale of the torques
-    gain_error: Array  #: relative standard deviation of each gain, 0 where it was given, (n,)
-    notes: tuple[str, ...]  #: what a reader should know
+    rms: Array  #: root mean square of the residual on the recordings [N m], shape (n,)
+    scale: str  #: "gains", "payload" or "masses", see :func:`identify`
+    gain_error: Array  #: relative standard deviation of each gain, 0 if it was given, (n,)
+    notes: tuple[str, ...]  #: warnings for the user
     inertial_error: Array
-    """Standard deviations of the inertial numbers, shape (n, 10); NaN where the recordings halve
-    the prior's variance at most, so that the number is mostly the prior's."""
+    """Standard deviations of the inertial numbers, shape (n, 10). NaN if the recordings do not
+    reduce the variance of the prior to half, so that the prior dominates the number."""
 
 
 def _deviations(
@@ -167,19 +166,20 @@ def identify(
     data: Sequence[Filtered] | None = None,
     least: float = LEAST,
 ) -> Identified:
-    """Identify inertia, friction and, if something fixes their scale, the drive gains.
+    """Identify inertia, friction and, unless they are given, the drive gains.
 
     Args:
-        arm: what is believed; the gains are a start, or hold (``scale="gains"``).
-        recordings: collision-free logs of this arm, at least 10 s of motion in all.
-        scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
-            recording with a known load above 0 does) or "masses" (those of ``arm`` do).
-        friction: its columns.
-        data: of each recording, from :func:`filtered` (default: made here); only for "gains".
-        least: least motion [s]; less where longer logs were cut into these recordings.
+        arm: nominal arm. Its gains are kept with ``scale="gains"``, else they are initial values.
+        recordings: collision-free logs of this arm.
+        scale: what determines the scale of the torques: "gains" (of ``arm``), "payload" (a
+            recording with a known load above 0) or "masses" (of ``arm``).
+        friction: the friction columns.
+        data: from :func:`filtered_logs` (default: computed); only for "gains".
+        least: least total motion of the recordings [s]; smaller for parts of longer logs.
 
     Raises:
-        ValueError: another scale, no load to take it from, too little motion, or another arm's log.
+        ValueError: unknown ``scale``, "payload" without a known load, too little motion, or a log
+            of another arm.
     """
     _check(recordings, arm.robot, scale)
     check_length(recordings, least)
@@ -193,14 +193,14 @@ def identify(
 def filtered_logs(
     arm: ArmModel, recordings: Sequence[Recording], friction: FrictionModel = REAL_FRICTION
 ) -> list[Filtered]:
-    """What :func:`identify` takes as ``data``, for several calls with the same gains."""
+    """``data`` of :func:`identify`, for several calls with the same gains."""
     return [
         filtered(r, arm.robot, arm.drive_gain, friction, RATE, BELIEFS.rest) for r in recordings
     ]
 
 
 class Subsets:
-    """Calibrations from some of the recordings, whose columns are filtered once; gains hold."""
+    """Calibrations from subsets of recordings whose columns are filtered once, with given gains."""
 
     def __init__(
         self,
@@ -208,7 +208,7 @@ class Subsets:
         recordings: Sequence[Recording],
         data: Sequence[Filtered] | None = None,
     ) -> None:
-        """Take the nominal arm, with its friction if it has any, and all recordings.
+        """Filter all recordings, with the friction columns of ``arm`` if it has any.
 
         ``data``: as in :func:`identify`.
         """
@@ -217,10 +217,10 @@ class Subsets:
         self._data = data or filtered_logs(arm, recordings, self._friction)
 
     def __call__(self, use: Sequence[int], least: float = LEAST) -> ArmModel:
-        """The arm that the recordings of these numbers show.
+        """The arm identified from the recordings with these indices.
 
         Raises:
-            ValueError: as of :func:`identify`.
+            ValueError: as :func:`identify`.
         """
         own, data = [self._recordings[k] for k in use], [self._data[k] for k in use]
         return identify(self._arm, own, friction=self._friction, data=data, least=least).arm
@@ -230,16 +230,16 @@ def _identify_scale(
     arm: ArmModel, recordings: Sequence[Recording], scale: str, friction: FrictionModel
 ) -> Identified:
     """Identify the drive gains as well, see :func:`identify`."""
-    # A torque per ampere that changes with the current would explain a load, so it is left out
-    # while the scale is sought.
+    # A torque per ampere that depends on the current would explain a load, so it is left out
+    # while the scale is identified.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
     sought, error = _fit(arm, recordings, scale, constant, None, 6)
     unsure = error > 0.5 * BELIEFS.gain
     start = ArmModel(arm.robot, np.where(unsure, arm.drive_gain, sought.arm.drive_gain))
     found, _ = _fit(start, recordings, "gains", friction, None, 2)
     notes = tuple(
-        f"{arm.robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
-        f"{100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept, give it with --gains"
+        f"{arm.robot.joint_names[j]}: the logs do not determine the scale of its torques (gain "
+        f"known to {100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept; give --gains"
         for j in np.flatnonzero(unsure)
     )
     return replace(found, scale=scale, gain_error=error, notes=notes)
@@ -263,7 +263,7 @@ def _fit(
     level: Array = np.ones(robot.joints)
     known = [known_load(recording.load) for recording in recordings]
     loads = np.array(known)
-    # Gains scale the currents only: friction by the model's own load does not depend on them.
+    # Gains scale only the currents if friction depends on the model's load.
     rescaled = friction.modelled and not friction.saturation
     first: Sequence[Filtered] = ()
     for turn in range(rounds):
@@ -272,7 +272,7 @@ def _fit(
         elif not held:
             data = [d.with_gain(gain / arm.drive_gain) for d in first]
         first = first or data
-        if turn and friction.modelled:  # loads that were not given are known by now
+        if turn and friction.modelled:  # loads that were not given have an estimate now
             data = [
                 d if is_known(r) else filtered(r, robot, gain, friction, RATE, BELIEFS.rest, load)
                 for d, r, load in zip(data, recordings, loads, strict=True)
@@ -308,10 +308,7 @@ def _fit(
 
 
 def _spread(matrix: Array, deviations: Array, joints: int) -> Array:
-    """Standard deviations of the inertial numbers, shape (n, 10); NaN: the logs hardly show them.
-
-    A number is shown where the logs leave less than half of the variance of its prior.
-    """
+    """Standard deviations as ``Identified.inertial_error``, shape (n, 10)."""
     bodies = slice(INERTIAL * joints)
     found: Array = np.sqrt(np.diag(np.linalg.inv(matrix))[bodies])
     found[found**2 > 0.5 * deviations[bodies] ** 2] = np.nan

@@ -1,4 +1,4 @@
-"""The regression of identification: filtered columns of each recording, and normal equations."""
+"""The regression of the identification: filtered columns of recordings, and normal equations."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """Everything that the regression needs of one recording, after the observer's filter.
+    """The quantities of one recording in the regression, after the observer's filter.
 
-    The normal equations of each joint are stored: rounds of least squares, and calibrations that
-    leave one recording out, differ only in the weights of the joints.
+    The normal equations of each joint are cached. Rounds of least squares and calibrations without
+    one of the recordings change only the weights of the joints.
     """
 
-    torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
+    torque: Array  #: nominal rigid-body torque without payload [N m], (R, n)
     current: Array  #: gain times current [N m], (R, n)
     inertial: Array  #: (R, n, 10 n)
     armature: Array  #: (R, n)
@@ -37,11 +37,11 @@ class Filtered:
     weight: Array  #: of each row and joint, (R, n)
 
     def with_gain(self, factor: Array) -> Filtered:
-        """The same at gains that are ``factor`` times as large, (n,); friction is not scaled."""
+        """The columns with gains times ``factor``, shape (n,); friction is not scaled."""
         return replace(self, current=self.current * factor)
 
     def design(self, joint: int, known: Array, measured: bool = False) -> Array:
-        """Columns of one joint; ``known`` is the load that the torque scales with.
+        """Columns of one joint; ``known`` is the known load, shape (10,).
 
         ``measured``: see :class:`System`.
         """
@@ -57,12 +57,12 @@ class Filtered:
         )
 
     def target(self, joint: int) -> Array:
-        """The torque that the unknowns have to explain [N m], shape (R,)."""
+        """The drive torque minus the nominal rigid-body torque [N m], shape (R,)."""
         out: Array = self.current[:, joint] - self.torque[:, joint]
         return out
 
     def normal(self, joint: int, known: Array, measured: bool = False) -> tuple[Array, Array]:
-        """Normal equations of one joint with its rows' own weights, shapes (k, k) and (k,)."""
+        """Normal equations of one joint with ``weight``, shapes (k, k) and (k,)."""
         kept = self.__dict__.setdefault("_normal", {})
         key = joint, known.tobytes(), measured
         if key not in kept:
@@ -82,9 +82,10 @@ def filtered(
     rest: float = 0.5,
     load: Array | None = None,
 ) -> Filtered:
-    """Everything that the regression needs of a recording at these gains.
+    """The quantities of a recording in the regression, with these gains.
 
-    ``load`` is what it carries, shape (10,), for friction that depends on it (default: as given).
+    ``load``: inertial numbers of the load, for load-dependent friction, shape (10,) (default: those
+    of ``recording.load``).
     """
     trace = recording.trace
     held = None
@@ -105,7 +106,7 @@ def filtered_columns(
     held: Array | None = None,
     sampled: bool = False,
 ) -> Filtered:
-    """The same of any rows of a trace, thinned to 0.02 s.
+    """The quantities of given rows of a trace in the regression, thinned to intervals of 0.02 s.
 
     Args:
         trace: of the arm.
@@ -114,8 +115,8 @@ def filtered_columns(
         model: the columns of friction.
         rate: rate of the filter [1/s].
         used: which rows, shape (T,).
-        rest: a joint that has stood still for longer counts no more [s]; ``None``: it counts.
-        held: what load-dependent friction grows with [N m], shape (T, n).
+        rest: rows of a joint that has been at rest for longer get weight 0 [s]; ``None``: weight 1.
+        held: load of load-dependent friction [N m], shape (T, n).
         sampled: see :class:`~tauguard.detectors.Estimator`.
     """
     stride = max(1, round(4e-3 / trace.dt))
@@ -123,7 +124,7 @@ def filtered_columns(
     rows = count * stride
 
     def mean(x: Array) -> Array:
-        """Mean over a thinned interval, in which the drive torque acts throughout."""
+        """Mean over each thinned interval."""
         if sampled:
             x = (x + np.concatenate([x[1:], x[-1:]])) / 2
         out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
@@ -154,7 +155,7 @@ def filtered_columns(
 
 
 def _weights(trace: Trace, rest: float | None) -> Array:
-    """0 where a joint has stood still for ``rest`` seconds, else 1, shape (T, n)."""
+    """0 where a joint has been at rest for ``rest`` [s], else 1, shape (T, n)."""
     if rest is None:
         return np.ones_like(trace.q)
     needed = max(1, round(rest / trace.dt))
@@ -169,8 +170,8 @@ def body_deviations(robot: RobotNumbers, mass: float, centre: float, inertia: fl
     Args:
         robot: the arm's nominal numbers.
         mass: standard deviation of each link's mass, relative.
-        centre: of each centre of mass [m].
-        inertia: relative to the link's largest entry.
+        centre: standard deviation of each coordinate of the centre of mass [m].
+        inertia: standard deviation of the inertia, relative to the link's largest entry.
     """
     body = []
     for numbers in robot.inertial:
@@ -189,18 +190,18 @@ def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
 class System:
     """Normal equations over errors of inertia and armature, friction, gains and payloads.
 
-    ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``, and the gain of
-    a joint is that of the round divided by 1 + s. Gains with priors of a few percent may instead
-    scale the measured current, ``current (1 + s) = torque - ...``, and are then multiplied by 1
-    + s. Free gains may not: if all of them were small, the fit would seem good.
+    ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``. The joint's new
+    gain is the gain of this round divided by 1 + s. With ``measured``, the equation is
+    ``current (1 + s) = torque - ...``, and the new gain is the gain times 1 + s. This needs priors
+    of a few percent: with free gains the residual is smallest if all gains are near zero.
     """
 
     def __init__(
         self, robot: RobotNumbers, columns: int, recordings: int, measured: bool = False
     ) -> None:
-        """All zero, for a number of friction columns and of recordings.
+        """Set all to zero, for a number of friction columns and of recordings.
 
-        ``measured``: the error of a gain scales the measured torque.
+        ``measured``: errors of the gains scale the measured torque, see the class.
         """
         self.measured = measured
         self.n, self.c, self.count = robot.joints, columns, recordings
@@ -212,14 +213,14 @@ class System:
         self.vector = np.zeros(self.size)
 
     def places(self, joint: int, recording: int) -> NDArray[np.intp]:
-        """Which unknowns one joint's rows of one recording have."""
+        """Indices of the unknowns in one joint's rows of one recording."""
         own = np.arange(self.friction + joint * self.c, self.friction + (joint + 1) * self.c)
         load = self.load + INERTIAL * recording + np.arange(INERTIAL)
         body = np.arange(INERTIAL * self.n)
         return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
 
     def add(self, data: Filtered, recording: int, weight: Array, known: Array) -> None:
-        """Take up a recording; ``weight`` is one over each joint's error [1/(N m)], shape (n,)."""
+        """Add a recording; ``weight`` is one over each joint's error [1/(N m)], shape (n,)."""
         for joint in range(self.n):
             at = self.places(joint, recording)
             matrix, vector = data.normal(joint, known, self.measured)

@@ -1,8 +1,8 @@
-"""Draws from the distribution of a contact's force given a residual: how certain its size is.
+"""Impulse and peak force of a contact, with intervals from draws of the force given a residual.
 
-The mean force of :mod:`~tauguard.detectors.diagnosis.contact_force` hides how uncertain it may
-be: a force through the joints' axes turns no joint. Draws over points, scales and forces show
-this: if the size is not identifiable, they spread as far as the prior.
+A mean force does not show its uncertainty: a force whose line intersects the joint axes causes no
+torque. Draws of points, scales and forces do. If the force is not identifiable, the draws are
+spread as widely as the prior.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 from tauguard.report import two_digits
 
-#: Number of draws, and their seed: the same residual gives the same answer.
+#: Number of draws, and the seed, so that the same residual gives the same result.
 DRAWS, SEED = 600, 5
 
 
@@ -47,7 +47,7 @@ def force_draws(
         surface: its sampled surface.
         q: positions [rad], shape (n,).
         residual: estimate of tau_ext [N m], shape (n,).
-        noise: its standard deviation [N m], shape (n,).
+        noise: standard deviation of the residual [N m], shape (n,).
         probability: probability of a contact at each point of the surface, shape (K,).
         count: number of draws.
     """
@@ -60,7 +60,7 @@ def force_draws(
     point = poses.origin[link] + np.einsum("kij,kj->ki", turn, surface.point[chosen])
     inward = -np.einsum("kij,kj->ki", turn, surface.normal[chosen])
     columns = point_jacobians(robot, poses, link, point).transpose(0, 2, 1) / noise[:, None]
-    # Tangential parts are scaled by the friction, so that all forces in the cone are alike.
+    # Tangential parts are scaled by the friction, so that the prior of the force is isotropic.
     along = np.einsum("knj,kj->kn", columns, inward)
     columns = FRICTION * columns + (1 - FRICTION) * along[:, :, None] * inward[:, None]
     force = _drawn(columns, residual / noise, inward, rng)
@@ -97,7 +97,7 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
     covariance, mean, spread = covariance[rows, at], mean[rows, at], spread[rows, at]
     factor = np.linalg.cholesky(covariance)
     free = mean + np.einsum("kij,kj->ki", factor, rng.standard_normal(mean.shape))
-    # Draw the component along the normal again, above 0; shift the others by their correlation.
+    # Draw the normal component again, above 0; shift the tangential ones by their correlation.
     middle = np.einsum("ki,ki->k", mean, inward)
     most = ndtr(middle / spread)
     pressed = middle - spread * ndtri(np.maximum(rng.random(len(rows)) * most, 1e-300))
@@ -107,21 +107,21 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
     return drawn
 
 
-#: Fraction of the true values that the intervals are to hold.
+#: Probability that an interval contains the true value.
 COVERAGE = 0.9
 
-#: The torque is averaged over this number of lags to both sides before its peak is taken.
+#: The peak is that of the torque averaged over this number of lags before and after each sample.
 SMOOTHED = 0.3
 
-#: Of a long contact at the tool, the average is over this fraction of its time: joints that slip
-#: give peaks.
+#: For long contacts at the tool, the average is over this fraction of the contact's duration,
+#: because joints that slip cause peaks.
 LONG = 0.1
 
-#: The contact lasts while the torque is above this fraction of its peak.
+#: A contact is where the torque is above this fraction of its peak.
 CONTACT_FRACTION = 0.15
 
-#: Relative error (log) besides those of noise and point: changing directions, gains. Chosen on
-#: simulated arms and seeds that no study uses.
+#: Standard deviation of the force's logarithm besides noise and point: changing directions, errors
+#: of gains. Chosen on simulated arms and seeds that no study uses.
 SPREAD = 0.2
 
 #: If the ends of an interval differ by more than this factor, the size is not identifiable.
@@ -133,7 +133,7 @@ UNRESOLVED = 0.9
 
 @dataclass(frozen=True)
 class Interval90:
-    """An estimate and the interval that holds the true value with probability :data:`COVERAGE`."""
+    """An estimate and the interval that contains the true value with probability COVERAGE."""
 
     value: float  #: the median
     low: float
@@ -167,9 +167,9 @@ class ContactTorque:
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
     hidden: float  #: fraction of the duration that the samples do not resolve
-    goes_on: bool = False  #: the contact lasted at the end of the window
-    first: int = 0  #: row at which the contact begins
-    last: int = -1  #: and at which it ends
+    goes_on: bool = False  #: the contact had not ended at the end of the window
+    first: int = 0  #: first row of the contact
+    last: int = -1  #: last row of the contact
 
     @property
     def mean(self) -> Array:
@@ -188,8 +188,8 @@ class ContactTorque:
 
         Args:
             after: the residual.
-            smooth: fraction of the contact's time that is averaged over, if this is more than twice
-                the time that the lag asks for.
+            smooth: the torque is averaged over this fraction of the contact's duration, if that is
+                more than twice :data:`SMOOTHED` lags.
         """
         width, torque, top, along, first, last = _followed(after, 0.0)
         wider = smooth * float(after.t[last] - after.t[first])
@@ -238,15 +238,15 @@ def severity(
     moments: int,
     trust: Trust,
 ) -> Severity:
-    """Impulse and peak force, over all points that may have been touched.
+    """Impulse and peak force over all possible contact points.
 
     Args:
         robot: the arm.
         surface: its sampled surface.
         after: the residual around the alarm.
         belief: probability of the contact at each point.
-        moments: number of moments multiplied in `belief`; its root of that order is used, because
-            their errors are not independent.
+        moments: number of samples combined in ``belief``. The root of this order of the belief is
+            used, because the errors of the samples are not independent.
         trust: errors of a residual.
     """
     contact_torque = ContactTorque.of(after)
@@ -265,7 +265,7 @@ def severity(
 
 
 def _followed(after: PostAlarmWindow, least: float) -> tuple[float, Array, int, Array, int, int]:
-    """The torque averaged over ``least`` [s], its peak's row, first and last row of the contact."""
+    """Averaging time, averaged torque and its peak, first and last row of a contact."""
     width, torque = _without_lag(after, least)
     top = int(np.linalg.norm(torque / after.deviation, axis=1).argmax())
     along = torque @ (torque[top] / after.deviation[top] ** 2)
@@ -273,7 +273,7 @@ def _followed(after: PostAlarmWindow, least: float) -> tuple[float, Array, int, 
 
 
 def _without_lag(after: PostAlarmWindow, least: float) -> tuple[float, Array]:
-    """Time that is averaged over [s], and tau_ext without the observer's lag [N m], (M, n)."""
+    """Averaging time [s], and tau_ext without the observer's lag [N m], shape (M, n)."""
     dt = float(np.median(np.diff(after.t)))
     half = max(1, round(max(SMOOTHED * after.lag, least / 2) / dt))
     raw = after.residual + after.lag * np.gradient(after.residual, after.t, axis=0)

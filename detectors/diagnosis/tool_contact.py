@@ -1,10 +1,10 @@
-"""The force of a contact whose place is known: the tool, as in most handling and pushing.
+"""The force of a contact at the tool, where most contacts of handling and pushing are.
 
-If the place is known, the torques of six joints determine the three components of the force. The
-uncertainty is in the torques: friction of a joint at rest takes part of a push or, where the servo
-drives the joint back against the push, adds to it. The displacement since the contact began says
-which of the two (the joint is measured to 1e-5 rad, and friction turns around within 1e-4 rad);
-what friction was before is unknown. The prior of the force is a mixture of Gaussians of several
+The torques of six joints determine the three components of a force at a known point. The
+uncertainty is in the torques. Friction of a joint at rest takes up part of a push or, if the servo
+drives the joint back against the push, adds to it. The displacement since the contact began shows
+which of the two, because positions are measured to 1e-5 rad and friction reverses within 1e-4 rad.
+Friction before the contact is unknown. The prior of the force is a mixture of Gaussians of several
 sizes, weighted by their likelihood.
 """
 
@@ -27,16 +27,18 @@ from tauguard.detectors.diagnosis.severity import (
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.models.link_surface import LinkSurface
 
-#: Sizes of the force that the prior weighs equally [N].
+#: Equally likely standard deviations of the force in the prior [N].
 SIZES = np.geomspace(5.0, 400.0, 9)
-#: Standard deviations: of any joint [N m], of a torque relative to itself, of the friction of a
-#: joint at rest before the contact relative to its largest, of the drives' gains and levers (log).
-LEAST, OWN, HIDDEN, SCALE = 0.15, 0.05, 0.58, 0.15
-#: A joint that is slower is at rest [rad/s].
+#: Parts of a torque's standard deviation: of every joint [N m]; relative to the torque; for a joint
+#: at rest, relative to its largest friction.
+LEAST, OWN, HIDDEN = 0.15, 0.05, 0.58
+#: Standard deviation of the force's logarithm due to errors of gains and lever arms.
+SCALE = 0.15
+#: A joint slower than this is at rest [rad/s].
 AT_REST = 0.02
-#: The tool reaches so far [m]; number of places along it that are equally likely before.
+#: Length of the tool [m], and number of equally likely contact points along it.
 TOOL, PLACES = 0.2, 5
-#: Displacement over which friction at rest turns around [rad].
+#: Displacement over which friction at rest reverses [rad].
 PRESLIDING = 1e-4
 
 
@@ -45,12 +47,12 @@ def tool_severity(
 ) -> tuple[Severity, Array]:
     """Impulse and peak of a contact at the tool, and its mean force.
 
-    The tool is along the last joint's axis, up to :data:`TOOL` beyond the end of the last link.
+    The tool is on the last joint's axis, up to :data:`TOOL` beyond the end of the last link.
 
     Args:
         arm: with friction, if joints are geared.
         after: the residual around the alarm.
-        surface: of the last link, which says where it ends (default: at its joint).
+        surface: surface of the last link, to find its end (default: the end is at its joint).
 
     Returns:
         The severity, and the force on the arm at its peak, world frame [N], shape (3,).
@@ -66,12 +68,12 @@ def tool_severity(
     rest = (np.abs(after.qd[: row + 1]) < AT_REST).all(axis=0)
     friction = rest * (0.0 if arm.friction is None else arm.friction.coulomb())
     turned = friction * _turned(after.q)
-    turned = turned - rest * after.residual[0]  # what a joint at rest holds is no contact
+    turned = turned - rest * after.residual[0]  # of joints at rest before the contact
     peak = torque.peak + turned[row]
     mean = torque.mean + turned[torque.first : torque.last + 1].mean(axis=0)
     deviation = np.sqrt(LEAST**2 + (OWN * np.abs(torque.peak)) ** 2 + (HIDDEN * friction) ** 2)
     along = peak / deviation**2
-    # The first value and turned friction were taken off: the mean may be small or negative.
+    # Initial residual and friction are subtracted, so the mean may be small or negative.
     level = float(np.clip(mean @ along / max(float(peak @ along), 1e-12), CONTACT_FRACTION, 1.0))
     force = _draws(jacobians, peak, deviation)
     rng = np.random.default_rng((SEED, 2))
@@ -81,7 +83,7 @@ def tool_severity(
 
 
 def _turned(q: Array) -> Array:
-    """Friction of joints at rest, from -1 to 1 of its largest, 0 at first, shape (M, n).
+    """Change of friction of joints at rest, relative to the largest friction, shape (M, n).
 
     Args:
         q: positions [rad], shape (M, n).
@@ -95,10 +97,10 @@ def _turned(q: Array) -> Array:
 
 
 def _draws(jacobians: Array, torque: Array, deviation: Array) -> Array:
-    """Forces [N] that joint torques [N m] may come from, shape (DRAWS, 3).
+    """Draws of the force [N] given joint torques [N m], shape (DRAWS, 3).
 
     Args:
-        jacobians: of the places, shape (P, 3, n).
+        jacobians: Jacobians of the possible contact points, shape (P, 3, n).
         torque: shape (n,).
         deviation: deviation of the torques [N m], shape (n,).
     """

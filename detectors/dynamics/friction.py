@@ -1,7 +1,7 @@
 """A nominal friction model: presliding, Coulomb, Stribeck, viscous, load-dependent, ripple.
 
-It is linear in its weights, so that they can be identified by least squares, and rate-independent
-in its presliding part, so that a joint that stands still keeps the friction it came to rest with.
+The torque is linear in the weights, so that least squares can identify them. Presliding does not
+depend on the rate of motion, so that a joint at rest keeps the friction with which it stopped.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class FrictionModel:
     Columns: 1; qd; a Dahl bristle b for each settling length; a stop operator for each width;
     b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; ``|load| b``;
     ``|load| tanh(qd/w)`` for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c
-    of the joint; ``tau |tau|`` where ``saturation`` says so.
+    of the joint; ``tau |tau|`` with ``saturation``.
     """
 
     bristles: tuple[float, ...] = (1.5e-3, 3e-3)  #: settling lengths [rad]
@@ -33,17 +33,17 @@ class FrictionModel:
     loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
     saturation: bool = False  #: the torque per ampere changes with the current
     modelled: bool = False
-    """The load is the torque of gravity and inertia by the arm's model, not the torque of the
-    drive. If the drive's torque is mostly friction, friction would be predicted from itself, and
-    the torque of a contact would vanish in it."""
+    """The load is the model's torque of gravity and inertia instead of the drive torque. Load from
+    a drive torque that is mostly friction would predict friction from itself, and would count the
+    torque of a contact as friction."""
     cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
     play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
     weights: Array = field(default_factory=lambda: np.empty((0, 0)))
-    """Shape (n, columns); units follow from the columns' [N m per unit]."""
+    """Weights [N m per unit of the column], shape (n, columns)."""
 
     def __post_init__(self) -> None:
-        """Check the widths: ``ValueError`` names what is not above 0."""
+        """Check all fields: ``ValueError`` names the field."""
         for name in ("bristles", "stops", "stribeck", "slopes", "loaded"):
             widths = tuple(float(w) for w in getattr(self, name))
             if not all(np.isfinite(w) and w > 0 for w in widths):
@@ -64,13 +64,13 @@ class FrictionModel:
 
     @property
     def columns(self) -> int:
-        """How many weights a joint has."""
+        """Number of weights per joint."""
         groups = self.bristles, self.stops, self.stribeck, self.slopes, self.loaded
         return 3 + sum(map(len, groups)) + 2 * int(self.cycles.shape[1]) + int(self.saturation)
 
     @property
     def load_columns(self) -> slice:
-        """Which columns grow with the load."""
+        """Columns that are proportional to the load."""
         before = 2 + sum(map(len, (self.bristles, self.stops, self.stribeck, self.slopes)))
         return slice(before, before + 1 + len(self.loaded))
 
@@ -94,13 +94,13 @@ class FrictionModel:
     def evaluate(
         self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
     ) -> Array:
-        """The columns of every sample.
+        """The value of each column at each sample.
 
         Args:
             q: positions [rad], shape (T, n).
             qd: velocities [rad/s], shape (T, n).
             tau: drive torques [N m], shape (T, n).
-            load: torques that load-dependent friction grows with [N m], shape (T, n); default: tau.
+            load: load of load-dependent friction [N m], shape (T, n) (default: tau).
 
         Returns:
             Shape (T, n, columns).
@@ -115,7 +115,7 @@ class FrictionModel:
     def torque(
         self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
     ) -> Array:
-        """Friction torque [N m] of a motion, positive against positive velocity, shape (T, n)."""
+        """Friction torque of a motion [N m], shape (T, n); positive at positive velocity."""
         columns = self.evaluate(q, qd, tau, load)
         if self.weights.shape != columns.shape[1:]:
             raise ValueError(
@@ -126,17 +126,17 @@ class FrictionModel:
         return torque
 
     def coulomb(self, speed: float = 0.1, load: ArrayLike = 0.0) -> Array:
-        """Friction at ``speed`` [rad/s], the mean of both directions [N m], shape (n,).
+        """Mean of the friction in both directions at a speed [N m], shape (n,).
 
         Args:
             speed: [rad/s].
-            load: torque of the joints besides their friction [N m], shape (n,) or a number.
+            load: torque of the joints without friction [N m], shape (n,) or a number.
         """
         n = len(self.weights)
         q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)
         carried = 0 * q + np.asarray(load, dtype=np.float64)
         level: Array = np.zeros(n)
-        for _ in range(5):  # load-dependent friction counts the torque that overcomes friction
+        for _ in range(5):  # fixed point: the drive torque includes the friction
             there, back = (
                 self.torque(
                     sign * q,
@@ -153,13 +153,13 @@ class FrictionModel:
     def coulomb_viscous(
         cls, coulomb: ArrayLike, viscous: ArrayLike, load: ArrayLike = 0.0, width: float = 0.05
     ) -> FrictionModel:
-        """From published numbers: Coulomb friction as tanh(qd/width), viscous, load-dependent.
+        """A model from published coefficients of Coulomb, viscous and load-dependent friction.
 
         Args:
             coulomb: [N m], shape (n,).
             viscous: [N m s/rad], shape (n,).
-            load: friction per drive torque [1], a number or shape (n,).
-            width: [rad/s].
+            load: load-dependent friction per drive torque [1], a number or shape (n,).
+            width: Coulomb friction is ``coulomb tanh(qd / width)`` [rad/s].
         """
         level = np.asarray(coulomb, dtype=np.float64)
         model = cls(bristles=(), stops=(2e-3,), stribeck=(), slopes=(width,))

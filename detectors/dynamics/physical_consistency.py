@@ -1,9 +1,9 @@
 """Inertial numbers that a body can have, in coordinates without constraints.
 
-Ten inertial numbers belong to a body of positive density exactly if the pseudo-inertia, the 4 x 4
-matrix of its second moments, is positive definite (Wensing, Kim & Slotine 2018). Its Cholesky
-factor with the logarithms of its diagonal has ten free coordinates (Rucker & Wensing 2022), so that
-least squares over them needs no inequality.
+A body of positive density has ten given inertial numbers if and only if the pseudo-inertia, the
+4 x 4 matrix of second moments, is positive definite (Wensing, Kim & Slotine 2018). The entries of
+the Cholesky factor of this matrix, with logarithms of the diagonal ones, are ten unconstrained
+coordinates (Rucker & Wensing 2022), so that least squares needs no inequality.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def pseudo_inertia(inertial: Array) -> Array:
         inertial: mass, first moment (3), Ixx Ixy Iyy Ixz Iyz Izz, shape (10,).
 
     Returns:
-        Shape (4, 4): integrals of x x^T [kg m^2], of x [kg m], and the mass [kg].
+        Blocks: integral of x x^T [kg m^2], integral of x [kg m], mass [kg]; shape (4, 4).
     """
     m, h, (xx, xy, yy, xz, yz, zz) = inertial[0], inertial[1:4], inertial[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -39,7 +39,7 @@ def pseudo_inertia(inertial: Array) -> Array:
 
 
 def inertial_numbers(pseudo: Array) -> Array:
-    """The ten numbers of a pseudo-inertia: the inverse of :func:`pseudo_inertia`, and linear."""
+    """The ten numbers of a pseudo-inertia, the inverse of :func:`pseudo_inertia`; it is linear."""
     moments = pseudo[:3, :3]
     inertia = np.trace(moments) * np.eye(3) - moments
     rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
@@ -59,7 +59,7 @@ def _linear() -> Array:
 
 
 _LINEAR = _linear()
-#: Which entry of the Cholesky factor each coordinate is, shape (10, 4, 4).
+#: The entry of the Cholesky factor that each coordinate determines, shape (10, 4, 4).
 _UNIT = np.zeros((10, 4, 4))
 _UNIT[np.arange(10), _LOWER[0], _LOWER[1]] = 1.0
 
@@ -67,8 +67,8 @@ _UNIT[np.arange(10), _LOWER[0], _LOWER[1]] = 1.0
 def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
     """Log-Cholesky coordinates of ten numbers, shape (10,).
 
-    Impossible numbers are changed: eigenvalues of the pseudo-inertia below ``floor`` times their
-    block's scale are raised to it.
+    If no body has these numbers, they are changed: eigenvalues of the pseudo-inertia below
+    ``floor`` times the scale of their block are set to that value.
     """
     pseudo = pseudo_inertia(inertial)
     mass = max(float(pseudo[3, 3]), 1e-3)
@@ -88,15 +88,16 @@ def from_coordinates(theta: Array) -> tuple[Array, Array]:
         theta: coordinates of one body or of several, shape (..., 10).
 
     Returns:
-        Ten numbers each, shape (..., 10), and shape (..., 10, 10), whose column k belongs to
-        coordinate k.
+        Ten numbers per body, shape (..., 10), and their derivatives, shape (..., 10, 10). Column k
+        is the derivative by coordinate k.
     """
     entries = theta.copy()
     entries[..., _DIAGONAL] = np.exp(entries[..., _DIAGONAL])
     factor = np.zeros((*theta.shape[:-1], 4, 4))
     factor[..., _LOWER[0], _LOWER[1]] = entries
     numbers = np.einsum("irc,...rk,...ck->...i", _LINEAR, factor, factor)
-    # d(L L^T) = dL L^T + L dL^T, and the numbers of a matrix are those of its symmetric part.
+    # d(L L^T) = dL L^T + L dL^T. The numbers depend only on the symmetric part of a matrix, so
+    # both terms contribute equally.
     derivative = 2 * np.einsum("krc,...lc->...krl", _UNIT, factor)
     derivative = np.einsum("irl,...krl->...ik", _LINEAR, derivative)
     scale = np.ones_like(entries)
@@ -109,23 +110,23 @@ def solve_physically_consistent(
 ) -> Array:
     """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
 
-    The logarithm of each pseudo-inertia's determinant, a sum of coordinates, keeps bodies from
-    becoming flat if the data allow other shapes. The unknowns x are errors (assumed less true) of
-    all links' inertial numbers, then of the armatures, then of other quantities, which stay free.
+    The log det is that of each pseudo-inertia, which is a sum of coordinates. It keeps bodies from
+    becoming flat if the data allow other shapes. The unknowns x are errors (assumed value minus
+    true value) of all inertial numbers, then of the armatures, then of unconstrained quantities.
 
     Args:
         matrix: positive definite, priors included, shape (N, N), N >= 11 n.
         vector: shape (N,).
-        inertial: believed, shape (n, 10).
-        armature: believed [kg m^2], shape (n,).
-        rounds: Levenberg-Marquardt steps at most.
+        inertial: assumed inertial numbers, shape (n, 10).
+        armature: assumed armatures [kg m^2], shape (n,).
+        rounds: largest number of Levenberg-Marquardt steps.
 
     Returns:
         x, shape (N,): every ``inertial - x`` is consistent and every ``armature - x`` above 0.
     """
     n = len(inertial)
     body = 11 * n
-    # The free unknowns are eliminated: their minimum is linear in the others.
+    # Eliminate the unconstrained unknowns: at the minimum they are linear in all other unknowns.
     own = matrix[body:, body:]
     coupled = matrix[body:, :body]
     follows: NDArray[Any] = np.linalg.solve(own, np.column_stack([coupled, vector[body:]]))
@@ -136,7 +137,7 @@ def solve_physically_consistent(
 
 
 def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int) -> Array:
-    """Levenberg-Marquardt over the free coordinates; x of the bodies and armatures alone."""
+    """Levenberg-Marquardt over log-Cholesky coordinates; returns x of bodies and armatures."""
     n = len(inertial)
     start: NDArray[Any] = np.linalg.solve(matrix, vector)
     wanted = armature - start[10 * n :]
@@ -167,7 +168,7 @@ def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rou
 
 
 def _unknowns(state: Array, inertial: Array, armature: Array) -> tuple[Array, Array]:
-    """x of the free coordinates, and its derivative by them."""
+    """x for given log-Cholesky coordinates, and the derivative of x by them."""
     n = len(inertial)
     x, slope = state.copy(), np.zeros((len(state), len(state)))
     bodies, derivatives = from_coordinates(state[: 10 * n].reshape(n, 10))

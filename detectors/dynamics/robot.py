@@ -1,4 +1,4 @@
-"""The numbers of a robot that the native kernels take: a tree of one-degree joints in arrays."""
+"""The numbers of a robot for the native kernels: a tree of joints with one degree of freedom."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class RobotNumbers(Frozen):
 
     joint_names: tuple[str, ...]
     parent: NDArray[np.int64]  #: joint that carries joint i, -1 for the base, shape (n,)
-    prismatic: NDArray[np.bool_]  #: else revolute, shape (n,)
-    rotation: Array  #: joint axes to parent axes at q = 0, shape (n, 3, 3)
+    prismatic: NDArray[np.bool_]  #: False: revolute, shape (n,)
+    rotation: Array  #: rotation from the joint's frame to the parent's at q = 0, shape (n, 3, 3)
     translation: Array  #: joint origin in the parent's frame [m], shape (n, 3)
     axis: Array  #: unit joint axis in the link's frame, shape (n, 3)
     inertial: Array  #: see INERTIAL; inertia about the link's origin [kg m^2], shape (n, 10)
@@ -89,7 +89,7 @@ class RobotNumbers(Frozen):
         )
 
     def __deepcopy__(self, memo: object) -> RobotNumbers:
-        """Itself: it cannot change."""
+        """The object itself, because it is immutable."""
         return self
 
     def with_inertial(self, inertial: Array) -> RobotNumbers:
@@ -101,7 +101,7 @@ class RobotNumbers(Frozen):
         """The numbers of a ``pinocchio.Model``.
 
         Args:
-            model: a fixed base and joints of one degree of freedom each.
+            model: a fixed base, and joints with one degree of freedom each.
 
         Raises:
             ValueError: a joint of another kind; the message names it.
@@ -111,7 +111,7 @@ class RobotNumbers(Frozen):
             if model.joints[i].nv != 1:
                 raise ValueError(
                     f"joint {model.names[i]}: {model.joints[i].shortname()} has "
-                    f"{model.joints[i].nv} degrees of freedom; revolute and prismatic joints work"
+                    f"{model.joints[i].nv} degrees of freedom; expected revolute or prismatic"
                 )
         motions = [_motion_axis(model.joints[i]) for i in joints]
         return cls(
@@ -131,7 +131,7 @@ def _motion_axis(joint: Any) -> Array:
     """The joint's constant motion subspace (linear, angular), shape (6,)."""
     kind = joint.shortname()
     if "Helical" in kind or "Mimic" in kind:
-        raise ValueError(f"{kind}: revolute and prismatic joints work")
+        raise ValueError(f"{kind}: expected a revolute or prismatic joint")
     data = joint.createData()
     joint.calc(data, *_neutral(joint))
     subspace = np.asarray(data.S() if callable(data.S) else data.S, dtype=float)
@@ -181,7 +181,7 @@ def inverse_dynamics(
         q: positions [rad or m], shape (T, n).
         qd: velocities, shape (T, n).
         qdd: accelerations, shape (T, n).
-        threads: 0 takes all processors; the result does not depend on it.
+        threads: 0: all processors; the result does not depend on it.
 
     Returns:
         Torques [N m], forces [N] for prismatic joints, shape (T, n).
@@ -236,13 +236,13 @@ def momentum_regressor(
     count: int = INERTIAL,
     threads: int = 0,
 ) -> tuple[Array, Array]:
-    """p and beta per unit of the inertial numbers: linear, so ``p = P @ inertial`` (less armature).
+    """Derivatives of p and beta by the inertial numbers: ``p = P @ inertial + armature * qd``.
 
     Args:
         robot: the arm.
         q: positions [rad], shape (T, n).
         qd: velocities [rad/s], shape (T, n).
-        link: 0-based; only this link's numbers (default: all links').
+        link: 0-based; only the numbers of this link (default: of all links).
         count: with ``link``, only its first ``count`` numbers (4: mass and first moment).
         threads: 0 takes all processors; the result does not depend on it.
 
@@ -264,7 +264,7 @@ def momentum_regressor(
 
 
 def holding(robot: RobotNumbers, held: Collection[str]) -> RobotNumbers:
-    """The robot without the joints ``held``."""
+    """The robot with the joints ``held`` fixed."""
     kept: list[int] = []
     inertial: list[Array] = []
     parent: list[int] = []

@@ -1,9 +1,8 @@
-"""From measured signals to a residual that is small without a collision.
+"""Momentum observer with friction compensation, and a Kalman filter of the errors of the model.
 
-Friction compensation, momentum observer, and a Kalman filter for what the model does not know: a
-payload at the last link, and per joint a torque offset and the relative errors of viscous and
-Coulomb friction (temperature). The residual of a wrong model is linear in those unknowns, with
-columns that pass through the observer's own filter.
+The filter estimates a payload at the last link and, for each joint, a torque offset and relative
+errors of viscous and Coulomb friction, which change with temperature. The residual of the observer
+is linear in these unknowns; their columns pass through the observer's filter.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import PLAIN_GAIN, intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
 
-#: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
+#: Number of unknowns per joint: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3
 #: Rows of :attr:`Estimate.motion`.
 MOTION = 4
@@ -31,10 +30,10 @@ PAYLOAD = 4
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Priors of the unknowns: how far and how fast each may change.
+    """Priors of the unknowns, and settings of the filter.
 
-    Each unknown is an Ornstein-Uhlenbeck process: a standard deviation and a time constant. A
-    standard deviation of 0 leaves an unknown out.
+    Each unknown is an Ornstein-Uhlenbeck process with a standard deviation and a time constant. An
+    unknown with a standard deviation of 0 is not estimated.
     """
 
     payload: float = 2.0  #: mass [kg]
@@ -45,19 +44,19 @@ class Unknowns:
     slow: float = 60.0  #: time constant of payload and friction errors [s]
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0
-    """Innovations are clipped: one of z standard deviations, z above this c, counts c^2/z. The
-    standard deviation is that of noise and beliefs, without ``noise_inflation``."""
+    """Innovations of z standard deviations are replaced by c^2/z if z exceeds this c. The standard
+    deviation is that of noise and unknowns, without ``noise_inflation``."""
     every: float = 0.01  #: time between two corrections [s]
     noise_inflation: float = 1.0
-    """Number of successive corrections with the same error of the model (fewer in a log slower than
-    ``every``). The noise variance of a correction is multiplied by it. 1 treats successive
+    """Factor of the noise variance of a correction: the number of successive corrections with the
+    same model error. It is reduced for sample intervals above ``every``. 1 treats successive
     corrections as independent."""
     started: float = 0.0
-    """Motion of a joint before its first correction [s], because static friction may hold any
-    torque. 0: joints at rest also correct the unknowns."""
+    """Time that a joint has to move before its first correction [s], because static friction can
+    hold an unknown torque. 0: joints at rest are used, too."""
     transition: float = 0.0
-    """Relative error of friction that has just changed. With c_j the difference of friction from
-    its low-pass of 30/s [N m], (transition c_j)^2 is added to ``noise^2`` of a correction."""
+    """Relative error of friction that has just changed. With c_j the difference between friction
+    and friction filtered at 30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
     weighted: bool = False
     """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + s_j^2), with
     s_j the standard deviation that the uncertain payload gives it."""
@@ -71,12 +70,12 @@ class Unknowns:
 
     @classmethod
     def for_detection(cls) -> Unknowns:
-        """Settings for detectors: model errors last 0.2 s and are a tenth of a friction change."""
+        """Settings for detectors: errors last 0.2 s and are a tenth of a change of friction."""
         return cls(noise_inflation=20.0, transition=0.1, weighted=True)
 
     @classmethod
     def for_logs(cls, mass: float, moment: float) -> Unknowns:
-        """Settings for real arms, whose ``noise`` is 0.3 friction levels and lasts about 0.6 s.
+        """Settings for real arms, whose ``noise`` is 0.3 times the friction level for about 0.6 s.
 
         Args:
             mass: standard deviation of the load [kg].
@@ -120,7 +119,7 @@ class ArmModel:
     noise: Array | None = None  #: standard deviation of the residual without collision [N m], (n,)
     sensors: SensorNoise | None = None  #: fuses position and velocity; None: as measured
     noise_model: NoiseModel | None = None
-    """Standard deviation of the residual without collision, over the motion; None: ``noise``."""
+    """Standard deviation of the residual without collision, by motion. None: ``noise``."""
 
     def __post_init__(self) -> None:
         """Check shapes: ``ValueError`` names the field."""
@@ -143,22 +142,25 @@ class ArmModel:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimator's output for a trace; rows are samples."""
+    """The estimator's output for a trace, one row per sample."""
 
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
-    unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
+    unexplained: Array  #: part of the residual that no unknown explains [N m], shape (T, n)
     motion: Array
-    """What the noise grows with, shape (T, 4, n). 0 without unknowns, with the mass matrix M of arm
-    and tracked payload: the torque of accelerations, ``sum_k |M_jk qdd_k|`` (of velocities
-    differentiated at 30/s) [N m]; the norm of row j of M [kg m^2]; the largest change of the
-    joint's friction of late (forgotten with 0.3 s) [N m]. In a slow log (``sampled``) half the
-    change of the joint's torque since the last sample [N m], else 0."""
+    """Inputs of the noise model, shape (T, 4, n). All are 0 if nothing is unknown. M is the mass
+    matrix with the estimated payload. Rows, for joint j:
+
+    * ``sum_k |M_jk qdd_k|`` [N m], with qdd the velocity differentiated at 30/s;
+    * norm of row j of M [kg m^2];
+    * largest recent change of the joint's friction [N m], which decays in 0.3 s;
+    * with ``sampled``, half the change of the joint's torque since the last sample [N m], else 0.
+    """
     plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
 
 class Estimator:
-    """The estimator of one arm, in batch and online with equal bits."""
+    """The estimator of one arm, for whole traces or sample by sample with bit-equal results."""
 
     def __init__(
         self,
@@ -174,9 +176,9 @@ class Estimator:
             arm: the model.
             gain: rate of the observer [1/s], a number or one per joint.
             dt: sample interval [s]; intervals of single samples may differ.
-            unknowns: what to track (default: payload, offsets, friction).
-            sampled: for a slow log. Torque and friction between two samples are the mean of both;
-                without it those of a sample act until the next one.
+            unknowns: priors (default: payload, offsets and friction errors are estimated).
+            sampled: for low sample rates. Torque and friction between two samples are the mean of
+                both. If False, they are those of the earlier sample.
         """
         self.arm = arm
         self.dt = float(intervals(dt, 2)[0])
@@ -184,7 +186,7 @@ class Estimator:
         joints = arm.robot.joints
         friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
         assert arm.noise is not None
-        # With rarer corrections, an error of the model lasts for fewer of them.
+        # If corrections are less frequent, fewer of them have the same model error.
         rarer = max(1.0, self.dt / self.unknowns.every)
         self.native = _observer.Estimator(
             arm.robot.chain,
@@ -209,7 +211,7 @@ class Estimator:
     def run(
         self, t: ArrayLike, q: ArrayLike, qd: ArrayLike, current: ArrayLike, keep: bool = False
     ) -> Estimate:
-        """Estimate over a whole series, starting anew at its first sample.
+        """Estimate along a trace from the initial state.
 
         Args:
             t: times [s], shape (T,), or a constant interval.
@@ -229,7 +231,7 @@ class Estimator:
         return Estimate(*out, tracked if keep else None)
 
     def reset(self) -> None:
-        """Forget: the next sample is the first."""
+        """Return to the initial state: the next sample is the first."""
         self.native.reset()
 
     def step(

@@ -18,11 +18,11 @@ class NoiseModel:
     """The standard deviation of joint j's residual in free motion is
     a + b |qd_j| + c T_j + d |M_j| + e C_j + f S_j.
 
-    T_j is the torque of accelerations: inertia is known to some percent only. |M_j| is the norm of
-    the joint's row of the mass matrix, with the payload; it multiplies the noise of velocities. C_j
-    says how far the joint's friction has lately changed, as at starts, stops and turns. S_j is half
-    the change of the joint's torque between two samples of a slow log, since the torque in between
-    is taken to be their mean. T, M, C and S are the rows of
+    T_j is the torque of accelerations, as inertia is known only to a few percent. |M_j| is the norm
+    of row j of the mass matrix with the payload, which multiplies the noise of velocities. C_j is
+    the recent change of the joint's friction, as at starts, stops and reversals. S_j is half the
+    change of the joint's torque between two samples at low sample rates, where the torque between
+    them is assumed to be their mean. T, M, C and S are the rows of
     :attr:`~tauguard.detectors.Estimate.motion`.
     """
 
@@ -35,7 +35,7 @@ class NoiseModel:
         Args:
             residual: residual of free motion [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            motion: motion of the estimate, shape (T, 4, n).
+            motion: ``Estimate.motion``, shape (T, 4, n).
         """
         from scipy.optimize import nnls
 
@@ -48,12 +48,12 @@ class NoiseModel:
 
     @classmethod
     def constant(cls, scale: ArrayLike) -> NoiseModel:
-        """The same at every speed, shape (n,) [N m]."""
+        """A model whose standard deviation is ``scale`` in any motion [N m], shape (n,)."""
         level = np.asarray(scale, dtype=np.float64)
         return cls(np.column_stack([level, np.zeros((len(level), TERMS - 1))]))
 
     def at_least(self, scale: ArrayLike) -> NoiseModel:
-        """At rest no less than ``scale``, shape (n,) [N m]; what motion adds is as before."""
+        """The model with a standard deviation at rest of ``scale`` or more [N m], shape (n,)."""
         weights = self.weights.copy()
         weights[:, 0] = np.maximum(weights[:, 0], scale)
         return NoiseModel(weights)

@@ -1,7 +1,7 @@
-"""The rate of the momentum observer [1/s], for every use of it.
+"""The momentum observer, and its rate [1/s] for each use.
 
-A faster observer follows an impact sooner and passes more noise; a rate far above a fifth of the
-sampling rate brings no more. Each use states its reason here.
+A higher rate detects an impact earlier and passes more noise. A rate far above a fifth of the
+sample rate has no further benefit.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows, same_rows
 
-#: Reports, recordings and calls that name no rate.
+#: Default, for reports and recordings.
 PLAIN_GAIN = 100.0
 
-#: Detectors at a kilohertz and the diagnosis after their alarms: 5 ms of lag.
+#: Detectors at 1 kHz and the diagnosis of their alarms: a lag of 5 ms.
 DETECTION_GAIN = 200.0
 
-#: The environments' observer: its alarm must stay down over a control step's jumps.
+#: Environments: steps of the control signal must not raise an alarm.
 ENVIRONMENT_GAIN = 50.0
 
-#: Logs of real arms without training, from 100 Hz: what their friction allows.
+#: Logs of real arms at 100 Hz or more without training: errors of friction allow no higher rate.
 LOG_GAIN = 20.0
 
 
 def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
-    """``value`` as one positive number a joint, shape (joints,).
+    """``value`` as one positive number per joint, shape (joints,).
 
     Raises:
         ValueError: another shape, or a number that is not finite and above 0.
@@ -66,14 +66,14 @@ def intervals(t: ArrayLike, samples: int) -> Array:
 
 
 def low_pass(gain: ArrayLike, dt: Array, p: Array, beta: Array, tau: Array | None = None) -> Array:
-    """The observer's filter on given columns: r of dp/dt - tau - beta, shape (T, c).
+    """The observer's low-pass of ``dp/dt - tau - beta`` for each column, shape (T, c).
 
     Args:
         gain: rate of each column [1/s], shape (c,).
         dt: intervals [s], shape (T - 1,).
         p: shape (T, c).
         beta: shape (T, c).
-        tau: held over each step, shape (T, c); ``None``: zero.
+        tau: constant between samples, shape (T, c) (default: zero).
     """
     out = np.empty(p.shape)
     driven = np.empty((0, p.shape[1])) if tau is None else tau
@@ -97,14 +97,14 @@ def observe(
     *,
     threads: int = 0,
 ) -> Array:
-    """The residual of every sample; equal to :class:`MomentumObserver` fed sample by sample.
+    """The residual at every sample, equal to that of :class:`MomentumObserver`.
 
     Args:
         robot: the arm.
         t: times [s], shape (T,), or a constant interval [s].
         q: positions [rad], shape (T, n).
         qd: velocities [rad/s], shape (T, n).
-        tau: drive torques at the joints less what friction takes, as far as known [N m], (T, n).
+        tau: drive torques at the joints minus known friction [N m], shape (T, n).
         gain: observer rate [1/s], a number or one per joint.
         threads: 0 takes all processors; the result does not depend on it.
 
@@ -121,15 +121,15 @@ def observe(
 
 
 class MomentumObserver:
-    """The observer online: a few microseconds a sample."""
+    """The observer, sample by sample; a step takes a few microseconds."""
 
     def __init__(self, robot: RobotNumbers, gain: ArrayLike = PLAIN_GAIN, dt: float = 1e-3) -> None:
-        """Bind the numbers.
+        """A new observer.
 
         Args:
             robot: the arm.
             gain: observer rate [1/s], a number or one per joint.
-            dt: sample interval for steps that do not say theirs [s].
+            dt: default sample interval of :meth:`step` [s].
         """
         self.robot = robot
         self.gain = per_joint("gain", gain, robot.joints)
@@ -137,13 +137,13 @@ class MomentumObserver:
         self.native = _observer.Observer(robot.chain, self.gain)
 
     def reset(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | None = None) -> None:
-        """Start again from the sample ``(q, qd, tau)`` before the next step. The residual is zero.
+        """Set the residual to zero, and the last sample to ``(q, qd, tau)``.
 
         Args:
             q: positions [rad], shape (n,).
             qd: velocities [rad/s], shape (n,).
-            tau: drive torques held until the next sample [N m], shape (n,) (default: those that
-                leave the momentum as it is, gravity compensation at rest).
+            tau: drive torques until the next sample [N m], shape (n,) (default: torques that keep
+                the momentum constant, which at rest is gravity compensation).
         """
         n = self.robot.joints
         at, speed = rows("q", np.atleast_2d(q), n), rows("qd", np.atleast_2d(qd), n)
@@ -152,11 +152,11 @@ class MomentumObserver:
         self.native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
 
     def get_state(self) -> Array:
-        """Its state between two steps, for :meth:`set_state`, shape (1 + 4 n,)."""
+        """The observer's state between two steps, shape (1 + 4 n,)."""
         return np.array(self.native.state())
 
     def set_state(self, state: Array) -> None:
-        """Go back to what :meth:`get_state` gave.
+        """Restore a state of :meth:`get_state`.
 
         Raises:
             ValueError: a state of an arm with other joints.
@@ -171,12 +171,12 @@ class MomentumObserver:
         dt: float | None = None,
         out: Array | None = None,
     ) -> Array:
-        """The residual at this sample; the first call after construction resets and returns zero.
+        """The residual at this sample; the first call of a new observer resets it, returning zero.
 
         Args:
             q: positions [rad], float64, shape (n,).
             qd: velocities [rad/s], shape (n,).
-            tau: drive torques [N m], shape (n,); they count for the next step.
+            tau: drive torques [N m], shape (n,); they are used in the next step.
             dt: time since the last sample [s] (default: the constructor's).
             out: where to write the residual, shape (n,) (default: a new array).
 

@@ -1,7 +1,7 @@
 """Faults of samples, by the limits of an arm's usual samples.
 
-No model of the arm is needed. A frozen bus, a stuck encoder or a missing packet shows in the
-samples. A wrong gain or a swapped pair of currents does not; it looks like a contact.
+No model of the arm is needed to find a frozen bus, a stuck encoder or a missing packet. A wrong
+gain or two exchanged currents cannot be found in this way; they look like a contact.
 """
 
 from __future__ import annotations
@@ -20,25 +20,26 @@ from tauguard.traces.trace import Trace
 
 Counts = NDArray[np.int64]
 
-#: No arm's joint turns faster [rad/s]; degrees per second do.
+#: Largest speed of any arm's joint [rad/s]; speeds given in degrees per second exceed it.
 FASTEST = 20.0
 #: Time over which summed velocities are compared with the change of position [s].
 SPAN = 20e-3
-#: Fraction of a joint's travel that position and velocity may differ by: filters lag, time jitters.
+#: Allowed difference of summed velocity and change of position over SPAN, as a fraction of the
+#: former, because filters lag and time stamps jitter.
 FRACTION = 0.2
-#: The same over one sample: a time stamp may be half an interval late.
+#: Allowed fraction over one sample, because a time stamp may be half an interval late.
 STEP_FRACTION = 0.5
-#: Allowance beyond that fraction, as a multiple of the most that training shows.
+#: Allowed difference beyond these fractions, as a multiple of the largest in the training traces.
 MARGIN = 3.0
-#: Resolution that every encoder is allowed [rad], since training at rest may show none.
+#: Least allowed difference [rad]: an encoder's resolution, which training at rest may not show.
 RESOLUTION = 2e-4
 
-#: Samples in a row that may be missing before it is a gap; they are interpolated.
+#: Largest number of successive missing samples, which are interpolated; more of them are a gap.
 LATE = 2
-#: Intervals in a row that may be unlike training's, at least: this, or what SPAN holds of twice dt.
+#: Least value of :attr:`UsualInput.odd`.
 ODD = 3
 
-#: By the number of the native check's answer: a name, and a text with the joint and the value.
+#: Name and text of each fault, by the number that the native check returns.
 FAULTS: dict[int, tuple[str, str]] = {
     1: ("not-finite", "the position of {joint} is {value:g}"),
     2: ("not-finite", "the velocity of {joint} is {value:g}"),
@@ -63,25 +64,25 @@ class UsualInput:
     joint_names: tuple[str, ...]
     dt: float  #: sample interval [s]
     longest: float  #: longest interval that is not a gap [s]
-    odd: int  #: intervals in a row that may be other than ``dt`` by a quarter
-    repeats: int  #: samples in a row in which no signal changes
-    window: int  #: samples over which velocities are summed
+    odd: int  #: allowed number of successive intervals that differ from ``dt`` by a quarter
+    repeats: int  #: allowed number of successive samples in which no signal changes
+    window: int  #: number of samples over which velocities are summed
     current: Array  #: largest possible ``|current|`` [A], shape (n,)
-    step: Array  #: ``|change of q less qd dt|`` over one sample beyond FRACTION [rad], shape (n,)
-    drift: Array  #: the same over ``window`` samples [rad], shape (n,)
-    stuck: Counts  #: samples in a row with one joint's current unchanged, shape (n,)
-    ratios: Array  #: of torque given to torque needed, see ``torques.torque_ratios``, shape (3, n)
+    step: Array  #: largest ``|dq - qd dt|`` of a sample beyond STEP_FRACTION [rad], shape (n,)
+    drift: Array  #: largest ``|dq - sum qd dt|`` of a window beyond FRACTION [rad], shape (n,)
+    stuck: Counts  #: allowed number of successive samples with the same current, shape (n,)
+    ratios: Array  #: drive torque over torque needed, see ``torques.torque_ratios``, shape (3, n)
 
     @classmethod
     def of(cls, traces: Sequence[Trace], arm: ArmModel | None = None) -> UsualInput:
-        """Learn what is usual from these traces.
+        """Limits from training traces.
 
         Args:
-            traces: of training.
-            arm: calibrated; without it nothing is learned of the torques.
+            traces: training traces.
+            arm: calibrated arm (default: limits of the torques stay the general ones).
 
         Raises:
-            ValueError: no traces, or of fewer than two samples.
+            ValueError: no traces, or a trace of fewer than two samples.
         """
         if not traces or any(len(trace.t) < 2 for trace in traces):
             raise ValueError("no traces, or one of fewer than 2 samples: nothing to learn from")
@@ -96,7 +97,7 @@ class UsualInput:
                 round(SPAN / dt / 2) - 2,
                 *(2 * _longest_run(_odd(trace, dt)) + 3 for trace in traces),
             ),
-            # At least two, so that a packet that comes twice is not taken for a frozen bus.
+            # At least two, so that a repeated packet does not count as a frozen bus.
             2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
             window,
             _believable(traces, arm),
@@ -110,9 +111,9 @@ class UsualInput:
 def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
     """Largest current that is not a fault [A], shape (n,).
 
-    Three times the joint's largest current, or the current that gives three times the torque of
-    the arm's strongest joint. A joint that needs little torque, such as one about a vertical
-    axis, still feels a hard contact fully.
+    It is three times the joint's largest current plus 1 A or, if that is more, the current for
+    three times the torque of the arm's strongest joint. A hard contact can load a joint that
+    usually needs little torque, such as a joint with a vertical axis.
     """
     own = np.max([np.abs(trace.current).max(axis=0) for trace in traces], axis=0)
     gain = np.ones(len(own)) if arm is None else np.abs(arm.drive_gain)
@@ -120,10 +121,9 @@ def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
 
 
 def _beyond(trace: Trace, window: int) -> Array:
-    """Most that position and velocity differ by over ``window`` samples, beyond what is allowed.
+    """Largest difference of position and summed velocity over ``window`` samples [rad], shape (n,).
 
-    Allowed are a fraction of the travel and the effect of a late velocity or time stamp. Shape
-    (n,).
+    A fraction of the travel and the effect of a late velocity or time stamp are subtracted.
     """
     travel = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     error = np.diff(trace.q, axis=0) - travel
@@ -135,26 +135,26 @@ def _beyond(trace: Trace, window: int) -> Array:
 
 
 def _odd(trace: Trace, dt: float) -> NDArray[np.bool_]:
-    """Which intervals are other than ``dt`` by a quarter, shape (T - 1,)."""
+    """Whether each interval is outside of 0.8 to 1.25 times ``dt``, shape (T - 1,)."""
     ratio = np.diff(trace.t) / dt
     return np.asarray((ratio <= 0.8) | (ratio >= 1.25))
 
 
 def _sums(values: Array, window: int) -> Array:
-    """Sums over ``window`` rows, at the beginning over those that exist, shape (T - 1, n)."""
+    """Sums over the last ``window`` rows, fewer at the beginning, shape (T - 1, n)."""
     total = np.cumsum(values, axis=0)
     total[window:] -= total[:-window].copy()
     return np.asarray(total)
 
 
 def _same(trace: Trace) -> NDArray[np.bool_]:
-    """Which signals are those of the sample before, shape (T - 1, 3 n)."""
+    """Whether each signal equals that of the sample before, shape (T - 1, 3 n)."""
     signals = np.concatenate([trace.q, trace.qd, trace.current], axis=1)
     return np.asarray(signals[1:] == signals[:-1])
 
 
 def _stuck(trace: Trace) -> Counts:
-    """Longest run of an unchanged current a joint, doubled, plus 3, shape (n,)."""
+    """Twice the longest run of an unchanged current, plus 3, for each joint, shape (n,)."""
     same = trace.current[1:] == trace.current[:-1]
     return np.array([2 * _longest_run(column) + 3 for column in same.T], dtype=np.int64)
 
@@ -194,7 +194,7 @@ class FaultCheck:
         )
 
     def reset(self) -> None:
-        """Forget the samples so far."""
+        """Forget all samples."""
         self.native.reset()
 
     def step(self, t: float, q: Array, qd: Array, current: Array) -> str | None:

@@ -1,4 +1,4 @@
-"""Whether the currents can be those of this arm in this motion, as the samples come."""
+"""Checks sample by sample whether the motor currents fit the arm and its motion."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimator, Unknowns
 from tauguard.traces.trace import Trace
 
-#: Rate of the observer whose residual is looked at [1/s].
+#: Rate of the observer whose residual is used [1/s].
 RATE = 20.0
-#: A joint counts as noisy as this fraction of the noisiest at least: a load can turn the torque of
-#: a wrist around, but not that of a shoulder.
+#: Least noise of a joint, as a fraction of the largest of all joints. Without it a load, which can
+#: reverse the small torque of a wrist joint, would be a fault.
 FRACTION = 0.5
 #: A fast ratio below the first works against the motion; slow ones outside of the other two say
 #: another size. With loads and contacts in training, what those show beyond, and the margin.
@@ -29,15 +29,15 @@ TEXTS = {
 
 
 def torque_fault(names: Sequence[str], number: int, joint: int, value: float) -> str:
-    """What the native check says of torques, in words; ``names`` are the joints'."""
+    """The text of a fault that the native check returns; ``names`` are those of the joints."""
     return TEXTS[number].format(joint=names[joint], value=value)
 
 
 class TorqueCheck:
-    """Holds each joint's torque against what the arm's model needs, over 0.5 and 4 s.
+    """Compares each joint's drive torque with the torque that the model needs, over 0.5 and 4 s.
 
-    A contact changes the ratio of the two for as long as it lasts; one that drives a joint against
-    its own torque for half a second looks the same as a wrong sign.
+    A contact changes their ratio while it lasts. A contact that pushes a joint against its drive
+    torque for half a second looks the same as a wrong sign.
     """
 
     def __init__(self, arm: ArmModel, dt: float, ratios: Array | None = None) -> None:
@@ -46,7 +46,7 @@ class TorqueCheck:
         Args:
             arm: calibrated.
             dt: sample interval of steps [s].
-            ratios: what training showed, see :func:`torque_ratios` (default: nothing unusual).
+            ratios: of the training traces, see :func:`torque_ratios` (default: all 1).
         """
         seen = np.ones((3, arm.robot.joints)) if ratios is None else ratios
         bounds = (
@@ -63,13 +63,13 @@ class TorqueCheck:
         self._out = np.zeros((2 + MOTION, len(noise)))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> str:
-        """What is wrong with the torques at this sample, "" for nothing.
+        """The fault of the torques at this sample as text, "" without a fault.
 
         Args:
             q: [rad], float64, shape (n,).
             qd: [rad/s], shape (n,).
             current: [A], shape (n,).
-            dt: since the last sample [s] (default: the constructor's).
+            dt: time since the last sample [s] (default: the constructor's).
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite.
@@ -79,23 +79,24 @@ class TorqueCheck:
         return torque_fault(self._names, number, joint, value) if number else ""
 
     def reset(self) -> None:
-        """Forget the ratios so far: a contact has ended, which changed them."""
+        """Forget all samples, for example after a contact, which changes the ratios."""
         self.native.reset()
 
     @property
     def extremes(self) -> Array:
-        """Least fast, least slow and largest slow ratio so far, shape (3, n)."""
+        """Least ratio over 0.5 s, least and largest ratio over 4 s until now, shape (3, n)."""
         return np.array(self.native.extremes()).reshape(3, -1)
 
 
 def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:
-    """What traces show of the ratios of torque given to torque needed, shape (3, n).
+    """Extreme ratios of drive torque to torque needed in traces, shape (3, n).
 
-    The least over 0.5 s, the least and the largest over 4 s; 1 where nothing counted.
+    Rows: least over 0.5 s, least over 4 s, largest over 4 s. They are 1 for a joint whose torque
+    is always too small to be judged.
     """
     found = np.ones((3, arm.robot.joints))
     for trace in traces:
-        dt = trace.dt  # a median over the trace: asked once
+        dt = trace.dt  # a median over the trace: computed once
         check = TorqueCheck(arm, dt)
         residuals = check.observer.run(trace.t, trace.q, trace.qd, trace.current).residual
         for residual, current in zip(residuals, trace.current, strict=True):
