@@ -24,7 +24,7 @@ from tauguard.datasets.inspection import SplitSummary, summarised
 
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
 
-#: The card; the header is what the Hugging Face hub reads.
+#: The card, with the header of the Hugging Face hub.
 CARD_TEXT = """---
 license: {license}
 pretty_name: {name}
@@ -100,7 +100,7 @@ for trace in read(".", splits=["{first}"]):
     print(trace, trace.truth.collisions)
 ```
 
-## What it is for, and what not
+## Use and limits
 
 For training and comparing detectors of collisions, and estimators of contact force, from joint
 signals. Report results on the splits whose names begin with "test"; train a detector for each arm.
@@ -147,7 +147,7 @@ def describe(configuration: Configuration) -> str:
     arms = sorted({arm for split in configuration.splits for arm in split.arms})
     return (
         f"{configuration.hours:.4g} hours of simulated robot arms at work ({', '.join(arms)}), "
-        f"{configuration.rate} samples a second, with the exact onset, link, point, force and "
+        f"{configuration.rate} samples per second, with the exact onset, link, point, force and "
         "joint torque of every collision"
     )
 

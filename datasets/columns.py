@@ -83,7 +83,7 @@ class ColumnMap:
         columns += [] if self.t is None else [self.t]
         if (self.t is None) != (self.clock > 0):
             raise ValueError(
-                "columns: give t (the time's column) or clock (rows a second), not both"
+                "columns: give t (the time's column) or clock (rows per second), not both"
             )
         for column in columns:
             if isinstance(column, bool) or not isinstance(column, str | int):
@@ -139,7 +139,7 @@ class ColumnMap:
 
 @dataclass(frozen=True)
 class Reading:
-    """How logs are read: flags of every command that takes logs of a real arm."""
+    """Flags of all commands that read logs of a real arm."""
 
     mend: tuple[str, ...] = ()
     """units and repairs of CSV files: deg (angles in degrees), mA (currents), ms, us or ns (time),

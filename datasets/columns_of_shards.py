@@ -12,7 +12,7 @@ from tauguard.traces import Collision, Trace, Truth
 
 #: Signals of the joints: column ``q_1`` and so on, float32.
 JOINT_SIGNALS = ("q", "qd", "current", "q_des", "qd_des", "qdd_des", "tau_ext")
-#: The momentum observer's estimate, where the configuration asks for it.
+#: The momentum observer's estimate, if the configuration has ``residual = true``.
 RESIDUAL = "residual"
 #: Step to which a signal is rounded; this makes files a third smaller. A step is a power of two, so
 #: that float32 represents multiples exactly, and is below the resolution of the sensors (2e-6 rad,

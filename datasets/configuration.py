@@ -108,7 +108,7 @@ class Configuration:
         return next((r.joints for r in self.robots if r.name == arm), cura6.JOINTS)
 
     def source_of(self, arm: str) -> str:
-        """The name or file that :func:`tauguard.models.load_arm` takes for this arm."""
+        """The name or file of this arm, for :func:`tauguard.models.load_arm`."""
         return next((r.source for r in self.robots if r.name == arm), arm)
 
     def with_source(self, arm: str, source: str) -> Configuration:
@@ -156,8 +156,8 @@ def load(source: str | Path) -> Configuration:
             raise ValueError(f"{path}: not a text file; expected TOML") from None
     else:
         raise FileNotFoundError(
-            f"configuration {str(source)!r}: no such file{closest(str(source), NAMED)}; names that "
-            f"ship: {', '.join(NAMED)}"
+            f"configuration {str(source)!r}: no such file{closest(str(source), NAMED)}; named "
+            f"configurations: {', '.join(NAMED)}"
         )
     try:
         return parse(tomllib.loads(text), path.parent)

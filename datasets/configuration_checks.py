@@ -24,7 +24,7 @@ class Key:
 
 
 def refuse(key: str, value: Any, expected: str) -> NoReturn:
-    """Raise ``ValueError`` with the key, its value and what would work."""
+    """Raise ``ValueError`` with the key, its value and the expected values."""
     shown = repr(value)
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
     raise ValueError(f"{key} = {shown}: expected {expected}")
@@ -217,7 +217,7 @@ KEYS: dict[str, dict[str, Key]] = {
     "top": {
         "name": Key(text, "the dataset's name"),
         "seed": Key(integer(0, 2**62), "a whole number, 0 to 2^62"),
-        "rate": Key(rows_a_second, "rows a second that divide 1000", 1000),
+        "rate": Key(rows_a_second, "rows per second that divide 1000", 1000),
         "episodes_per_shard": Key(integer(1, 1000), "a whole number, 1 to 1000", 10),
         "residual": Key(flag, "true or false", False),
         "objects": Key(text, "a TOML file that lists objects around the arm", ""),

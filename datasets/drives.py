@@ -24,7 +24,7 @@ class DriveNumbers:
 # gains up to 50 % higher: identify your own arm's gains if you can.
 UR10E = DriveNumbers(gain=(10.0, 10.70, 8.46, 9.00, 9.48, 10.12))
 # Ratio of the target torques to the target currents of a UR5's controller, by least squares over
-# its logs. The last joint's gain is not identifiable; its drive is that of the joint before.
+# its logs. The last joint's gain is not identifiable; the last two joints have the same drive.
 UR5 = DriveNumbers(gain=(12.0, 10.6, 11.1, 9.9, 10.3, 10.3))
 DRIVES = {"ur10e": UR10E, "ur5": UR5}
 

@@ -19,7 +19,7 @@ from tauguard.traces import Trace
 if TYPE_CHECKING:
     from tauguard.detectors import RobotNumbers
 
-#: Extensions of the files that :func:`read` takes for recordings.
+#: Extensions of recordings.
 ENDINGS = (".mcap", ".csv", ".parquet")
 
 

@@ -173,7 +173,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
 
 
 def _refuse_parts(time: str, t: Array, header: Sequence[str]) -> None:
-    """Raise ``ValueError`` for whole seconds that repeat beside a column of nanoseconds."""
+    """Raise ``ValueError`` if the time is whole seconds, and another column is nanoseconds."""
     rest = [name for name in header if (_unit(name, _SECONDS) or 1.0) < 1e-3 and name != time]
     known = t[np.isfinite(t)]
     if rest and (known == np.floor(known)).all() and (np.diff(known) == 0).any():

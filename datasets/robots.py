@@ -35,7 +35,7 @@ class RobotSource:
 
 
 def find_robot(asked: str, folder: Path) -> RobotSource:
-    """The arm that a configuration in ``folder`` asks for.
+    """The arm ``asked`` (name or file) of a configuration in ``folder``.
 
     Raises:
         ValueError: no such arm, one that cannot be used, or a file name that is not allowed.

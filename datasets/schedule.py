@@ -101,7 +101,7 @@ def dealt(values: Sequence[T], seed: list[int], number: int) -> T:
 
 
 def _fraction(fraction: float) -> tuple[bool, ...]:
-    """At most 20 values for :func:`dealt`, of which this fraction is True."""
+    """A list of at most 20 values for :func:`dealt`, with this fraction of True."""
     part = Fraction(fraction).limit_denominator(20)
     yes, no = part.numerator, part.denominator - part.numerator
     return (True,) * yes + (False,) * no
@@ -114,13 +114,13 @@ def _collisions(
     before = (
         draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
     )
-    cards = range(before * split.collisions, (before + 1) * split.collisions)
+    numbers = range(before * split.collisions, (before + 1) * split.collisions)
     return collision_plans(
         rng,
         split.collisions,
-        strata=[dealt(split.severities, [*seed, 9], card) for card in cards],
-        kinds=[dealt(split.kinds, [*seed, 7], card) for card in cards],
-        links=[dealt(split.links, [*seed, 8], card) for card in cards],
+        strata=[dealt(split.severities, [*seed, 9], number) for number in numbers],
+        kinds=[dealt(split.kinds, [*seed, 7], number) for number in numbers],
+        links=[dealt(split.links, [*seed, 8], number) for number in numbers],
         clamp_seconds=split.clamp_seconds,
     )
 
@@ -150,12 +150,12 @@ def _stated(configuration: Configuration, split: Split) -> Balance:
         counts.update({value: (fold - 1) * n for value, n in counts.items()})
     levels = [_level(low, high) for low, high in split.severities]
     links = [str(link) for link in split.links]
-    for name, values, card in (
+    for name, values, stream in (
         ("kind", split.kinds, 7),
         ("link", links, 8),
         ("severity", levels, 9),
     ):
-        found[name] = _dealt_counts(values, [*seed, card], struck * split.collisions)
+        found[name] = _dealt_counts(values, [*seed, stream], struck * split.collisions)
     return {
         name: {value: counts[value] for value in sorted(counts, key=class_order)}
         for name, counts in found.items()

@@ -61,7 +61,7 @@ def _home_inertia(scene: Scene) -> Array:
     return np.asarray(np.diag(mass)[scene.dof_adr])
 
 
-# Native code replaces this clock while it steps, because reading it takes time.
+# Native code replaces this clock while it steps, because reading a clock takes time.
 _plant.set_clock(variable_address("mjcb_time"))
 
 

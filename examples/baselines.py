@@ -125,7 +125,7 @@ def baselines(task, files=(), robot="cura6"):
 
 
 def play(task, name, episodes, first=0, files=(), **keywords):
-    """Success, targets, reward, force over limit and cost [N s], a row per episode."""
+    """Success, targets, reward, force over limit and cost [N s], one row per episode."""
     act, more, wrapper = baselines(task, files)[name]
     keywords = KEYWORDS | more | keywords
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""The moving picture of the README: an arm is struck, the residual rises, the alarm comes.
+"""The moving picture of the README: a ball hits an arm, the residual rises, the alarm starts.
 
     python examples/moving_picture.py [PICTURE.gif]
 

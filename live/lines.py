@@ -27,7 +27,7 @@ class LineStream(Closing):
         self.joint_names, self.rate = tuple(joint_names), rate
         self.events: list[str] = []
         self._file, self._pending, self._lines = stream, b"", 0
-        self._ready = selectors.SelectSelector()  # others refuse files
+        self._ready = selectors.SelectSelector()  # epoll refuses files
         self._ready.register(stream, selectors.EVENT_READ)
 
     def read(self, timeout: float) -> Sample | None:

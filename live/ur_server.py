@@ -41,7 +41,7 @@ class UrServer(Closing):
         packets: the packets to send, of six joints.
         port: the port to serve; 0: any free port (see :attr:`port`).
         version: the only protocol version that is accepted.
-        controller: major version of the controller; 5 and up sends up to 500 samples a second.
+        controller: major version of the controller; 5 and up sends up to 500 samples per second.
 
     Raises:
         ValueError: the number of joints is not six, or the port cannot be opened.

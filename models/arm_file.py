@@ -23,7 +23,7 @@ STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
 #: Branches at the end of a chain are a gripper if the chain has at least the first number of joints
 #: and each branch at most the second, but no more than the chain.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
-#: After a chain of at least that many joints, a joint whose name matches is a gripper, with all
+#: After a chain of GRIPPER_FROM joints or more, a joint whose name matches is a gripper, with all
 #: joints below it.
 _GRIPPER = re.compile(r"grip|finger|jaw|knuckle|claw", re.IGNORECASE)
 #: Usual names of a tool frame, the likeliest first.

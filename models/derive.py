@@ -1,4 +1,4 @@
-"""Derive the numbers that a robot file does not state; each rule has its reason beside it."""
+"""Derive the numbers that a robot file does not state; comments give the reason of each rule."""
 
 import mujoco
 import numpy as np

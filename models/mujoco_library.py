@@ -12,7 +12,7 @@ def library() -> ctypes.CDLL:
     """The loaded library.
 
     Raises:
-        OSError: there is none beside the binding.
+        OSError: the folder of the Python binding has no library.
     """
     folder = Path(mujoco.__file__).parent
     names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]

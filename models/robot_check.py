@@ -89,7 +89,7 @@ def _check_names(path: Path) -> None:
 
 
 def _inside(robot: Path, folder: Path, where: Path, name: str) -> Path:
-    target = (where / name.replace("\\", "/")).resolve()  # MuJoCo takes both for a separator
+    target = (where / name.replace("\\", "/")).resolve()  # both separate folders in MuJoCo
     if not target.is_relative_to(folder):
         raise ValueError(f"{robot}: names {name!r}, a file outside its folder {folder}")
     return target

@@ -45,7 +45,7 @@ def trial(what):
     try:
         exec(work, {"mujoco": mujoco, "what": what, "os": os, "signal": signal})
     except ValueError as error:
-        if "allocate" in str(error):  # refused for the limit of memory, not for what it says
+        if "allocate" in str(error):  # refused because of the memory limit
             raise
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 print("ready", flush=True)

@@ -139,7 +139,7 @@ class Scene:
 
 
 def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
-    """Compile what ``spec`` lists.
+    """Compile the scene that ``spec`` describes.
 
     Args:
         spec: parts and settings of the scene.
@@ -215,7 +215,7 @@ def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
-    """Add everything listed beside the arm; returns the names of the obstacles."""
+    """Add all parts other than the arm; returns the names of the obstacles."""
     whole = arm.spec
     obstacles: dict[str, Obstacle] = {}
     if spec.payload:

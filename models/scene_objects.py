@@ -87,8 +87,8 @@ class SceneObject:
     """Rows of time [s] and position [m], from 0 on; after the last row it repeats. It replaces
     ``position``."""
     belt: Vector | None = None
-    """Velocity of a conveyor's surface in the object's frame [m/s]. The object does not move; what
-    lies on it does."""
+    """Velocity of a conveyor's surface in the object's frame [m/s]. The object itself does not
+    move, but carries parts that lie on it."""
     mass: float = 1.0  #: mass of a free or held object [kg]
     stiffness: float = 1e5  #: of its contact with the arm [N/m]
     damping: float = 100.0  #: of its contact with the arm [N s/m]

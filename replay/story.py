@@ -66,7 +66,7 @@ def cut(
 def page(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = (), about: str = ""
 ) -> str:
-    """The text beside the views, in Markdown: the events, then an explanation of the views."""
+    """The text next to the views, in Markdown: the events, then an explanation of the views."""
     lines = [f"## {about}", ""] if about else []
     if trace.truth is not None:
         lines += collision_table(trace, detection, explained)

@@ -56,7 +56,9 @@ constexpr double clearance = 0.005;    // distance of palms and arms from barrie
 constexpr double climb = 0.6;          // speed at which a hand that a barrier stops rises [m/s]
 constexpr double highest_climb = 0.6;  // largest rise of such a hand [m]
 constexpr double descend = 0.2;        // speed at which the hand comes down again [m/s]
-constexpr double patience = 2.0;       // before a walk: time to take hands back, else its delay [s]
+// Before a walk the person takes both hands back [s]. If they are not back after this time, the
+// next attempt begins as much later.
+constexpr double patience = 2.0;
 
 inline double minimum_jerk(double u) {
   u = std::min(std::max(u, 0.0), 1.0);

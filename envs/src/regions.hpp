@@ -13,17 +13,17 @@
 
 namespace tauguard::envs {
 
-// A body region in the scene; its ids are -1 if it has no joint (held in place).
+// A body region in the scene; `joint`, `qpos` and `dof` are -1 if it is held in place.
 struct Region {
   int body = -1, joint = -1, qpos = -1, dof = -1;
-  int mocap = -1;                          // mocap frame of a person's part; -1: of no person
+  int mocap = -1;                          // mocap id of a person's capsule; -1: no person's
   bool held = false;                       // cannot move away
-  int sensor = -1;                         // address of its ten contact numbers
+  int sensor = -1;                         // address of its contact sensor's ten numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no impact is allowed
   double span = 0;                         // distance from its origin at which it turns back [m]
   double speed = 0;                        // its speed when it turns back [m/s]
   double area = 0;                         // area of the robot's contact surface [cm^2]; 0: unknown
-  double least_pressure = 0;  // pressure of a flat surface, if the area is unknown [N/cm^2]
+  double least_pressure = 0;  // pressure of a flat contact surface, for an unknown area [N/cm^2]
   double stiffness = 0;       // stiffness of its contact [N/m]
   double touching = 0;        // duration of the present contact [s]
   double force = 0;           // at the last physics step [N]
@@ -52,7 +52,7 @@ struct Touched {
 struct Contact {
   double force = 0;         // peak net force on a link [N]
   double cost = 0;          // impulse beyond the regions' limits [N s]
-  double ratio = 0;         // peak of a region's force over its limit
+  double ratio = 0;         // peak ratio of a region's force to its limit
   double region_force = 0;  // peak force on a region [N]
   int link = 0;             // 1-based, of the peak force; 0: none
   int region = 0;           // 1-based, of the peak ratio; 0: none

@@ -72,7 +72,7 @@ def test_the_twin_has_15_slices_of_7_minutes_and_65_collisions_a_speed():
         ("episodes = 4", "episodes = true", "episodes = True"),
         ("episodes = 4", "seconds = 60", r"splits\[0\]\.episodes: missing"),
         ("seed = 1", "seed = -1", "seed = -1: expected a whole number, 0 to"),
-        ("seed = 1", "seed = 1\nrate = 300", "rate = 300: expected rows a second that divide 1000"),
+        ("seed = 1", "seed = 1\nrate = 300", "rate = 300: expected rows per second"),
         ('["cura6"]', '["cura7"]', r"splits\[0\]\.arms: arm 'cura7': no such .*mean cura6\?"),
         ('["cura6"]', "[6]", "arms = .*expected a list of cura6, cura6-small"),
         ("episodes = 4", "episodes = 4\nlinks = [7]", r"links = \(7,\): expected 1 to 6, links"),
