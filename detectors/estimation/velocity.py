@@ -1,8 +1,8 @@
 """The noise of positions and velocities, and the joint velocity estimated from both.
 
-At a kilohertz most of a residual without a collision is the noise of the velocity, times the
-inertia and the observer's rate. Positions are measured far better than velocities. A Kalman filter
-of both gives a velocity with a fraction of the noise and, for a steady acceleration, no lag.
+At 1 kHz, most of a residual without a collision is velocity noise times inertia times the
+observer's rate. Positions are measured more precisely than velocities. A Kalman filter of both
+gives a velocity with less noise and, at constant acceleration, without lag.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.traces.trace import Trace
 
-#: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows an impact sooner,
-#: lower passes less noise.
+#: Random walk of the acceleration in the filter [rad/s^2 per root second]. A larger value detects
+#: an impact earlier, a smaller one passes less noise.
 AGILITY = 4.0
-#: At longer sample intervals the measured velocity is used [s].
+#: Largest sample interval for the filter [s]; above it, the measured velocity is used.
 SLOWEST = 2.5e-3
 
 
 @dataclass(frozen=True, eq=False)
 class SensorNoise:
-    """Standard deviations of what is measured, one per joint."""
+    """Standard deviations of the measured positions and velocities, one per joint."""
 
     position: Array  #: [rad], shape (n,)
     velocity: Array  #: [rad/s], shape (n,)
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError`` names what is not above 0 or differs in length."""
+        """Check: ``ValueError`` for values that are not above 0, or different lengths."""
         for name in ("position", "velocity"):
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.ndim != 1 or not (np.isfinite(value).all() and (value > 0).all()):
@@ -45,12 +45,12 @@ class SensorNoise:
         """Estimate the noise from third differences, which are almost 0 for smooth motion.
 
         Args:
-            traces: of one arm at one rate; each of 4 samples or more.
+            traces: traces of one arm at one rate, each of 4 samples or more.
         """
 
         def level(name: str, floor: float) -> Array:
             squares = [np.diff(getattr(t, name), 3, axis=0) ** 2 for t in traces]
-            # Medians of a trace's pieces: impacts and steps in some pieces do not count.
+            # With the median over pieces, impacts and steps in some pieces have no effect.
             pieces = np.concatenate(
                 [
                     [p.mean(axis=0) for p in np.array_split(s, max(1, len(s) // 500))]
@@ -63,7 +63,7 @@ class SensorNoise:
         return cls(level("q", 1e-9), level("qd", 1e-6))
 
     def fusion_gains(self, dt: float) -> list[float]:
-        """Steady Kalman gains, six a joint: of q, qd and qdd by each of the two innovations.
+        """Steady-state Kalman gains of q, qd and qdd for both innovations, six per joint.
 
         Args:
             dt: sample interval [s].
@@ -75,7 +75,7 @@ class SensorNoise:
         ]
 
 
-@lru_cache(maxsize=1024)  # a Riccati equation, asked again at every reset of a detector
+@lru_cache(maxsize=1024)  # every reset of a detector needs the same Riccati equation
 def _joint_gains(position: float, velocity: float, dt: float) -> tuple[float, ...]:
     """The six gains of a joint whose encoder and tachometer have this noise [rad], [rad/s]."""
     from scipy.linalg import solve_discrete_are
@@ -83,7 +83,7 @@ def _joint_gains(position: float, velocity: float, dt: float) -> tuple[float, ..
     move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
     see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
     push = AGILITY * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
-    # In units of the noise, so that the equation is well scaled.
+    # In units of the noise, the equation is well conditioned.
     scale = np.diag([1 / position, 1 / velocity, dt / velocity])
     back = np.linalg.inv(scale)
     a, c = scale @ move @ back, see @ back

@@ -22,8 +22,8 @@ def upper_quantile(
 ) -> Array:
     """Coefficients c >= 0 so that ``x @ c`` is about the quantile of ``y``.
 
-    They minimise the pinball loss plus ``weight @ |c - prior|``, so coefficients without data keep
-    the prior. The linear programme is solved in its dual, which has few constraints.
+    They minimise the pinball loss plus ``weight @ |c - prior|``, so coefficients without data equal
+    the prior. The dual of the linear programme is solved, because it has few constraints.
 
     Args:
         x: at least 0, shape (R, k).
@@ -37,14 +37,14 @@ def upper_quantile(
         Shape (k,).
 
     Raises:
-        ValueError: the programme has no solution: numbers that are not finite.
+        ValueError: the programme has no solution, because numbers are not finite.
     """
     from scipy.optimize import linprog
 
     k, stride = x.shape[1], max(1, -(-len(y) // rows))
     x, y = x[::stride], y[::stride]
-    # max a (y - x prior) - m prior over a in [-(1 - quantile), quantile] stride and m >= 0 with
-    # |x^T a + m| <= pull; c - prior is what its constraints cost.
+    # Maximise a (y - x prior) - m prior over a in [-(1 - quantile), quantile] stride and m >= 0,
+    # with |x^T a + m| <= pull. The multipliers of this constraint are c - prior.
     columns = np.vstack([x, np.eye(k)]).T
     pull = np.maximum((1 - quantile) * weight, 1e-9)
     each = (-(1 - quantile) * stride, quantile * stride)
@@ -62,21 +62,22 @@ def upper_quantile(
     return coefficients
 
 
-#: Bound at rest: deviations of the noise, and multiples of the friction level.
+#: The bound at rest is the larger of NOISE standard deviations and REST friction levels.
 NOISE, REST = 6.5, 0.12
 
-#: Additions to bounds: by motion of any joint to that at rest, by a contact to that of a joint that
-#: it turned, and by a start to that in motion.
+#: Additions to a bound, in friction levels: to the bound at rest by motion of any joint; to the
+#: bound of a joint that a contact turned; to the bound in motion by a start.
 STOP, TURNED, START = 1.2, 0.6, 1.0
 
-#: The bound in motion over the 99 % quantile of left-out residuals, and its least value.
+#: The bound in motion is MARGIN times the 99 % quantile of left-out residuals, at least LEAST
+#: friction levels.
 MARGIN, LEAST = 1.7, 0.6
 
-#: Prior of that quantile, in friction levels per 1, rad/s, own and largest acceleration [rad/s^2],
-#: and slowness, exp(-|qd| / CREEP).
+#: Prior coefficients of that quantile [friction levels], for 1, |qd| [rad/s], |qdd| of the joint
+#: and largest |qdd| of all joints [rad/s^2], and exp(-|qd| / CREEP), the slowness.
 PRIOR = np.array([0.3, 0.02, 0.05, 0.03, 0.3])
 
-#: A friction level from T seconds of motion is widened by hypot(1, this / T).
+#: A friction level from T seconds of motion is multiplied by hypot(1, WIDENING_SECONDS / T).
 WIDENING_SECONDS = 40.0
 
 #: Motion of a joint [s] above a speed [rad/s] at which its own friction counts half.
@@ -87,7 +88,7 @@ KNOWN_SECONDS, FULL_SPEED = 4.0, 0.05
 SHOWN_SECONDS, BEYOND, ANYWHERE = 1.0, 0.1, 1e6
 _ENDS = ("min", "max")
 
-#: Quantile of the logs' gravity torques at which the friction level is taken.
+#: Quantile of a joint's gravity torques in the logs for which the friction level is computed.
 LOADED = 0.9
 
 
@@ -95,22 +96,23 @@ LOADED = 0.9
 class Bound:
     """Bound of one arm's residual in collision-free motion, at rest and while joints move."""
 
-    friction: Array  #: level of each joint's error in motion [N m], shape (n,)
-    static: Array  #: friction that may hold each joint at rest [N m], shape (n,)
-    noise: Array  #: deviation of the residual of a joint at rest [N m], shape (n,)
+    friction: Array  #: friction level, the unit of each joint's error in motion [N m], shape (n,)
+    static: Array  #: friction level of each joint at rest [N m], shape (n,)
+    noise: Array  #: standard deviation of the residual of a joint at rest [N m], shape (n,)
     quantile: Array
-    """99 % of the residual in motion [N m per 1, rad/s, rad/s^2, rad/s^2, 1], shape (n, 5)."""
+    """Coefficients of the 99 % quantile of the residual in motion, see :data:`PRIOR`
+    [N m per 1, rad/s, rad/s^2, rad/s^2, 1], shape (n, 5)."""
     low: Array
-    """Least position of joints that move in no log [rad], -ANYWHERE for others, shape (n,)."""
-    high: Array  #: their largest position, ANYWHERE for others
-    fast: Array  #: speed that the logs show, :data:`ANYWHERE` for any [rad/s], (n,)
-    hard: Array  #: the same of the acceleration [rad/s^2], (n,)
+    """Least position of joints that move in no log, -ANYWHERE for all other joints [rad], (n,)."""
+    high: Array  #: largest position of these joints, ANYWHERE for all other joints [rad], (n,)
+    fast: Array  #: speed that the logs reach, :data:`ANYWHERE` if unlimited [rad/s], (n,)
+    hard: Array  #: acceleration that the logs reach, ANYWHERE if unlimited [rad/s^2], (n,)
     scale: Array
-    """Factors from held-out logs on the prior bounds: at rest, added by motion, and in motion,
-    shape (3, n)."""
+    """Factors from held-out logs on the bound at rest, on the addition by motion, and on the bound
+    in motion, shape (3, n)."""
 
     def __post_init__(self) -> None:
-        """Refuse speeds or accelerations of which no multiple is a number: no alarm would come."""
+        """Refuse ``fast`` and ``hard`` that are not finite or not above 0: ``ValueError``."""
         for name in ("fast", "hard"):
             own = getattr(self, name)
             if not (np.isfinite(own) & (own > 0)).all():
@@ -118,7 +120,7 @@ class Bound:
 
     @classmethod
     def prior(cls, friction: Array, static: Array, low: Array, high: Array) -> Bound:
-        """The bound to start from, before it is fitted to recordings."""
+        """The bound before it is fitted to recordings."""
         return cls(
             friction,
             static,
@@ -133,7 +135,7 @@ class Bound:
 
     @property
     def shown(self) -> Bools:
-        """Which joints' motion the logs show, shape (n,)."""
+        """Whether each joint moves in the logs, shape (n,)."""
         return self.high >= ANYWHERE
 
     @property
@@ -145,18 +147,18 @@ class Bound:
 
     @property
     def stop(self) -> Array:
-        """What motion of any joint adds to the bound at rest [N m], shape (n,)."""
+        """Addition to the bound at rest by motion of any joint [N m], shape (n,)."""
         added: Array = STOP * self.scale[1] * self.static
         return added
 
     @property
     def start(self) -> Array:
-        """What a start adds to the bound in motion [N m], shape (n,)."""
+        """Addition to the bound in motion by a start of the joint [N m], shape (n,)."""
         return START * self.static
 
     @property
     def moving(self) -> Array:
-        """Bound in motion per 1, |qd_j|, |qdd_j|, the largest |qdd| and slowness, (n, 5)."""
+        """Coefficients of the bound in motion, ordered as ``quantile``, shape (n, 5)."""
         bound: Array = MARGIN * self.scale[2][:, None] * self.quantile
         return bound
 
@@ -168,13 +170,13 @@ class Bound:
 
 
 def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Array, Array]:
-    """The units of a joint's bounds, in motion and at rest [N m], shapes (n,).
+    """Friction levels in motion and at rest, the units of a joint's bounds [N m], shapes (n,).
 
-    At rest it is the joint's friction at 0.1 rad/s under the gravity torque in the logs; without
-    that torque, a joint that carries the arm would count as one with half its friction. In motion
-    it is the same, or 1.5 times the error if that is larger. Both are widened by
-    hypot(1, 40 s / T) for T seconds of motion. A joint's own friction has the weight
-    T_j / (T_j + 4 s), and the arm's largest friction has the rest.
+    At rest, the level is the joint's friction at 0.1 rad/s under the gravity torque in the logs.
+    Without that torque, a joint that carries the arm could have half its friction. In motion, the
+    level is the same, or 1.5 times the error if that is larger. Both are multiplied by
+    hypot(1, 40 s / T) for T seconds of motion. Both are weighted means of the joint's own level,
+    with the weight T_j / (T_j + 4 s), and the arm's largest level.
     """
     n = arm.robot.joints
     error = 1.5 * np.asarray(arm.noise)
@@ -197,7 +199,7 @@ def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Arr
 
 
 def motion_seconds(recordings: Sequence[Recording]) -> Array:
-    """How long each joint moved faster than :data:`FULL_SPEED` [s], shape (n,)."""
+    """Time for which each joint moved faster than :data:`FULL_SPEED` [s], shape (n,)."""
     own = [(np.abs(r.trace.qd) > FULL_SPEED).sum(axis=0) * r.trace.dt for r in recordings]
     return np.asarray(np.sum(own, axis=0), dtype=np.float64)
 
@@ -213,13 +215,11 @@ def standing_positions(recordings: Sequence[Recording]) -> tuple[Array, Array]:
 #: Rate of the observer [1/s].
 FREE_GAIN = 30.0
 
-#: Error of the model in motion, in friction levels: the noise of the estimator.
+#: Error of the model in motion, in friction levels; it is the noise of the estimator.
 ERROR = 0.3
-
-#: A joint slower than this [rad/s] for a while is at rest.
+#: Largest speed of a joint at rest [rad/s].
 SLOW = _observer.REGIME_SLOW
-
-#: Slowness of a joint falls to 1/e at this speed [rad/s].
+#: Speed at which the slowness of a joint is 1/e [rad/s].
 CREEP = _observer.REGIME_CREEP
 
 
@@ -228,8 +228,8 @@ def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMo
 
     Args:
         arm: calibrated, with friction.
-        bound: of its joints.
-        load: how uncertain the carried load is.
+        bound: bound of its joints.
+        load: uncertainty of the load.
     """
     unknowns = Unknowns.for_logs(load.mass, load.moment)
     believed = replace(arm, noise=ERROR * bound.friction, sensors=None)

@@ -1,9 +1,9 @@
-"""The calibrated arm, its estimator and noise model; residuals in standard deviations.
+"""The calibrated arm with estimator and noise model, and residuals in standard deviations.
 
-Scaling decides whether the SVR works: raw residuals in N m have a median distance near 100, which
-makes the matrix of a kernel of length sigma = 3 almost diagonal. Each joint's residual is divided
-by its standard deviation, compressed by asinh (a hard impact must stay within the region of the
-training data) and multiplied by one factor.
+The SVR needs scaled residuals: residuals in N m have a median distance near 100, at which the
+matrix of a kernel of length sigma = 3 is almost diagonal. Each joint's residual is divided by its
+standard deviation, compressed by asinh, so that hard impacts stay within the region of the training
+data, and multiplied by a factor.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Scaling(Frozen):
 
     joints: tuple[int, ...]  #: 0-based
     noise_model: NoiseModel | None = None  #: None: ``factor residual`` in N m
-    units: float = 1.0  #: standard deviations that count one
+    units: float = 1.0  #: number of standard deviations with the scaled value 1
     factor: float = 1.0
-    compress: bool = False  #: by asinh
+    compress: bool = False  #: compress by asinh
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
@@ -59,7 +59,7 @@ class Scaling(Frozen):
         Args:
             residual: [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            motion: of the estimate, shape (T, 4, n).
+            motion: ``Estimate.motion``, shape (T, 4, n).
         """
         found = np.empty((len(residual), len(self.joints)))
         self._native.rows(residual, qd, motion, found)
@@ -67,14 +67,14 @@ class Scaling(Frozen):
 
 
 class NativeStream:
-    """The scores of one recording as its samples come in.
+    """The scores of one recording, computed sample by sample.
 
     Attributes:
-        native: what gives them.
+        native: the C++ stream.
     """
 
     def __init__(self, native: _observer.Scores, dt: float) -> None:
-        """Take the native stream and the interval of steps that do not say theirs [s]."""
+        """Keep the native stream and the default interval of steps [s]."""
         self.native, self._dt = native, dt
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
@@ -97,29 +97,33 @@ class NativeStream:
             ) from None
 
 
-#: One sample in so many seconds of collision-free motion is enough to fit a noise model.
+#: Interval of the collision-free samples that a noise model is fitted to [s].
 THIN = 5e-3
 
 
 @dataclass(frozen=True)
 class FrontEndSettings:
-    """How the residual is estimated."""
+    """Settings of the estimation of the residual."""
 
     gain: float = DETECTION_GAIN  #: of the observer [1/s]
-    adapt: bool = True  #: track payload, offsets and friction errors
-    settle: float = 3.0  #: until the payload is found [s]
-    joints: tuple[int, ...] = (1, 2, 3, 4)  #: that are used, 1-based; those that exist
+    adapt: bool = True  #: estimate payload, offsets and friction errors
+    settle: float = 3.0  #: time until the payload is estimated [s]
+    joints: tuple[int, ...] = (
+        1,
+        2,
+        3,
+        4,
+    )  #: used joints, 1-based; missing ones are left out
     calibrate: bool = True  #: identify friction, inertia and gains from the collision-free motion
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
         """Identify the arm and its noise model from the collision-free rows.
 
-        The last result for these settings is kept while its traces live: methods with equal
-        settings use the same.
+        The last result is cached as long as the traces exist, for methods with equal settings.
 
         Raises:
-            ValueError: traces that do not fit, or without collision-free motion, or joints that
-                do not exist.
+            ValueError: traces of different arms or rates, or without collision-free motion, or no
+                joint of ``joints`` exists.
         """
         given = (*traces, arm)
         known, found = _FITTED.get(self, ((), None))
@@ -169,12 +173,12 @@ class FrontEndSettings:
 
 @dataclass(frozen=True, eq=False)
 class FrontEnd(Frozen):
-    """A fitted front end: from a trace to the residual that the model does not explain."""
+    """A fitted front end, which computes the unexplained residual of a trace."""
 
     gain: float  #: of the observer [1/s]
-    adapt: bool  #: track payload, offsets and friction errors
-    settle: float  #: [s]
-    joints: tuple[int, ...]  #: that are used, 0-based
+    adapt: bool  #: estimate payload, offsets and friction errors
+    settle: float  #: time until the payload is estimated [s]
+    joints: tuple[int, ...]  #: joints that are used, 0-based
     arm: ArmModel  #: calibrated
     dt: float  #: sample interval [s]
 
@@ -186,12 +190,12 @@ class FrontEnd(Frozen):
             raise ValueError(f"joints {self.joints}: expected some of 0 to below the arm's number")
 
     def estimator(self) -> Estimator:
-        """A fresh estimator of this arm."""
+        """A new estimator of this arm."""
         unknowns = Unknowns.for_detection() if self.adapt else Unknowns.none()
         return Estimator(self.arm, self.gain, self.dt, unknowns, sampled=self.dt > SLOWEST)
 
     def estimate(self, trace: Trace) -> Estimate:
-        """The estimate of a trace; the last one is kept while the trace lives.
+        """The estimate of a trace, cached as long as the trace exists.
 
         Raises:
             ValueError: another arm or another rate.
@@ -220,7 +224,7 @@ _ESTIMATES: dict[int, tuple[FrontEnd, Estimate]] = {}
 
 
 def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
-    """Keep the estimate until the trace dies or another front end estimates it."""
+    """Cache the estimate as long as the trace exists, or until another front end's replaces it."""
     if id(trace) not in _ESTIMATES:
         weakref.finalize(trace, _ESTIMATES.pop, id(trace), None)
     _ESTIMATES[id(trace)] = front, estimate
@@ -229,7 +233,7 @@ def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
 def plain_residual(arm: ArmModel, trace: Trace) -> Array:
     """The residual of the plain observer, without unknowns [N m], shape (T, n).
 
-    A front end of this arm that has just estimated the trace has it already.
+    It is taken from the cached estimate of a front end of this arm if there is one.
     """
     front, known = _ESTIMATES.get(id(trace), (None, None))
     if front is not None and known is not None and front.arm is arm:
@@ -239,7 +243,7 @@ def plain_residual(arm: ArmModel, trace: Trace) -> Array:
 
 
 class OnFrontEnd(Frozen):
-    """Base of fitted methods that stand on a front end: what they know is what it knows."""
+    """Base of fitted methods with a front end, from which arm, interval and settling time come."""
 
     front: FrontEnd
 
@@ -255,5 +259,5 @@ class OnFrontEnd(Frozen):
 
     @property
     def settle(self) -> float:
-        """Until the estimator has settled and found the payload [s]."""
+        """Time until the estimator has settled and estimated the payload [s]."""
         return self.front.settle

@@ -1,4 +1,4 @@
-"""Kinds of motion of a joint, and which of them logs do not show."""
+"""Motion regimes of joints, and regimes that do not occur in logs."""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ from tauguard.arrays import Array, Bools
 from tauguard.detectors.features.free_bound import SLOW
 from tauguard.traces.trace import Trace
 
-#: A regime that all logs together show for less than this is unknown [s].
+#: Least total time of a regime in the logs for which it counts as seen [s].
 SEEN = 3.0
-
-#: A speed or an acceleration counts as shown if it was exceeded for so long in all [s].
+#: A speed or acceleration counts as shown if the logs exceed it for this time in total [s].
 SHORTLY = 0.5
-
-#: Time between two rows that are counted [s].
+#: Interval of the rows that are evaluated [s].
 EVERY = 0.04
 
-#: Regimes and the joints that no log shows in them.
+#: Pairs of a regime and the joints that no log shows in it.
 Unseen = tuple[tuple[str, tuple[str, ...]], ...]
 
 
 def motion_regimes(trace: Trace) -> dict[str, Bools]:
-    """Which joints are in each regime, shape (T, n) each."""
+    """Whether each joint is in each regime, shape (T, n) each."""
     speed, dt = np.abs(trace.qd), trace.dt
     moves = speed > SLOW
     stood, went = _lasting(~moves, dt), _lasting(moves, dt)
@@ -54,10 +52,10 @@ def unseen(traces: Sequence[Trace]) -> Unseen:
 
 
 def exceeded(parts: Sequence[tuple[Array, Array]]) -> Array:
-    """The size that each column exceeds for :data:`SHORTLY` in all, shape (n,).
+    """The value that each column exceeds for :data:`SHORTLY` in total, shape (n,).
 
     Args:
-        parts: times [s], shape (T,), and sizes, shape (T, n), of each log.
+        parts: times [s], shape (T,), and values, shape (T, n), of each log.
     """
     steps = [float(np.median(np.diff(t))) for t, _ in parts]
     strides = [max(1, round(EVERY / dt)) for dt in steps]
@@ -65,21 +63,21 @@ def exceeded(parts: Sequence[tuple[Array, Array]]) -> Array:
     each = [k * dt for k, dt in zip(strides, steps, strict=True)]
     sizes, seconds = np.concatenate(rows), np.repeat(each, [len(r) for r in rows])
     order = np.argsort(-sizes, axis=0, kind="stable")
-    passed = np.cumsum(seconds[order], axis=0)  # for so long a column had this size or a larger one
+    passed = np.cumsum(seconds[order], axis=0)  # time with this value or a larger one, per column
     count = (passed <= SHORTLY * (1 + 1e-6)).sum(axis=0)
     ranked = np.take_along_axis(sizes, order, axis=0)
     return np.asarray(np.take_along_axis(ranked, np.maximum(count - 1, 0)[None], axis=0)[0])
 
 
 def unseen_text(lacking: Unseen, joints: int) -> str:
-    """A line on them: each regime with its joints of so many."""
+    """One line of text: each unseen regime with its joints, out of ``joints``."""
     return "; ".join(
         f"{name}: {'all joints' if len(own) == joints else ', '.join(own)}" for name, own in lacking
     )
 
 
 def _lasting(on: Bools, dt: float) -> Array:
-    """How long each column has been on [s]; 0 while it is off. Shape of ``on``."""
+    """Time since each column became True [s], 0 where it is False; shape of ``on``."""
     rows = np.arange(1, len(on) + 1)[:, None]
     off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
     return np.asarray(np.where(on, (rows - off) * dt, 0.0))

@@ -1,7 +1,7 @@
-"""Windows of the scaled residual: the input of the learned methods.
+"""Windows of the scaled residual, the input of the learned methods.
 
-The dissertation's window is rows 1-4 of the observer output, t_W = 80 ms long, sampled every
-t_I = 8 ms: 11 samples each, 44 numbers.
+The dissertation's window contains the residuals of joints 1 to 4 during t_W = 80 ms, sampled every
+t_I = 8 ms. These are 11 samples per joint, 44 numbers.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from tauguard.detectors import _kernel
 from tauguard.detectors.estimation.observer import intervals, lagged
 from tauguard.traces.trace import Trace
 
-#: The dissertation's window [s].
+#: Length and sample interval of the dissertation's window [s].
 WINDOW, INTERVAL = 80e-3, 8e-3
 
 
 @dataclass(frozen=True)
 class WindowShape:
-    """Which samples make a window."""
+    """The samples of a window."""
 
-    lag: int  #: samples from one number of a joint to the next
-    count: int  #: numbers per joint
+    lag: int  #: number of rows between successive samples of a window
+    count: int  #: number of samples per joint
 
     @classmethod
     def at(cls, dt: float) -> WindowShape:
@@ -37,9 +37,9 @@ class WindowShape:
         return cls(lag, max(1, round(WINDOW / (lag * dt))) + 1)
 
     def of(self, signal: Array, ends: ArrayLike) -> Array:
-        """The windows that end at rows ``ends``, shape (N, m count): joint by joint, oldest first.
+        """The windows that end at rows ``ends``, shape (N, m count).
 
-        Rows before the beginning repeat the first row.
+        They are ordered by joint, then oldest sample first. The first row replaces rows before it.
 
         Args:
             signal: shape (T, m).
@@ -59,25 +59,24 @@ def median_distance(a: Array, b: Array, rng: np.random.Generator, pairs: int = 4
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """One training trace after the estimator."""
+    """Signals of one training trace."""
 
-    signal: Array  #: scaled residual, shape (T, joints of the features)
+    signal: Array  #: scaled residual, shape (T, number of used joints)
     target: Array  #: target of the regressor, shape (T,)
     free: Bools  #: rows that are certainly collision-free, shape (T,)
-    collision: Bools  #: rows with a collision that can be felt, shape (T,)
+    collision: Bools  #: rows with a collision whose target is above FELT, shape (T,)
 
 
-#: Torques of joints 1, 2, ... that have equal weight in the training target; the last is repeated.
-#: Only their ratios matter.
+#: Torques of joints 1, 2, ... with equal weight in the training target. The last value is used for
+#: all further joints. Only ratios of these numbers have an effect.
 ALIKE = (20.0, 20.0, 15.0, 6.0)
 
 #: The scaled sum of torques of the median training collision.
 MEDIAN_SEVERITY = 2.5
 
-#: A target above this is a collision that can be felt.
+#: Least target of a collision in training.
 FELT = 0.05
-
-#: No target counts more: its severity is 49.
+#: Larger targets are set to this, whose severity is 49.
 HIGHEST = 0.98
 
 
@@ -85,17 +84,17 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
     """The training target x / (1 + x), where x is the scaled sum over ``joints`` of |tau_ext|.
 
     The torques pass the observer's filter and are weighted by :data:`ALIKE`. The scale is chosen so
-    that the collisions' peaks of x have the median :data:`MEDIAN_SEVERITY`, so arms of all sizes
-    have the same targets. Labels 0/1 do not grow with torque and give no ranking. x / (1 + x) keeps
-    the target within [0, 1), so hard impacts do not use up the regressor's bounded weights.
+    that the peaks of x in collisions have the median :data:`MEDIAN_SEVERITY`, whatever the size of
+    the arm. Labels 0 and 1 would not rank collisions. As x / (1 + x) is below 1, hard impacts do
+    not use up the regressor's bounded weights.
 
     Args:
-        traces: without truth the target is 0.
+        traces: the target of a trace without truth is 0.
         joints: 0-based.
         gain: gain of the observer [1/s].
 
     Returns:
-        One target a trace, shape (T,).
+        The target of each trace, shape (T,).
     """
     alike = np.array([ALIKE[min(k, len(ALIKE) - 1)] for k in range(len(joints))])
     totals = [_total(trace, list(joints), alike, gain) for trace in traces]
@@ -110,11 +109,10 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
 
 
 def severity(target: Array) -> Array:
-    """x of a target x / (1 + x), no more than that of :data:`HIGHEST`.
+    """x of a target x / (1 + x), at most the x of :data:`HIGHEST`.
 
-    A regressor's output cannot exceed 1 by much, however hard the impact is. Peaks of x have a
-    tail that can be extrapolated, and at any speed an impact can exceed the residual of free
-    motion.
+    The output of a regressor hardly exceeds 1, however hard the impact is. x has no such limit, so
+    the tail of its peaks can be extrapolated, and impacts can exceed free motion at any speed.
     """
     bounded = np.minimum(target, HIGHEST)
     found: Array = bounded / (1 - bounded)
@@ -162,7 +160,7 @@ def draw_windows(
     """Random windows and targets, a fraction ``positive`` of them from collisions.
 
     Raises:
-        ValueError: no collision, or no free motion, in the traces.
+        ValueError: no collision or no free motion in the traces.
     """
     x, y = [], []
     for name, fraction in (("collision", positive), ("free", 1 - positive)):
@@ -170,7 +168,7 @@ def draw_windows(
         total = sum(int(m.sum()) for m in masks)
         if total == 0:
             what = "collision" if name == "collision" else "collision-free row"
-            raise ValueError(f"the training traces hold no {what}: both kinds are needed")
+            raise ValueError(f"the training traces contain no {what}: both kinds are needed")
         picks = np.sort(rng.choice(total, min(total, round(count * fraction)), replace=False))
         start = 0
         for p, mask in zip(prepared, masks, strict=True):

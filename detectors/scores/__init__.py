@@ -1,1 +1,1 @@
-"""Scores: one number a sample, higher where a collision is more likely."""
+"""Scores: one number per sample, higher if a collision is more likely."""

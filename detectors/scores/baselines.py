@@ -1,4 +1,4 @@
-"""Baselines that learn one number for each joint: thresholds of the residual."""
+"""Baselines: thresholds of the residual, one per joint."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True)
 class MovingThresholds:
-    """Thresholds that follow speed, acceleration and what has been learned of the payload.
+    """Thresholds that depend on speed, acceleration and the estimated payload.
 
-    The score is the largest ratio of |residual that the payload-tracking estimator cannot explain|
-    to its standard deviation, in units of the ratio that collision-free motion exceeds in a
-    fraction 1 - ``fraction`` of its samples.
+    A joint's ratio is its |unexplained residual| divided by its standard deviation. The score is
+    the largest ratio of all joints, each divided by the quantile ``fraction`` of this joint's ratio
+    in collision-free motion.
     """
 
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
@@ -37,14 +37,14 @@ class MovingThresholds:
     name: ClassVar[str] = "moving-thresholds"
 
     def scaling(self, front: FrontEnd) -> Scaling:
-        """The signal that is compared with the limits."""
+        """Scaling of the residual that is compared with the limits."""
         return front.scaling()
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedThresholds:
-        """Calibrate the arm, fit the noise model and take each joint's quantile.
+        """Calibrate the arm, fit the noise model and compute each joint's quantile.
 
         Raises:
-            ValueError: traces that do not fit, or without collision-free motion.
+            ValueError: traces of different arms or rates, or without collision-free motion.
         """
         front = self.front.fit(traces, arm)
         scaling = self.scaling(front)
@@ -56,9 +56,9 @@ class MovingThresholds:
 
 @dataclass(frozen=True)
 class ResidualThresholds(MovingThresholds):
-    """The classical detector: the calibrated momentum observer, one constant threshold a joint.
+    """The classical detector: calibrated momentum observer, one constant threshold per joint.
 
-    The score is the largest ratio of |residual| to its joint's limit [N m].
+    The score is the largest ratio of a joint's |residual| to the joint's limit [N m].
     """
 
     front: FrontEndSettings = field(
@@ -83,7 +83,7 @@ class FittedThresholds(OnFrontEnd):
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
         if self.limits.shape != (len(self.scaling.joints),) or not (self.limits > 0).all():
-            raise ValueError("limits: expected one number above 0 a joint")
+            raise ValueError("limits: expected one number above 0 per joint")
 
     def scores(self, trace: Trace) -> Array:
         """The largest ratio over the joints, shape (T,)."""
@@ -92,7 +92,7 @@ class FittedThresholds(OnFrontEnd):
         return score
 
     def stream(self) -> NativeStream:
-        """The same, sample by sample."""
+        """A new stream of the scores, sample by sample."""
         estimator, scaling = self.front.estimator().native, self.scaling.numbers
         scores = _observer.limit_scores(estimator, *scaling, self.limits.tolist())
         return NativeStream(scores, self.dt)

@@ -1,4 +1,4 @@
-"""A network that predicts motor currents from the motion; its largest error is the score."""
+"""A network that predicts motor currents from the motion; the score is its largest error."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tauguard.traces.trace import Trace
 
 
 def smoothed(x: Array, rate: float, dt: float) -> Array:
-    """The low-pass of rate ``rate`` [1/s] along the rows of x, from the first row's value."""
+    """Low-pass of rate ``rate`` [1/s] over the rows of x, initially the first row."""
     from scipy.signal import lfilter
 
     keep = float(np.exp(-rate * dt))
@@ -31,7 +31,7 @@ class LowPass:
     """:func:`smoothed`, sample by sample, with equal results."""
 
     def __init__(self, rate: float, dt: float) -> None:
-        """Take rate [1/s] and sample interval [s]."""
+        """Set rate [1/s] and sample interval [s]."""
         self._keep = float(np.exp(-rate * dt))
         self._first: Array | None = None
         self._state: Array | float = 0.0
@@ -47,11 +47,11 @@ class LowPass:
 #: Rate of the filter that differentiates the velocity [1/s].
 DERIVATIVE = 100.0
 
-#: Friction changes its sign within about this velocity [rad/s].
+#: Speed over which friction changes its sign [rad/s].
 REVERSAL = 0.02
 
-#: Added to the sum of |acceleration| when samples are drawn, so that samples at rest are drawn, too
-#: [rad/s^2].
+#: Addition to the sum of |acceleration| in the drawing of samples, so that samples at rest are
+#: drawn, too [rad/s^2].
 STILL = 0.5
 
 
@@ -70,23 +70,23 @@ class Inputs:
 
     lags: tuple[float, ...]  #: ages of the window's samples [s]
     memory: float  #: age of the past sample that is fed back [s]
-    dt: float  #: [s]
+    dt: float  #: sample interval [s]
 
     @property
     def ages(self) -> tuple[int, ...]:
-        """Ages of the window's samples and of the sample that is fed back."""
+        """Ages of the window's samples and of the sample that is fed back, in samples."""
         own = tuple(round(lag / self.dt) for lag in self.lags)
         return (*own, max(1, round(self.memory / self.dt)))
 
     def of(self, now: Sample, past: Sequence[Sample]) -> Array:
         """The inputs, shape (N, d).
 
-        Position as sine and cosine, direction of motion, velocity and acceleration at the window's
-        ages, and the past sample's currents and position.
+        They are sine and cosine of the position, direction of motion, velocity and acceleration at
+        the window's ages, and the current and position of the past sample that is fed back.
 
         Args:
             now: the samples.
-            past: the samples that are :attr:`ages` older.
+            past: for each of :attr:`ages`, the samples that much older.
         """
         parts = [np.sin(now.q), np.cos(now.q), np.tanh(now.qd / REVERSAL)]
         for sample in past[: len(self.lags)]:
@@ -96,7 +96,7 @@ class Inputs:
         return np.concatenate(parts, axis=1)
 
     def rows(self, trace: Trace, rows: NDArray[np.intp]) -> tuple[Sample, list[Sample]]:
-        """Samples of a trace and their past; before the first sample is the first."""
+        """Samples of a trace and their past; the first sample replaces samples before it."""
         signals = (trace.q, trace.qd, self.acceleration(trace), trace.current)
         past = [Sample(*(x[np.maximum(rows - age, 0)] for x in signals)) for age in self.ages]
         return Sample(*(x[rows] for x in signals)), past
@@ -108,9 +108,9 @@ class Inputs:
 
 @dataclass(frozen=True)
 class CurrentNetwork:
-    """Predicts how far each motor's current changes since a past sample; the largest error counts.
+    """Predicts changes of motor currents since a past sample; the score is the largest error.
 
-    Without the past sample an unknown payload would be an error.
+    Without the past sample, an unknown payload would cause an error.
     """
 
     lags: tuple[float, ...] = (0.0, 0.025, 0.05)  #: ages of the window's samples [s]
@@ -125,11 +125,11 @@ class CurrentNetwork:
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentNetwork:
         """Train on collision-free samples of all traces, more of them where the arm accelerates.
 
-        A sample's chance grows with the square root of the sum of |acceleration|: fast starts and
-        stops are rare, and are where the errors are.
+        The probability of a sample is proportional to the square root of the sum of |acceleration|,
+        because errors are largest at fast starts and stops, which are rare.
 
         Raises:
-            ValueError: traces that do not fit, or without collision-free motion.
+            ValueError: traces of different arms or rates, or without collision-free motion.
         """
         inputs = Inputs(self.lags, self.memory, common_interval(traces, arm.robot.joint_names))
         x, y = [], []
@@ -144,7 +144,7 @@ class CurrentNetwork:
         return FittedCurrentNetwork(self.name, arm, self.settle, inputs, network)
 
     def _drawn(self, traces: Sequence[Trace], inputs: Inputs) -> list[NDArray[np.intp]]:
-        """Rows of every trace to train on."""
+        """Rows of each trace to train on."""
         rng = np.random.default_rng([self.seed, 7])
         free = [np.flatnonzero(free_rows(trace, self.settle)) for trace in traces]
         if not sum(len(rows) for rows in free):
@@ -168,7 +168,7 @@ class FittedCurrentNetwork(Frozen):
     """A :class:`~tauguard.detectors.scores.detector.FittedDetector`."""
 
     name: str
-    arm: ArmModel  #: as it was given: nothing of it is used
+    arm: ArmModel  #: as given; the scores do not depend on it
     settle: float  #: [s]
     inputs: Inputs
     network: Network
@@ -189,12 +189,12 @@ class FittedCurrentNetwork(Frozen):
         return score
 
     def stream(self) -> CurrentNetworkStream:
-        """The same, sample by sample."""
+        """A new stream of the scores, sample by sample."""
         return CurrentNetworkStream(self)
 
 
 class CurrentNetworkStream:
-    """Sample by sample, with the samples up to the oldest age kept."""
+    """Scores sample by sample; past samples up to the oldest age are stored."""
 
     def __init__(self, detector: FittedCurrentNetwork) -> None:
         """Begin anew."""

@@ -1,6 +1,6 @@
-"""The protocol of a detection method: fit on traces, then one score a sample, in batch or online.
+"""The protocol of a detection method: fit to traces, then one score per sample.
 
-A method ranks samples. The definition of an alarm is the same for all methods:
+The definition of an alarm is the same for all methods:
 :class:`~tauguard.detectors.alarms.alarm.CollisionAlarm` adds a threshold and a confirmation
 time.
 """
@@ -16,30 +16,30 @@ from tauguard.traces.trace import Trace
 
 
 class Detector(Protocol):
-    """The settings of a method; it can be trained."""
+    """The settings of a method, which can be fitted to traces."""
 
     @property
     def name(self) -> str:
-        """Its name in reports."""
+        """The method's name in reports."""
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedDetector:
-        """Learn from traces of one arm at one sample rate.
+        """Train on traces of one arm at one sample rate.
 
         Args:
-            traces: with truth where collisions are in them; every method needs collision-free
-                motion, those that learn a ranking need collisions too.
-            arm: the model before training: nominal numbers, drive gains and, where known, friction.
+            traces: with truth if there are collisions in them. Every method needs collision-free
+                motion. Some also need collisions.
+            arm: model before training: nominal numbers, drive gains and, if known, friction.
 
         Raises:
-            ValueError: traces that do not fit or lack what this method needs.
+            ValueError: traces of different arms or rates, or without data that the method needs.
         """
 
 
 class FittedDetector(Protocol):
-    """A trained method: complete and immutable.
+    """A trained method, immutable.
 
-    A frozen dataclass of numbers, text, arrays, tuples and other such dataclasses can be written
-    into a model file.
+    A frozen dataclass can be written into a model file if its fields are numbers, text, arrays,
+    tuples and other such dataclasses.
     """
 
     @property
@@ -59,29 +59,29 @@ class FittedDetector(Protocol):
         """Time at the beginning of a trace in which scores are not valid [s]."""
 
     def scores(self, trace: Trace) -> Array:
-        """One score a sample, shape (T,): higher is more like a collision.
+        """One score per sample, higher if a collision is more likely, shape (T,).
 
-        Causal: a score depends on this sample and those before it.
+        Scores are causal: each depends only on this sample and earlier ones.
 
         Raises:
             ValueError: other joints or another sample rate than the training's.
         """
 
     def stream(self) -> ScoreStream:
-        """The same scores sample by sample, from the next sample on."""
+        """A new stream of the scores, sample by sample."""
 
 
 class ScoreStream(Protocol):
-    """The scores of one recording as its samples come in."""
+    """The scores of one recording, computed sample by sample."""
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample, equal to that of :meth:`FittedDetector.scores`.
+        """The score of this sample, equal to the result of :meth:`FittedDetector.scores`.
 
         Args:
             q: [rad], float64, shape (n,).
             qd: [rad/s], shape (n,).
             current: [A], shape (n,).
-            dt: time since the last sample [s] (default: the training's interval).
+            dt: time since the last sample [s] (default: sample interval of the training traces).
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite.

@@ -1,4 +1,4 @@
-"""A weighted sum of SRQ kernels: what support vector machines of this kernel compute."""
+"""Support vector regression with the SRQ kernel, and its function, a weighted sum of kernels."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int =
         a: shape (N, d).
         b: shape (M, d).
         sigma: length scale, above 0.
-        threads: 0 takes all processors; the result does not depend on it.
+        threads: 0: all processors; the result does not depend on it.
 
     Returns:
         Shape (N, M).
@@ -89,7 +89,7 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """
 
     def __init__(self, sigma: float = 3.0, C: float = 1.0, epsilon: float = 0.02) -> None:
-        """Keep the settings (sigma: kernel length; C, epsilon: those of the SVR)."""
+        """Keep the settings (sigma: kernel length; C, epsilon: as of ``sklearn.svm.SVR``)."""
         self.sigma = sigma
         self.C = C
         self.epsilon = epsilon
@@ -116,25 +116,26 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self.machine_(rows)
 
 
-#: Least squared distance of a vector from the span of those chosen before. A nearer one would add
-#: only rounding errors: the norm of a vector is 1 in the SRQ kernel.
+#: Least squared distance, in the kernel's norm, of a picked vector from the span of the vectors
+#: picked before. Nearer ones add only rounding errors, as every vector has the norm 1.
 DEPENDENT = 1e-8
 
 
 def reduced_set(
     vectors: Array, coefficients: Array, sigma: float, count: int
 ) -> tuple[Array, Array]:
-    """Pick ``count`` of the vectors, fewer if the others depend on them, with new coefficients.
+    """Approximate a weighted sum of kernels by a sum over at most ``count`` of its vectors.
 
     Args:
         vectors: support vectors, shape (S, d).
-        coefficients: theirs, shape (S,).
+        coefficients: coefficients of the vectors, shape (S,).
         sigma: length of the SRQ kernel.
-        count: how many to keep, 1 to S.
+        count: largest number of vectors, 1 to S.
 
     Returns:
-        Vectors (C, d) and coefficients (C,) of the function nearest to the given one in the
-        kernel's norm over the picked vectors; C <= count.
+        Picked vectors (C, d) and new coefficients (C,), C <= count. In the kernel's norm, no sum
+        over the picked vectors is nearer to the given sum. C is less than ``count`` if all other
+        vectors depend linearly on the picked ones.
 
     Raises:
         ValueError: a count outside 1 to S.
@@ -160,8 +161,8 @@ def reduced_set(
         distance -= column**2
         columns[:, k] = column
         picked.append(best)
-    # The columns already are the Cholesky factor of the picked vectors' kernel matrix. Computing it
-    # anew could fail for vectors that nearly depend on each other.
+    # The columns are the Cholesky factor of the picked vectors' kernel matrix. A new factorisation
+    # could fail if vectors are nearly linearly dependent.
     lower = columns[picked, : len(picked)]
     new = solve_triangular(lower, values[picked], lower=True)
     new = solve_triangular(lower, new, lower=True, trans="T")

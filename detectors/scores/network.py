@@ -17,7 +17,7 @@ from tauguard.detectors.frozen import Frozen
 
 @dataclass(frozen=True, eq=False)
 class Network(Frozen):
-    """Affine layers with rectifiers in between, on standardised inputs and outputs."""
+    """Affine layers with rectifiers between them, for standardised inputs and outputs."""
 
     weights: tuple[Array, ...]  #: of each layer, shape (in, out)
     biases: tuple[Array, ...]  #: of each layer, shape (out,)
@@ -34,14 +34,14 @@ class Network(Frozen):
         seed: int = 0,
         epochs: int = 60,
     ) -> Network:
-        """Least squares by Adam; a tenth of the rows decides when to stop.
+        """Least squares by Adam, with early stopping by the loss on a tenth of the rows.
 
         Args:
             x: inputs, shape (N, d).
             y: outputs, shape (N,) or (N, m).
             hidden: widths of the hidden layers.
-            seed: seed of the start, the order and the held-out tenth.
-            epochs: at most.
+            seed: seed of the initial weights, the order of the rows and the held-out tenth.
+            epochs: largest number of epochs.
         """
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
@@ -58,7 +58,7 @@ class Network(Frozen):
         )
         target = (outputs - mean) / spread
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # epochs is the budget
+            warnings.simplefilter("ignore", ConvergenceWarning)  # of reaching the last epoch
             model.fit((x - centre) / scale, target[:, 0] if target.shape[1] == 1 else target)
         weights = [np.ascontiguousarray(w) for w in model.coefs_]
         biases = [np.ascontiguousarray(b) for b in model.intercepts_]
@@ -77,7 +77,7 @@ class Network(Frozen):
         )
 
     def __call__(self, x: Array) -> Array:
-        """Outputs at the rows of x, shape (N, d) -> (N, m); each depends on its row alone."""
+        """Outputs at the rows of x, shape (N, d) -> (N, m)."""
         rows = np.ascontiguousarray(x, dtype=np.float64)
         out = np.empty((len(rows), len(self.biases[-1])))
         _network.network(rows, *self._flat, out, 0)

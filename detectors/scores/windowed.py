@@ -36,50 +36,47 @@ from tauguard.detectors.scores.baselines import FittedThresholds, MovingThreshol
 from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
 from tauguard.traces.trace import Trace
 
-#: Fraction of the collision-free samples that may exceed the unit.
+#: Fraction of the collision-free samples whose scaled residual may exceed 1.
 RARE = 1e-3
-
-#: Windows that the scale of the features is found with.
+#: Number of windows from which the scale of the features is computed.
 SAMPLED = 1000
-
-#: Between two mined moments [s].
+#: Least time between two collision-free windows that are added as negatives [s].
 MINING_GAP = 0.1
-
-#: Windows that are evaluated at once: memory stays small.
+#: Number of windows that are evaluated at once, to limit the memory.
 CHUNK = 20_000
 
 
 @dataclass(frozen=True)
 class SrqSvr:
-    """The dissertation's regressor on the residual in standard deviations of free motion,
-    compressed by asinh.
+    """The dissertation's regressor, on residuals in standard deviations compressed by asinh.
 
-    Training windows are drawn from collisions and from collision-free motion; then, twice, the
-    collision-free moments that score highest are added as negatives. One factor brings the median
-    distance between windows of collisions and of collision-free motion to ``distance``, a length
-    that the kernel resolves. Beneath the score lie the thresholds of ``moving-thresholds``: they
-    find what is far from anything that the regressor has seen.
+    Training windows are drawn from collisions and from collision-free motion. Then, in two rounds,
+    the collision-free windows with the highest scores are added as negatives. The windows are
+    scaled so that the median distance between windows of collisions and of collision-free motion is
+    ``distance``, which the kernel resolves. The thresholds of ``moving-thresholds`` raise alarms,
+    too, because they detect residuals unlike all training windows.
     """
 
-    windows: int = 3000  #: training windows, a fifth of them from collisions
-    mined: int = 300  #: collision-free moments added in each of two rounds
-    units: float = 5.0  #: standard deviations that make 1 before the asinh
+    windows: int = 3000  #: number of training windows, a fifth of them from collisions
+    mined: int = 300  #: number of collision-free windows added in each of the two rounds
+    units: float = 5.0  #: number of standard deviations with the value 1 before the asinh
     seed: int = 0
-    graded: bool = True  #: targets grow with the torque, and scores are severities; else 0 and 1
+    graded: bool = True  #: scores are severities; False: training labels are 0 and 1
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
     sigma: float = 3.0  #: of the SRQ kernel
     C: float = 1.0
     epsilon: float = 0.02
     distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
-    vectors: int = 400  #: support vectors that are kept, at most; 0 keeps all
+    vectors: int = 400  #: largest number of support vectors; 0 keeps all
     name: ClassVar[str] = "srq-svr"
-    floored: ClassVar[bool] = True  #: whether plain thresholds lie beneath the score
+    floored: ClassVar[bool] = True  #: whether plain thresholds raise alarms, too
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedWindowed:
-        """Calibrate, draw windows, learn, mine, learn.
+        """Calibrate, draw windows, and train, with two rounds of added negatives.
 
         Raises:
-            ValueError: traces that do not fit, or without collisions or collision-free motion.
+            ValueError: traces of different arms or rates, or without collisions or collision-free
+                motion.
         """
         front = self.front.fit(traces, arm)
         shape = WindowShape.at(front.dt)
@@ -114,7 +111,7 @@ class SrqSvr:
         front: FrontEnd,
         shape: WindowShape,
     ) -> Scaling:
-        """Bring the median distance of windows to ``distance``."""
+        """The scaling with which the median distance of windows is ``distance``."""
         bare = self.bare(traces, front)
         if self.distance <= 0:
             return bare
@@ -125,11 +122,11 @@ class SrqSvr:
         return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
 
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
-        """The residual in ``units`` deviations, or more for a joint whose peaks are higher.
+        """The residual divided by ``units`` standard deviations, or by more if its peaks are high.
 
-        With dry friction the residual of free motion is small except at starts and reversals, where
-        it peaks at dozens of standard deviations. Those peaks must stay in the linear range of the
-        asinh, or they come near to collisions.
+        With dry friction, the residual of free motion is small except at starts and reversals, with
+        peaks of dozens of standard deviations. These peaks have to stay in the linear range of the
+        asinh, so that they differ from collisions.
         """
         plain = front.scaling(self.units)
         rows = undisturbed_rows(traces, front.settle)
@@ -141,7 +138,7 @@ class SrqSvr:
     def prepared(
         traces: Sequence[Trace], targets: Sequence[Array], front: FrontEnd, scaling: Scaling
     ) -> list[Prepared]:
-        """Training traces with their targets, and the rows that are free or surely in collision."""
+        """Training traces with targets, and rows that are certainly free or in collision."""
         return [
             Prepared(
                 front.scaled(trace, scaling),
@@ -155,7 +152,7 @@ class SrqSvr:
     def _mine(
         self, prepared: Sequence[Prepared], shape: WindowShape, machine: KernelMachine, dt: float
     ) -> Array:
-        """The collision-free moments with the highest output, as many from every trace."""
+        """The collision-free windows with the highest output, the same number of each trace."""
         fraction = -(-self.mined // len(prepared))
         thin = max(1, shape.lag // 2)
         gap = max(1, round(MINING_GAP / dt) // thin)
@@ -169,7 +166,7 @@ class SrqSvr:
 
 
 def _widened(scaling: Scaling, factors: Array) -> NoiseModel:
-    """The noise model with that of the scaled joints times ``factors``."""
+    """The noise model of ``scaling``, multiplied by ``factors`` for its joints."""
     assert scaling.noise_model is not None
     weights = scaling.noise_model.weights.copy()
     weights[list(scaling.joints)] *= factors[:, None]
@@ -196,13 +193,13 @@ class FittedWindowed(OnFrontEnd):
     scaling: Scaling
     shape: WindowShape
     regressor: KernelMachine
-    graded: bool  #: the regressor says x / (1 + x), and the score is x
+    graded: bool  #: the regressor's output is x / (1 + x), and the score is x
     limits: Array | None = None
-    """Of :attr:`floor`, shape (joints,); ``None``: there is none."""
+    """Limits of :attr:`floor`, shape (joints,). ``None``: no floor."""
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual: a residual above them is an alarm too."""
+        """Plain thresholds on the same residual, which raise alarms, too."""
         if self.limits is None:
             return None
         return FittedThresholds(
@@ -216,7 +213,7 @@ class FittedWindowed(OnFrontEnd):
         return severity(output) if self.graded else output
 
     def stream(self) -> NativeStream:
-        """The same, sample by sample."""
+        """A new stream of the scores, sample by sample."""
         machine, floor = self.regressor, self.floor
         vectors, weights = map(np.ascontiguousarray, (machine.vectors, machine.weights))
         scores = _observer.kernel_scores(
@@ -237,10 +234,11 @@ class FittedWindowed(OnFrontEnd):
 
 @dataclass(frozen=True)
 class PlainSrqSvr(SrqSvr):
-    """The dissertation's form: residuals in N m times one factor, labels 0/1, no friction model.
+    """The dissertation's form: residuals in N m times a factor, labels 0/1, no friction model.
 
-    Residuals in N m lie some 100 apart, where a kernel of sigma = 3 is diagonal and nothing is
-    learnt; the factor brings the median distance to sigma. ``distance=0`` is the literal form.
+    Residuals in N m have distances near 100, at which the matrix of a kernel of sigma = 3 is almost
+    diagonal and nothing is learned. The factor scales the median distance to ``distance``.
+    ``distance=0`` is the literal form of the dissertation, without the factor.
     """
 
     mined: int = 0
