@@ -54,6 +54,7 @@ FAULTS: dict[int, tuple[str, str]] = {
     11: ("frozen", "no signal has changed for {value:.0f} samples"),
     12: ("position", "the position of {joint} is off its velocity by {value:.2g} rad"),
     13: ("stuck", "the current or torque of {joint} stays at {value:.3g}: saturated or stuck"),
+    # 14 and 15 are in torques.py
 }
 
 

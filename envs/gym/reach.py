@@ -149,7 +149,7 @@ class Reach(Task):
 class CarefulReach(Reach):
     """Reach with a cost of contacts: the peak force of each action times its duration."""
 
-    terms: ClassVar[tuple[str, ...]] = ("progress", "target", "contact")
+    terms: ClassVar[tuple[str, ...]] = (*Reach.terms, "contact")
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """As :class:`Reach`, minus force / :data:`CONTACT_FORCE` (at most 1) per second."""

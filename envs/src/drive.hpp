@@ -30,6 +30,34 @@ struct Joint {
       slope_velocity;  // rises of the friction level [N m], their speed scales
 };
 
+// Calls set(name, value) for each number, so that Python can give them by name.
+template <class Set>
+void for_each_value(Joint& j, const Set& set) {
+  set("qpos", j.qpos);
+  set("dof", j.dof);
+  set("gain", j.gain);
+  set("nominal_gain", j.nominal_gain);
+  set("current_limit", j.current_limit);
+  set("gear", j.gear);
+  set("coulomb", j.coulomb);
+  set("breakaway", j.breakaway);
+  set("stribeck_velocity", j.stribeck_velocity);
+  set("viscous", j.viscous);
+  set("bristle_stiffness", j.bristle_stiffness);
+  set("load", j.load);
+  set("kp", j.kp);
+  set("kd", j.kd);
+  set("rated_speed", j.rated_speed);
+  set("no_load_speed", j.no_load_speed);
+  set("known_coulomb", j.known_coulomb);
+  set("known_viscous", j.known_viscous);
+  set("cycles", j.cycles);
+  set("amplitude", j.amplitude);
+  set("phase", j.phase);
+  set("slope", j.slope);
+  set("slope_velocity", j.slope_velocity);
+}
+
 struct JointState {
   double current = 0.0;  // A
   double bristle = 0.0;  // rad

@@ -1,5 +1,7 @@
 // Python bindings of the values that a plant is made of. The values are described where their types
 // are declared.
+#include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -12,44 +14,17 @@ namespace {
 using namespace nb::literals;
 
 void bind_joint(nb::module_& m) {
-  nb::class_<Joint>(m, "Joint")
-      .def(
-          "__init__",
-          [](Joint* self, int qpos, int dof, double gain, double nominal_gain, double current_limit,
-             double gear, double coulomb, double breakaway, double stribeck_velocity,
-             double viscous, double bristle_stiffness, double load, double kp, double kd,
-             double rated_speed, double no_load_speed, double known_coulomb, double known_viscous,
-             Numbers cycles, Numbers amplitude, Numbers phase, Numbers slope,
-             Numbers slope_velocity) {
-            *new (self) Joint() = {qpos,
-                                   dof,
-                                   gain,
-                                   nominal_gain,
-                                   current_limit,
-                                   gear,
-                                   coulomb,
-                                   breakaway,
-                                   stribeck_velocity,
-                                   viscous,
-                                   bristle_stiffness,
-                                   load,
-                                   kp,
-                                   kd,
-                                   rated_speed,
-                                   no_load_speed,
-                                   known_coulomb,
-                                   known_viscous,
-                                   std::move(cycles),
-                                   std::move(amplitude),
-                                   std::move(phase),
-                                   std::move(slope),
-                                   std::move(slope_velocity)};
-          },
-          nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
-          "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
-          "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a, "known_coulomb"_a,
-          "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a, "slope"_a = Numbers(),
-          "slope_velocity"_a = Numbers());
+  nb::class_<Joint>(m, "Joint").def("__init__", [](Joint* self, const nb::kwargs& given) {
+    Joint joint;
+    std::size_t known = 0;
+    for_each_value(joint, [&](const char* name, auto& value) {
+      if (!given.contains(name)) throw nb::type_error((std::string("Joint: no ") + name).c_str());
+      value = nb::cast<std::decay_t<decltype(value)>>(given[name]);
+      ++known;
+    });
+    if (given.size() != known) throw nb::type_error("Joint: a keyword that it does not have");
+    new (self) Joint(std::move(joint));
+  });
 }
 
 void bind_anatomy(nb::module_& m) {
