@@ -14,17 +14,23 @@ namespace {
 using namespace nb::literals;
 
 void bind_joint(nb::module_& m) {
-  nb::class_<Joint>(m, "Joint").def("__init__", [](Joint* self, const nb::kwargs& given) {
-    Joint joint;
-    std::size_t known = 0;
-    for_each_value(joint, [&](const char* name, auto& value) {
-      if (!given.contains(name)) throw nb::type_error((std::string("Joint: no ") + name).c_str());
-      value = nb::cast<std::decay_t<decltype(value)>>(given[name]);
-      ++known;
-    });
-    if (given.size() != known) throw nb::type_error("Joint: a keyword that it does not have");
-    new (self) Joint(std::move(joint));
-  });
+  nb::class_<Joint>(m, "Joint")
+      .def(
+          "__init__",
+          [](Joint* self, const nb::kwargs& given) {
+            Joint joint;
+            std::size_t known = 0;
+            for_each_value(joint, [&](const char* name, auto& value) {
+              if (!given.contains(name))
+                throw nb::type_error((std::string("Joint: no ") + name).c_str());
+              value = nb::cast<std::decay_t<decltype(value)>>(given[name]);
+              ++known;
+            });
+            if (given.size() != known)
+              throw nb::type_error("Joint: a keyword that it does not have");
+            new (self) Joint(std::move(joint));
+          },
+          nb::sig("def __init__(self, **kwargs: object) -> None"));
 }
 
 void bind_anatomy(nb::module_& m) {
