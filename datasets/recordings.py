@@ -1,4 +1,4 @@
-"""Simulate, resume and read folders of labelled recordings, one MCAP file per episode."""
+"""Simulate episodes into a folder, one MCAP file each (a run can be resumed), and read them."""
 
 import contextlib
 import os

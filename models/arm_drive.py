@@ -13,7 +13,7 @@ from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joi
 
 #: Default presliding distance: Coulomb friction over bristle stiffness [rad].
 PRESLIDING = 1.5e-3
-#: Smallest time constant with which back-EMF brakes a joint [s].
+#: Least time constant of a joint's braking by back-EMF above the largest speed [s].
 _FADE_TIME = 4e-3
 #: Default gear ratio and gain [N m/A].
 _GEAR, _GAIN = 100.0, 10.0

@@ -165,7 +165,7 @@ def _joints_below(body: mujoco.MjsBody) -> Iterator[mujoco.MjsJoint]:
 
 
 def _find_gripper(spec: mujoco.MjSpec) -> tuple[str, ...]:
-    """The gripper's joints: small branches at the chain's end, or all from a gripper's name on."""
+    """Joints of small branches at the chain's end, or from the first with a gripper's name on."""
     chain: list[str] = []
     level = list(spec.worldbody.bodies)
     while level:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.models.arm_drive import PRESLIDING
 from tauguard.models.arm_file import ArmFile
 from tauguard.models.robot import Robot
 from tauguard.models.robot_file import read_note
@@ -18,8 +19,6 @@ SPEEDS = np.geomspace(2e-3, 2.0, 100)
 STRIBECK = 0.03
 #: Speed of a joint near its reversal [rad/s].
 TURNING = 0.05
-#: Default angle over which friction reverses with the joint [rad].
-PRESLIDING = 1.5e-3
 
 
 def calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str]) -> Robot:

@@ -122,8 +122,7 @@ def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) 
     at = joint_ids(model, joints)
     given = model.dof_armature[model.jnt_dofadr[at]]
     hinge = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_HINGE
-    masses = inertia_matrices(model, joints, random_poses(model, joints))
-    least = ROTOR_FRACTION * masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    least = ROTOR_FRACTION * servo_inertia(model, joints)
     guess = np.where(np.isfinite(limit), ROTOR_PER_TORQUE * limit, least)
     return np.where(given > 0, given, np.where(hinge, guess, 0.0))
 
@@ -146,8 +145,7 @@ def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) 
     if np.isfinite(stated).all():
         return stated
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
-    masses = inertia_matrices(model, joints, random_poses(model, joints))
-    most = masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    most = servo_inertia(model, joints)
     dofs = model.jnt_dofadr[joint_ids(model, joints)]
     lost = model.dof_frictionloss[dofs] + model.dof_damping[dofs] * DEFAULT_SPEED
     spare = HOLDING_FACTOR * (holding_torque(model, joints) + lost) + SPARE_ACCELERATION * most

@@ -71,8 +71,9 @@ class Friction:
         for name in ("coulomb_per_kelvin", "viscous_per_kelvin"):
             if not 1 + getattr(self, name) * warm > 0:
                 raise ValueError(
-                    f"Friction.temperature {self.temperature} degC: friction would be negative by "
-                    f"{name} {getattr(self, name)}; expected nearer to {self.reference_temperature}"
+                    f"Friction.temperature {self.temperature} degC: friction would be negative for "
+                    f"{name} = {getattr(self, name)}; expected a temperature nearer to "
+                    f"{self.reference_temperature}"
                 )
 
 

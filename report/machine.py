@@ -57,7 +57,7 @@ def load() -> float | None:
     """Load average of the last minute; None: unknown."""
     try:
         return round(os.getloadavg()[0], 1)
-    except (AttributeError, OSError):  # Windows, or a system that does not say
+    except (AttributeError, OSError):  # a system without load averages
         return None
 
 

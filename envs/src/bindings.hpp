@@ -20,7 +20,7 @@ using Numbers = std::vector<double>;
 // An array that Python made and the plant reads or writes.
 using Array = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
 
-// That array as the plant stores it, which keeps it alive.
+// Wraps such an array for the plant and keeps it alive.
 inline Held held(const Array& array) {
   Held out(array.data(), {}, std::make_shared<Array>(array));
   for (std::size_t k = 0; k < array.ndim(); ++k) out.add_axis(array.shape(k));

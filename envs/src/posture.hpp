@@ -32,8 +32,7 @@ class Posture {
     centre[segment] = mix(a, b, 0.5);
     const Vec3 path = b - a;
     const Vec3 d = (1.0 / norm(path)) * path;
-    // The rotation that takes -z to d. It is undefined for d = +z, but no capsule points straight
-    // up.
+    // The rotation that takes -z to d, undefined for d = +z. No capsule points straight up.
     std::array<double, 4>& q = quat_wxyz[segment];
     q = {1.0 - d.z, d.y, -d.x, 0.0};
     const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);

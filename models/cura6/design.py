@@ -182,7 +182,7 @@ def mjcf(
     flange: tuple[float, float, float] = FLANGE,
     name: str = "cura6",
 ) -> str:
-    """The MJCF text of an arm with these links, by default the arm's own."""
+    """The MJCF text of an arm with these links; by default, of the CURA6-like arm."""
     lines = [_HEAD.replace('"cura6"', f'"{name}"')]
     indent = "    "
     lines += [f'{indent}<body name="base">']

@@ -37,7 +37,7 @@ def test_bad_drives_are_named(change, message):
         ({"bristle_stiffness": 0 * SIX}, "Friction.bristle_stiffness .* expected above 0"),
         ({"viscous": -SIX}, "Friction.viscous .* expected 0 or more"),
         ({"load": np.full(6, np.nan)}, "Friction.load .* expected 0 or more"),
-        ({"temperature": 200.0}, "friction would be negative by viscous_per_kelvin"),
+        ({"temperature": 200.0}, "friction would be negative for viscous_per_kelvin"),
     ],
 )
 def test_bad_friction_is_named(change, message):
