@@ -1,12 +1,11 @@
-"""A detector that learns from collision-free motion alone.
+"""A detector that learns only from collision-free motion.
 
-Momentum observer at 30/s, biases (load, friction) tracked while joints move, and each joint's
-bound (:mod:`~tauguard.detectors.features.free_bound`). The score is the largest ratio of a joint's
-signal to its bound; 1 is the threshold.
+A momentum observer at 30/s gives the residual. Errors by load and friction are estimated while
+joints move, and subtracted. The score is the largest ratio of a joint's signal to the joint's bound
+(:mod:`~tauguard.detectors.features.free_bound`); the threshold is 1.
 
-The bounds are prior knowledge in units of each joint's friction. Logs move the bound in motion: a
-regression on what is left of the residual in logs that the calibration has not seen, pulled
-towards the prior where the logs show little.
+The prior bounds are multiples of each joint's friction. The bound in motion is then fitted to the
+residuals of held-out logs by a regression that keeps the prior where the logs have few data.
 """
 
 from __future__ import annotations
@@ -57,53 +56,45 @@ from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_joints
 from tauguard.traces.trace import Trace
 
-#: Confirmation of an alarm [s]: none, since scores pass 1 only once they are confirmed.
+#: Confirmation time of an alarm [s]: 0, because scores include the confirmation.
 CONFIRMATION = 0.0
-
 #: The quantile of the residual in motion that is learned.
 QUANTILE = 0.99
-
-#: Weight of the prior in seconds of motion at these speeds and accelerations [rad/s, ...].
+#: Weight of the prior: 20 s of motion whose inputs of the quantile, ordered as PRIOR, are USUAL.
 WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
-
-#: The least speed and acceleration that count as shown in any case [rad/s, rad/s^2].
+#: Least value of ``Bound.fast`` and ``Bound.hard`` [rad/s, rad/s^2].
 LEAST_SHOWN = 0.05
-
-#: Motion counts as beyond the logs where it adds this to the bound, in friction levels.
+#: Motion is beyond the logs if its speed and acceleration add this to the bound [friction levels].
 FURTHER = 0.25
-
 #: Largest number of calibrations with held-out logs.
 FOLDS = 5
-
-#: Factor on the largest signals of held-out logs; their least and largest value as fractions of the
-#: bounds at rest, after motion and in motion; weight of the prior in seconds.
+#: Numbers of the factors ``Bound.scale``, for the bounds at rest, after motion and in motion:
+#: factor on the largest signals of held-out logs, least factor, and largest factor.
 SCALE_MARGIN, SCALE_LEAST, SCALE_MOST = (1.5, 1.5, 1.3), (1.0, 1.0, 0.4), 3.0
+#: Weight of the factor 1 in ``Bound.scale``, in seconds of logs.
 SCALE_WORTH = (30.0, 20.0, 60.0)
-
-#: For an arm that moves in no log: least noise of a joint over the largest, and the torque that
-#: static friction is assumed to hold, in standard deviations of the noise.
+#: For an arm that moves in no log: least noise of a joint relative to the noisiest joint, and the
+#: torque that static friction may hold, in standard deviations of the noise.
 QUIETEST, KEEPS = 0.2, 10.0
-
-#: Noise of a standing arm: at most this factor times the standard deviation in the calmest tenth of
-#: pieces of this length [s], because contacts leave some pieces calm. In free logs of two arms the
-#: median over that deviation is 1.03 to 1.68, so the median counts there, or nearly.
+#: The noise of a standing arm is at most CALM times the standard deviation in the calmest tenth of
+#: pieces of PIECE [s], because some pieces have no contact. In free logs of two arms, the ratio of
+#: the median to that deviation is 1.03 to 1.68, so the limit hardly changes their noise.
 CALM, PIECE = 1.45, 0.3
-
-#: Beginning of a log that is neither learned from nor watched [s].
+#: Time at the beginning of a log that is used neither in training nor in detection [s].
 SETTLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A detector's signals along a trace; rows are samples."""
+    """A detector's signals along a trace, one row per sample."""
 
     t: Array  #: [s], shape (T,)
     qd: Array  #: [rad/s], shape (T, n)
-    qdd: Array  #: sizes of accelerations [rad/s^2], shape (T, n)
+    qdd: Array  #: absolute accelerations [rad/s^2], shape (T, n)
     ratio: Array  #: each joint's signal over its bound, at most 1 until confirmed, (T, n)
     bound: Array  #: [N m], shape (T, n)
-    residual: Array  #: without biases [N m], shape (T, n)
-    rest: Bools  #: which joints are at rest, shape (T, n)
+    residual: Array  #: minus the estimated errors of the model [N m], shape (T, n)
+    rest: Bools  #: whether each joint is at rest, shape (T, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,16 +102,16 @@ class FittedFreeMotion(Frozen):
     """A calibrated arm and the bounds of its collision-free motion."""
 
     arm: ArmModel
-    dt: float  #: of the slowest training log [s]
+    dt: float  #: longest sample interval of the training logs [s]
     bound: Bound
-    load: LoadDeviation  #: how uncertain the carried load is
-    seconds: float  #: collision-free motion that the bounds were learned from [s]
-    unseen: Unseen = ()  #: what the logs do not show
+    load: LoadDeviation  #: uncertainty of the load
+    seconds: float  #: collision-free motion from which the bounds were learned [s]
+    unseen: Unseen = ()  #: motion regimes that are in no log
     name: str = "free-motion"
     settle: float = SETTLE  #: [s]
 
     def carrying(self, load: Load) -> FittedFreeMotion:
-        """The same detector of the arm with a load in its gripper; ``Load()`` for none."""
+        """The detector for the arm with a load in its gripper; ``Load()``: no load."""
         arm, deviation = laden(self.arm, load)
         return replace(self, arm=arm, load=deviation)
 
@@ -130,12 +121,15 @@ class FittedFreeMotion(Frozen):
         return scores
 
     def stream(self) -> NativeStream:
-        """The same scores sample by sample."""
+        """A new stream of the scores, sample by sample."""
         scores = _observer.free_scores(native(self.arm, self.bound, self.load))
         return NativeStream(scores, self.dt)
 
     def unwatched(self, trace: Trace) -> tuple[float, tuple[str, ...]]:
-        """Seconds in which joints move whose motion no log showed, and their names."""
+        """Time in which joints move that move in no training log [s], and their names.
+
+        It includes the settling time after the motion. No collision is detected in this time.
+        """
         hidden = ~self.bound.shown
         moved = (np.abs(trace.qd) > _observer.REGIME_FULL_SPEED) | (trace.q < self.bound.low)
         moved = (moved | (trace.q > self.bound.high)) & hidden
@@ -149,8 +143,10 @@ class FittedFreeMotion(Frozen):
         return float(steps[np.cumsum(blind)[:-1] > 0].sum()), names
 
     def beyond(self, trace: Trace) -> tuple[float, dict[str, float]]:
-        """Seconds in which joints are faster than the logs show, or accelerate harder, and their
-        names with the bound that nine tenths of these seconds stay below [N m]."""
+        """Time in which joints are faster, or accelerate more, than in the training logs [s].
+
+        Also returned are the joints' names, with the 90 % quantile of the bound in this time [N m].
+        """
         judged, bound = self.judge(trace), self.bound
         times = np.abs(judged.qd) / bound.fast - 1, judged.qdd / bound.hard - 1
         more = np.maximum(times[0], 0) + _observer.REGIME_HARDER * np.maximum(times[1], 0)
@@ -186,7 +182,7 @@ class FittedFreeMotion(Frozen):
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Settings of the free-motion detector: there are none to choose."""
+    """The free-motion detector, which has no settings."""
 
     name: str = "free-motion"
 
@@ -204,7 +200,7 @@ class FreeMotion:
         """
         recordings = [r for r in map(_recording, traces) if not _has_collisions(r.trace)]
         if traces and not recordings:
-            raise ValueError("no trace without collisions: free motion is all that this learns")
+            raise ValueError("no trace without collisions: this detector learns from free motion")
         check_joints([r.trace for r in recordings], arm.robot.joint_names)
         parts = pieces(recordings, FOLDS)
         moving = [r for r in parts if moves(r.trace)]
@@ -226,9 +222,9 @@ class FreeMotion:
 
 
 def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotion:
-    """The detector of an arm that no log shows moving: it watches while the arm stands.
+    """The detector of an arm that moves in no log; it detects collisions while the arm stands.
 
-    Its bounds rest on the calmest pieces, so contacts in these logs raise alarms.
+    Its bounds come from the calmest pieces of the logs, so contacts in these logs raise alarms.
 
     Raises:
         ValueError: logs that are too short.
@@ -257,7 +253,7 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
 
 
 def _calmest(judged: Sequence[Judged], joints: int) -> Array:
-    """Deviation of the residual in the calmest tenth of pieces of an arm at rest [N m], (n,)."""
+    """Standard deviation of the residual in the calmest tenth of pieces [N m], shape (n,)."""
     found = [np.full((1, joints), np.inf)]
     for part in judged:
         length = max(4, round(PIECE / float(np.median(np.diff(part.t)))))
@@ -273,7 +269,7 @@ def _calmest(judged: Sequence[Judged], joints: int) -> Array:
 
 
 def _recording(trace: Trace | Recording) -> Recording:
-    """A log with what is known of its load: nothing, if it is labelled."""
+    """A log with its load, which is unknown if the log is labelled."""
     if isinstance(trace, Recording):
         return trace
     return Recording(trace) if trace.truth is None else Recording(trace, None)
@@ -284,7 +280,7 @@ def _has_collisions(trace: Trace) -> bool:
 
 
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
-    """For each part the calibration from the parts of other folds, and that from all."""
+    """For each part, the calibration from the parts of all other folds; and that from all."""
     calibrated, everything = Subsets(arm, parts), range(len(parts))
     whole = calibrated(everything, 0.0)  # the uncut logs have enough
     models = [whole] * len(parts)
@@ -299,12 +295,12 @@ def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmMo
 
 
 def with_load_of(recording: Recording, detector: FittedFreeMotion) -> FittedFreeMotion:
-    """The detector of the arm with the load that a recording is known to carry."""
+    """The detector for the arm with the load of a recording, if that is known."""
     return detector if recording.load is None else detector.carrying(recording.load)
 
 
 def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
-    """The prior bounds moved by what left-out logs show."""
+    """The prior bounds fitted to held-out logs."""
     quantile = _quantiles(judged, prior.friction)
     bound = replace(prior, noise=_noise(judged, prior.noise), quantile=quantile)
     fast, hard = (
@@ -317,14 +313,13 @@ def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
 def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
     """Ratio of the logs' largest signals to the bounds, as :attr:`Bound.scale`, shape (3, n).
 
-    It takes the second largest peak of pieces of 2 s, so that a single contact in the logs has no
-    effect. The longer the logs, the more the ratio counts against 1, see
-    :data:`SCALE_WORTH`.
+    The largest signal is the second largest peak of pieces of 2 s, so that a single contact in the
+    logs has no effect. The result is a weighted mean of this ratio and 1, see :data:`SCALE_WORTH`.
 
     Args:
         prior: the bound with which the logs were judged.
-        bound: the bound with the logs' own quantiles and noise.
-        judged: the left-out logs.
+        bound: the bound with quantiles and noise of the logs.
+        judged: the held-out logs.
     """
     n = len(prior.friction)
     peaks: list[list[Array]] = [[], [], []]
@@ -358,7 +353,7 @@ def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
 
 
 def _in_motion(bound: Bound, part: Judged) -> Array:
-    """The bound of joints in motion without starts and biases [N m], shape (T, n)."""
+    """The bound of joints in motion without the additions at starts [N m], shape (T, n)."""
     speed, own = np.abs(part.qd), np.abs(part.qdd)
     hardest = np.broadcast_to(own.max(axis=1, keepdims=True), own.shape)
     terms = np.stack([np.ones_like(speed), speed, own, hardest, np.exp(-speed / CREEP)])
@@ -394,7 +389,7 @@ def _stride(part: Judged) -> int:
 
 
 def _noise(judged: Sequence[Judged], prior: Array) -> Array:
-    """Deviation of a standing joint's residual [N m], shape (n,); ``prior`` where none stands."""
+    """Standard deviation of the residual at rest [N m], (n,); ``prior`` if a joint never rests."""
     changes = []
     for part in judged:
         dt = float(np.median(np.diff(part.t)))

@@ -1,13 +1,14 @@
 """The rate of false alarms of a threshold, estimated from recorded motion.
 
-Alarms are blocks of the merge gap whose peak exceeds the threshold. For alarms that are too rare to
-count, a generalised Pareto tail is fitted to the blocks' peaks. The interval comes from a bootstrap
-of whole episodes, because the moments of one episode are alike. Every draw has its own tail, and
-the tails differ most in rare alarms. A tail has an end only if the peaks show one significantly.
+The motion is divided into blocks of 0.5 s (``MERGE_GAP``). A block whose peak exceeds the threshold
+counts as one alarm. For alarms that are too rare to count, a generalised Pareto tail is fitted to
+the peaks. The interval comes from a bootstrap of whole episodes, because samples of one episode are
+not independent. Each draw has its own tail. A tail has an end only if the peaks show one
+significantly.
 
-A tail knows nothing of situations that no episode shows. Therefore an interval always contains the
-exact Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an
-alarm do not exclude two alarms an hour with 80 % confidence, whatever the threshold.
+A tail does not describe situations that are in no episode. Therefore the interval always contains
+the exact Poisson interval of the number of episodes that exceed the threshold. For example, 45
+minutes without an alarm do not exclude two alarms per hour with 80 % confidence.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ from tauguard.detectors.thresholds.tail_model import (
 )
 from tauguard.report import poisson_rate
 
-#: Bounds of the tail's shape if the peaks do not show that it ends, and the lowest shape if they
-#: do.
+#: Bounds of the tail's shape if the peaks do not show an end of the tail, and the lowest shape if
+#: they do.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
-#: Number of draws of the episodes, for the uncertainty of a rate.
+#: Number of bootstrap draws.
 DRAWS = 200
 
 
@@ -39,12 +40,12 @@ DRAWS = 200
 class ExpectedRate:
     """Rates of false alarms of one detector, by threshold."""
 
-    blocks: tuple[Array, ...]  #: peaks of each episode's blocks, rising
-    draws: NDArray[np.int64]  #: how often each draw holds each episode, shape (D, E)
+    blocks: tuple[Array, ...]  #: peaks of each episode's blocks, in ascending order
+    draws: NDArray[np.int64]  #: number of times that a draw contains an episode, shape (D, E)
     tails: Tails  #: of the draws
-    draw_hours: Array  #: of each draw, shape (D,)
-    highest: Array  #: peak of every episode, shape (E,)
-    hours: float  #: of all episodes
+    draw_hours: Array  #: total length of each draw [h], shape (D,)
+    highest: Array  #: peak of each episode, shape (E,)
+    hours: float  #: total length of all episodes [h]
 
     @classmethod
     def of(cls, scores: Sequence[FreeScores]) -> ExpectedRate:
@@ -64,7 +65,7 @@ class ExpectedRate:
         return cls(blocks, draws, tails, own, highest, float(hours.sum()))
 
     def rates(self, threshold: float) -> Array:
-        """The rate of every draw, counted or along its tail [1/h], shape (D,)."""
+        """The rate of each draw, counted or from its tail if alarms are rare [1/h], shape (D,)."""
         found = self.tails.above(threshold)
         counted = threshold <= self.tails.base
         if counted.any():
@@ -73,7 +74,7 @@ class ExpectedRate:
         return found
 
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
-        """Interval of the rate, from redrawn episodes and from the counted alarms [1/h]."""
+        """Interval of the rate from the bootstrap and the count of episodes with alarms [1/h]."""
         side = (1 - confidence) / 2
         low, high = np.quantile(self.rates(threshold), (side, 1 - side))
         seen = poisson_rate(int(np.sum(self.highest > threshold)), self.hours, confidence)
@@ -87,13 +88,13 @@ class Tails:
     base: Array
     scale: Array
     shape: Array
-    per_hour: Array  #: peaks above the base
+    per_hour: Array  #: rate of peaks above the base [1/h]
 
     @classmethod
     def of(
         cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array, fraction: float
     ) -> Tails:
-        """The tails of the highest ``fraction`` of each draw's blocks; ``hours`` are the draws'."""
+        """Tails of the highest ``fraction`` of blocks in each draw, which lasts ``hours``."""
         together = np.concatenate(blocks)
         order = np.argsort(together)
         together = together[order]
@@ -120,14 +121,14 @@ class Tails:
 
 
 def _draws(episodes: int) -> NDArray[np.int64]:
-    """How often each draw with replacement holds each episode, shape (DRAWS, episodes)."""
+    """Number of times that each bootstrap draw contains each episode, shape (DRAWS, episodes)."""
     rng = np.random.default_rng(0)
     again = (rng.integers(episodes, size=episodes) for _ in range(DRAWS))
     return np.stack([np.bincount(one, minlength=episodes) for one in again])
 
 
 def _shapes(peaks: Array, fraction: float) -> tuple[float, float]:
-    """Bounds of the shape of every draw's tail, from the peaks of all, in descending order."""
+    """Bounds of the shape of the draws' tails, from all peaks in descending order."""
     whole = Tail.of(peaks, max(2, round(fraction * len(peaks))), (LOWEST, SHAPES[1]))
     margin = BEYOND_CHANCE * shape_error(whole.count)
     return max(LOWEST, min(SHAPES[0], whole.shape + margin)), SHAPES[1]

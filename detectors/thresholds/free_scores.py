@@ -1,4 +1,4 @@
-"""Peaks of scores and their tails."""
+"""Peaks of scores in collision-free motion."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
     return level[where], where
 
 
-#: Motion is kept as the peaks of pieces this long [s], or of single samples that are longer: ten
-#: hours are two million numbers.
+#: Length of the pieces of motion whose peaks are stored [s]; a longer sample interval is a piece.
+#: Ten hours of motion are two million peaks.
 PIECE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class FreeScores:
-    """One detector on one collision-free episode."""
+    """Scores of a detector in one collision-free episode."""
 
-    peaks: Array  #: highest sustained score of every piece, shape (P,)
-    speeds: Array  #: recent speed where it stands [rad/s], shape (P,)
-    seconds: float  #: of collision-free motion
-    floor: FreeScores | None = None  #: of the plain thresholds beneath the score
-    interval: float = 0.0  #: between two samples [s]
+    peaks: Array  #: highest sustained score of each piece, shape (P,)
+    speeds: Array  #: recent speed at this score [rad/s], shape (P,)
+    seconds: float  #: length of the collision-free motion [s]
+    floor: FreeScores | None = None  #: scores of the detector's plain thresholds, if it has any
+    interval: float = 0.0  #: sample interval [s]
 
     @classmethod
     def of(cls, level: Array, trace: Trace, settle: float) -> FreeScores:
-        """From the collision-free rows of a trace after the detector has settled.
+        """Scores in the collision-free rows of a trace after the detector has settled.
 
         Args:
-            level: what the score has reached throughout the last t_c, shape (T,); -inf: not known.
-            trace: that was scored.
-            settle: time that the detector needs to settle [s].
+            level: least score within the last confirmation time, shape (T,); -inf if unknown.
+            trace: the trace with these scores.
+            settle: settling time of the detector [s].
 
         Raises:
-            ValueError: the trace is over before the detector has settled.
+            ValueError: the trace ends before the detector has settled.
         """
         rows = np.flatnonzero(free_rows(trace, settle) & (level > -np.inf))
         if not len(rows):
@@ -67,16 +67,16 @@ class FreeScores:
 
     @property
     def peak(self) -> float:
-        """The highest score: a threshold at or above it gives no alarm."""
+        """The highest score; there is no alarm with a threshold at or above it."""
         return float(self.peaks.max())
 
     def blocks(self) -> tuple[Array, Array]:
-        """Peak of every merge gap and the speed where it stands."""
+        """Peak of each block of ``MERGE_GAP`` and the speed at this peak."""
         high, where = block_maxima(self.peaks, self._pieces(MERGE_GAP))
         return high, self.speeds[where]
 
     def cases(self) -> Array:
-        """Peak of every whole non-collision case."""
+        """Peak of each complete non-collision case (``CASE_SECONDS``)."""
         case = self._pieces(CASE_SECONDS)
         whole = len(self.peaks) // case * case
         found: Array = self.peaks[:whole].reshape(-1, case).max(axis=1)
@@ -85,7 +85,10 @@ class FreeScores:
     def over(
         self, levels: SpeedNormalisation, floor: SpeedNormalisation | None = None
     ) -> FreeScores:
-        """The larger of normalised score and floor; within a piece the speed hardly changes."""
+        """The normalised scores, or those of the floor where larger.
+
+        The speed at the peak of a piece is used for the whole piece.
+        """
         peaks, beneath = levels(self.peaks, self.speeds), None
         if floor is not None and self.floor is not None:
             beneath = self.floor.over(floor)
@@ -93,16 +96,16 @@ class FreeScores:
         return replace(self, peaks=peaks, floor=beneath)
 
     def alarms(self, threshold: float) -> int:
-        """How many alarms a threshold gives, those less than the merge gap apart as one."""
+        """Number of alarms with a threshold; alarms less than ``MERGE_GAP`` apart count as one."""
         times = np.arange(len(self.peaks)) * self.piece
         return len(find_alarms(times, self.peaks > threshold, MERGE_GAP))
 
     def _pieces(self, seconds: float) -> int:
-        """How many pieces come nearest to ``seconds``."""
+        """Number of pieces in ``seconds``, rounded."""
         return max(1, round(seconds / self.piece))
 
 
 def speed_normalisation(episodes: Sequence[FreeScores]) -> SpeedNormalisation:
-    """What the peaks of merge gaps reach at each speed."""
+    """Speed normalisation from the peaks of blocks of ``MERGE_GAP``."""
     peaks, speeds = zip(*(episode.blocks() for episode in episodes), strict=True)
     return SpeedNormalisation.fit(np.concatenate(peaks), np.concatenate(speeds))

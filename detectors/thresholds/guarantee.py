@@ -1,16 +1,17 @@
 """A threshold with a guarantee of the rate of false alarms, for motion like the calibration's.
 
-The method is split-conformal calibration whose unit is a motion episode. Samples in time are not
-exchangeable (a stick-slip lasts, a payload stays). Episodes that are drawn in the same way are
-exchangeable: the rank of a new episode's peak among the peaks of n calibration episodes is uniform.
-With the (k + 1)-th largest peak as the threshold, the probability p that a fresh episode alarms
-follows Beta(k + 1, n - k) whatever the detector and the motion (Vovk 2012), so P(p > alpha) =
-P(Binomial(n, alpha) <= k). The threshold uses the largest k for which this is at most 1 -
+The method is split-conformal calibration of motion episodes. Successive samples are not
+exchangeable, because stick-slip and payloads last longer than a sample. Episodes that are drawn in
+the same way are exchangeable. So the rank of a new episode's peak among the peaks of n calibration
+episodes is uniformly distributed.
+With the (k + 1)-th largest peak as the threshold, the probability p of an alarm in a new episode
+has the distribution Beta(k + 1, n - k), whatever the detector and the motion (Vovk 2012). Hence
+P(p > alpha) = P(Binomial(n, alpha) <= k). The largest k is used for which this is at most 1 -
 confidence.
 
-An episode may alarm more than once. The guarantee is about alarms, so alpha is the rate asked for
-times the hours of an episode over the alarms of an alarmed episode, counted at a lower threshold
-that enough calibration episodes exceed (alarms get fewer as the threshold rises).
+An episode can have several alarms, m on average if it has any. So alpha is the accepted rate, times
+the length of an episode, divided by m. m is counted at a lower threshold that enough calibration
+episodes exceed, because m decreases with the threshold.
 """
 
 from __future__ import annotations
@@ -22,22 +23,22 @@ import numpy as np
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
 
-#: Alarms of an alarmed episode are counted at the threshold that this number of episodes exceed, or
-#: this fraction of all if that is fewer.
+#: The alarms per episode are counted at the threshold that COUNTED episodes exceed, or FRACTION of
+#: all episodes if that is fewer.
 COUNTED, FRACTION = 30, 0.25
 
 
 @dataclass(frozen=True)
 class Guarantee:
-    """A calibrated threshold and what it guarantees."""
+    """A calibrated threshold and its guarantee."""
 
     threshold: float  #: of the score
-    per_hour: float  #: false alarms asked for
-    confidence: float  #: probability, over calibration sets, that the guarantee holds
-    episodes: int  #: that it was calibrated on
-    hours: float  #: of motion in them
-    allowed: int  #: calibration episodes that alarm at the threshold, at most
-    alarms_an_episode: float  #: of an alarmed one, as counted
+    per_hour: float  #: guaranteed rate of false alarms [1/h]
+    confidence: float  #: probability over calibration sets that the guarantee holds
+    episodes: int  #: number of calibration episodes
+    hours: float  #: total length of the calibration episodes [h]
+    allowed: int  #: largest number of calibration episodes with an alarm at the threshold
+    alarms_an_episode: float  #: mean number of alarms of an episode with any
 
 
 def guaranteed_threshold(
@@ -46,21 +47,22 @@ def guaranteed_threshold(
     """The lowest threshold that guarantees at most ``per_hour`` false alarms on fresh episodes.
 
     Args:
-        episodes: collision-free, drawn as those that the guarantee is for, not trained on.
-        per_hour: false alarms per hour to accept, above 0.
-        confidence: probability that calibration episodes as good as these give a threshold that
-            keeps the guarantee, between 0 and 1.
+        episodes: collision-free, not trained on, and drawn in the same way as the episodes for
+            which the guarantee is to hold.
+        per_hour: accepted false alarms per hour, above 0.
+        confidence: probability that calibration episodes drawn in this way give a threshold for
+            which the guarantee holds, between 0 and 1.
 
     Raises:
-        ValueError: bad arguments, or too few episodes for the guarantee; says how many would do.
+        ValueError: bad arguments, or too few episodes; the message says how many are enough.
     """
     check_guarantee([e.seconds for e in episodes], per_hour, confidence)
     count = len(episodes)
     hours = sum(e.seconds for e in episodes) / 3600
     peaks = np.sort([e.peak for e in episodes])[::-1]
     several, counted = 0.0, min(COUNTED, int(FRACTION * count))
-    # Counted at a threshold that at least as many episodes exceed: alarms of an episode become
-    # fewer above it.
+    # Count at a threshold that at least as many episodes exceed; above it, an episode has fewer
+    # alarms.
     while (now := _alarms_an_episode(episodes, float(peaks[counted]))) > several:
         several = now
         alpha = min(1.0, per_hour * hours / count / several)
@@ -72,18 +74,18 @@ def guaranteed_threshold(
 
 
 def check_guarantee(seconds: Sequence[float], per_hour: float, confidence: float) -> None:
-    """Whether episodes of these lengths can guarantee at all, whatever the detector.
+    """Refuse episodes that are too few or too short for the guarantee with any detector.
 
-    Each alarm is taken to be in an episode of its own; where one episode alarms more than once,
-    :func:`guaranteed_threshold` needs more of them.
+    It is assumed that no episode has two alarms; if some have, :func:`guaranteed_threshold` needs
+    more episodes.
 
     Args:
         seconds: length of each collision-free episode [s].
-        per_hour: false alarms per hour to accept, above 0.
+        per_hour: accepted false alarms per hour, above 0.
         confidence: between 0 and 1.
 
     Raises:
-        ValueError: they cannot, or bad arguments; says how many would do.
+        ValueError: bad arguments, or too few episodes; the message says how many are enough.
     """
     if not per_hour > 0:
         raise ValueError(f"per_hour: {per_hour}, expected above 0")
@@ -119,6 +121,6 @@ def allowed_episodes(count: int, alpha: float, confidence: float) -> int:
 
 
 def _alarms_an_episode(episodes: Sequence[FreeScores], threshold: float) -> float:
-    """Alarms of an episode that alarms at ``threshold``; at least 1."""
+    """Mean number of alarms, at ``threshold``, of an episode with any; at least 1."""
     counts = [n for e in episodes if (n := e.alarms(threshold)) > 0]
     return max(1.0, float(np.mean(counts))) if counts else 1.0

@@ -1,9 +1,9 @@
-"""Scores normalised over the speed: one threshold gives one rate of false alarms at all speeds.
+"""Normalisation of scores by speed, so that one threshold suits all speeds.
 
-The faster the arm moves without a collision, the larger is the residual. A single threshold on the
-score would be set by the fastest motion and be far too high for slow motion. A normalised score is
-0 at a level that the peaks of collision-free motion at this speed seldom exceed. Its unit is their
-mean excess over that level.
+The residual of collision-free motion increases with the speed. A threshold of the score that suits
+the fastest motion would be far too high for slow motion. A normalised score is 0 at a base score
+that the peaks of collision-free motion at this speed seldom exceed. Its unit is the mean excess of
+peaks over this base.
 """
 
 from __future__ import annotations
@@ -15,25 +15,23 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
 
-#: A motion counts for this time after it [s], because stiction acts after a stop.
+#: Time for which the recent speed includes a motion [s], because stiction acts after a stop.
 MEMORY = 0.5
-
-#: Number of speeds with own levels, and the least number of blocks for each.
+#: Largest number of speeds with their own base and unit, and least number of blocks for each.
 BINS, FEWEST = 10, 40
-
-#: Fraction of a speed's blocks whose peaks are its tail.
+#: Fraction of the blocks at a speed whose peaks exceed the base.
 TAIL = 0.1
 
 
 def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
     """The largest sum of |qd| over the joints within the last ``memory`` seconds, shape (T,).
 
-    Causal: a value depends on this sample and those before it.
+    Values are causal: each depends only on this sample and earlier ones.
 
     Args:
         qd: [rad/s], shape (T, n).
         dt: sample interval [s].
-        memory: [s].
+        memory: length of the window [s].
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -46,7 +44,7 @@ def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
 
 
 def memory_samples(dt: float, memory: float = MEMORY) -> int:
-    """How many samples a motion counts for, 1 or more; times in s."""
+    """Number of samples within ``memory``, at least 1; times in s."""
     if not (dt > 0 and np.isfinite(memory) and memory >= 0):
         raise ValueError(f"dt {dt}, memory {memory} s: expected above 0, and 0 or more")
     return max(1, round(memory / dt))
@@ -54,17 +52,17 @@ def memory_samples(dt: float, memory: float = MEMORY) -> int:
 
 @dataclass(frozen=True, eq=False)
 class SpeedNormalisation:
-    """Levels of the peaks of collision-free scores, as functions of the recent speed.
+    """Base and unit of collision-free scores, as functions of the recent speed.
 
-    Both grow with the speed, are linear between the speeds given and constant beyond them.
+    Both are linear between the given speeds and constant beyond them.
     """
 
-    speed: Array  #: rising [rad/s], shape (K,)
+    speed: Array  #: ascending [rad/s], shape (K,)
     base: Array  #: score that the peak of a block seldom exceeds, shape (K,)
-    unit: Array  #: of the score, above 0: mean excess of those that do exceed it, shape (K,)
+    unit: Array  #: mean excess of the peaks that exceed ``base``, above 0, shape (K,)
 
     def __post_init__(self) -> None:
-        """Check the shapes: ``ValueError`` says what they are."""
+        """Check shapes and values: ``ValueError``."""
         shapes = [np.shape(value) for value in (self.speed, self.base, self.unit)]
         if len(shapes[0]) != 1 or not shapes[0][0] or len(set(shapes)) != 1:
             raise ValueError(f"speed, base, unit: shapes {shapes}, expected (K,) each, K > 0")
@@ -73,11 +71,11 @@ class SpeedNormalisation:
 
     @classmethod
     def fit(cls, peaks: ArrayLike, speeds: ArrayLike) -> SpeedNormalisation:
-        """From the peaks of blocks of collision-free motion.
+        """Fit to the peaks of blocks of collision-free motion.
 
         Args:
             peaks: highest score of each block, shape (B,).
-            speeds: recent speed where the block has its peak [rad/s], shape (B,).
+            speeds: recent speed at this score [rad/s], shape (B,).
 
         Raises:
             ValueError: no blocks, shapes that differ, or numbers that are not finite.
@@ -104,7 +102,7 @@ class SpeedNormalisation:
         )
 
     def __call__(self, score: ArrayLike, speed: ArrayLike) -> Array:
-        """The normalised score at a recent speed [rad/s], both of one shape."""
+        """The normalised score at a recent speed [rad/s]; shapes are equal."""
         at = np.asarray(speed, dtype=np.float64)
         base = np.interp(at, self.speed, self.base)
         unit = np.interp(at, self.speed, self.unit)

@@ -1,4 +1,4 @@
-"""Peaks of scores and their tails."""
+"""Generalised Pareto tails of the peaks of scores, and thresholds for a rate of false alarms."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_normalisation
 from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
 
-#: The tail's shape where its peaks do not show another. Estimates of 26 simulated arms with two
-#: detectors have means of 0.18 and 0.20 and deviations of 0.12; chance alone makes 0.07. False
-#: alarms come from arms with heavier tails: with 0.25 all arms together have as many as asked.
+#: The tail's shape unless the peaks show another one. For two detectors on 26 simulated arms, the
+#: estimated shapes have means of 0.18 and 0.20 and standard deviations of 0.12, of which chance
+#: alone explains 0.07. The value is larger than the means because most false alarms come from arms
+#: with heavy tails. With it, all arms together have the accepted rate.
 USUAL_SHAPE = 0.25
-
-#: An estimated shape counts if it is this number of standard errors from the usual one.
+#: Largest distance of the shape from its estimate, in standard errors.
 BEYOND_CHANCE = 3.0
-
-#: Bounds of an estimated shape: the tail ends no sooner than a triangle, and has a variance.
+#: Bounds of the shape: with -0.5 the density falls linearly to 0, and from 0.5 on the variance is
+#: infinite.
 SHAPES = (-0.5, 0.5)
 
 
 @dataclass(frozen=True)
 class Tail:
-    """A generalised Pareto tail of peaks: the level that a number of them is expected to exceed.
+    """A generalised Pareto tail of peaks.
 
-    Unlike an exponential tail it can end: a score that has a highest value is not extrapolated far
-    beyond it.
+    Unlike an exponential tail, it can have an end, so that a bounded score is not extrapolated far
+    beyond its bound.
     """
 
     base: float  #: level where the tail begins
-    scale: float  #: 0: nothing is known beyond the base
+    scale: float  #: scale of the excesses over the base; 0: unknown
     shape: float
-    count: int  #: peaks above the base
+    count: int  #: number of peaks above the base
 
     @classmethod
     def of(
@@ -44,16 +44,16 @@ class Tail:
         shapes: tuple[float, float] | None = None,
         usual: float = USUAL_SHAPE,
     ) -> Tail:
-        """From the ``count`` largest peaks and the next one.
+        """The tail of the ``count`` largest peaks, whose base is the next peak.
 
-        Scale and shape follow from their excesses by probability-weighted moments (Hosking & Wallis
-        1987).
+        Scale and shape are estimated from the excesses by probability-weighted moments (Hosking &
+        Wallis 1987).
 
         Args:
             peaks: in descending order, shape (N,), N >= 1.
-            count: at most N - 1 are used.
-            shapes: lowest and highest shape; ``None``: the one nearest to ``usual`` that is within
-                :data:`BEYOND_CHANCE` standard errors of the estimate.
+            count: number of peaks in the tail; at most N - 1 are used.
+            shapes: lowest and highest shape (default: the shape is the one nearest to ``usual``
+                within :data:`BEYOND_CHANCE` standard errors of the estimate).
             usual: see ``shapes``.
         """
         count = min(count, len(peaks) - 1)
@@ -61,7 +61,7 @@ class Tail:
             return cls(float(peaks[0]), 0.0, 0.0, 0)
         excess = peaks[:count] - peaks[count]
         mean = float(excess.mean())
-        # The largest comes first: its probability of being exceeded is the smallest.
+        # Probability of exceeding each peak; peaks are in descending order.
         exceeded = (np.arange(1, count + 1) - 0.65) / count
         weighted = float(np.mean(excess * exceeded))
         if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
@@ -85,22 +85,22 @@ def shape_error(count: int) -> float:
 
 
 def _likely_shape(found: float, count: int, usual: float) -> float:
-    """The shape nearest to the usual one that an estimate of ``count`` peaks allows."""
+    """The shape nearest to ``usual`` within BEYOND_CHANCE standard errors of ``found``."""
     found, margin = float(np.clip(found, *SHAPES)), BEYOND_CHANCE * shape_error(count)
     return float(np.clip(usual, found - margin, found + margin))
 
 
 def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SHAPE) -> float:
-    """The level that ``allowed`` peaks are expected to exceed, along their :class:`Tail`.
+    """The level that ``allowed`` peaks are expected to exceed, by their :class:`Tail`.
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
-        allowed: above 0; at or above ``count`` it is the peak that so many exceed.
-        count: at most N - 1 are used.
-        usual: shape of the tail where the peaks do not show another.
+        allowed: above 0. From ``count`` on, the result is the peak that so many peaks exceed.
+        count: number of peaks in the tail; at most N - 1 are used.
+        usual: shape of the tail unless the peaks show another one.
 
     Raises:
-        ValueError: no peaks, or a number allowed that is not above 0.
+        ValueError: no peaks, or ``allowed`` not above 0.
     """
     if not (len(peaks) and allowed > 0):
         raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
@@ -109,15 +109,13 @@ def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SH
     return Tail.of(peaks, count, usual=usual).level(allowed)
 
 
-#: Fraction of the blocks whose peaks the tail is fitted to.
+#: Fraction of the blocks whose peaks are the tail.
 TAIL = 0.05
-
-#: The same of a log whose samples are further apart than :data:`SLOW` [s]. Whether a brake acts
-#: just after a sample or just before the next decides how large the residual is: such peaks are
-#: rare, and the wider the interval, the heavier their tail. Chosen on four simulated arms.
+#: This fraction for logs with sample intervals above SLOW [s]. There the residual depends on the
+#: time between a brake and the next sample, which causes rare high peaks. The longer the interval,
+#: the heavier is their tail. Chosen on four simulated arms.
 SLOW_TAIL, SLOW = 0.1, 0.015
-
-#: The usual shape of a slow log grows with its interval from this one on [s].
+#: Above this sample interval the usual shape is proportional to the interval [s].
 HEAVIER = 0.02
 
 
@@ -127,17 +125,17 @@ def tail_fraction(interval: float) -> float:
 
 
 def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
-    """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
+    """The threshold that collision-free motion exceeds ``per_hour`` times per hour.
 
-    Alarms are counted as blocks of the merge gap that exceed the threshold. Rarer alarms than the
-    motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
+    Each block of ``MERGE_GAP`` whose peak exceeds the threshold counts as one alarm. Rare alarms
+    are extrapolated by a generalised Pareto tail of the blocks' peaks.
 
     Args:
-        scores: an episode each. Where plain thresholds lie beneath a score, they alone decide.
-        per_hour: false alarms to accept.
+        scores: scores of each episode. If they have a ``floor``, only the floor is used.
+        per_hour: accepted false alarms per hour.
 
     Raises:
-        ValueError: no scores, or a rate that is not above 0.
+        ValueError: no scores, or ``per_hour`` not above 0.
     """
     if not (len(scores) and per_hour > 0):
         raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
@@ -149,25 +147,26 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     return tail_level(peaks, per_hour * hours, count, usual)
 
 
-#: Where the plain thresholds beneath a learned score have the first rate, it has the second [1/h].
-#: Both together then have the first by the tail's law: most moments that either exceeds are those
-#: of the other. Chosen on three arms.
+#: At the threshold at which the plain thresholds alone have PLAIN alarms per hour, the learned
+#: score alone has LEARNED. Both together then have about PLAIN by the tail model, because most
+#: alarms of the two coincide. Chosen on three arms.
 PLAIN, LEARNED = 1.0, 0.3
 
 
 def normalisations(
     scores: Sequence[FreeScores],
 ) -> tuple[SpeedNormalisation, SpeedNormalisation | None]:
-    """The normalisation of a score, and that of the plain thresholds beneath it.
+    """The normalisation of a learned score, and that of its floor, the plain thresholds.
 
-    One threshold holds for the larger of both: the one that the plain thresholds alone would have.
-    So what they find is found, and no later. The learned score is scaled to add few alarms to it.
+    The threshold for the larger of both normalised scores is the threshold of the floor alone. So
+    every collision that the floor detects is detected, with the same delay or a shorter one. The
+    learned score is scaled so that it adds few false alarms.
 
     Args:
-        scores: not normalised, an episode each.
+        scores: scores of each episode, not normalised.
 
     Returns:
-        The second is ``None`` where the score has no floor.
+        Both normalisations; the second is ``None`` if the scores have no floor.
     """
     levels = speed_normalisation(scores)
     beneath = [one.floor for one in scores if one.floor is not None]
