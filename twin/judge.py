@@ -32,8 +32,8 @@ WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
 ALIKE, PLACE, SPEED, APART, REPEATED = 2.0, 0.1, 0.2, 1.5, 1.0
 #: Least duration for an rms [s].
 SHORTEST = 1.0
-#: Fewest windows of each kind for an area under a curve.
-FEWEST = 40
+#: Fewest windows of each kind for an area under a curve, and its folds.
+FEWEST, FOLDS = 40, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,9 @@ class Likeness:
     """Areas of two classifiers, trees with boosting and logistic regression; .5: real and simulated
     cannot be told apart."""
     standing_auc: tuple[float, float]
-    real_auc: tuple[float, float]  #: of real against real, moving
+    programs_auc: tuple[float, float]
+    """The same of the arm's logs that the twin is made from against these logs, moving: .5 if the
+    arm itself errs alike in both. NaN if they are not given."""
     real_residuals: tuple[Array, ...]  #: of each log [N m]
     twin_residuals: tuple[Array, ...]
     times: tuple[Array, ...]  #: of the residuals [s]
@@ -86,7 +88,13 @@ def with_alarms(
     return replace(likeness, alarms=(arms, twins))
 
 
-def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0) -> Likeness:
+def compare(
+    arm: ArmModel,
+    drive: Drive,
+    traces: Sequence[Trace],
+    seed: int = 0,
+    own: Sequence[Trace] = (),
+) -> Likeness:
     """Play the twin along logs and compare its residuals with the real ones.
 
     Args:
@@ -94,6 +102,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         drive: drive of the twin.
         traces: held-out logs.
         seed: seed of sensor noise and classifier.
+        own: the logs that the twin is made from, for ``programs_auc``.
     """
     real: list[Array] = []
     twin: list[Array] = []
@@ -104,9 +113,8 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     motions: list[Array] = []
     for k, trace in enumerate(traces):
         other = replace(trace, current=played(arm, drive, trace, seed + k))
-        dt = float(np.median(np.diff(trace.t)))
-        begin = int(BEGIN / dt)
-        motions.append(np.hstack([trace.q / PLACE, trace.qd / SPEED])[begin:])
+        begin = _begin(trace)
+        motions.append(_motion(trace))
         real.append(residual_of(arm, trace)[begin:])
         twin.append(residual_of(arm, other)[begin:])
         times.append(trace.t[begin:])
@@ -121,6 +129,7 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
     seconds = np.concatenate([np.gradient(t) for t in times])
     lag = max(1, round(0.1 / dt))
     both = np.array([np.concatenate(real), np.concatenate(twin)])
+    stirred = [~s for s in still]
     return Likeness(
         _rms(twin_, moving, seconds) / _rms(real_, moving, seconds),
         _peaks(twin, moves, times) / _peaks(real, moves, times),
@@ -128,14 +137,24 @@ def compare(arm: ArmModel, drive: Drive, traces: Sequence[Trace], seed: int = 0)
         _peaks(twin, stand, times) / _peaks(real, stand, times),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        told_apart(real, twin, [~s for s in still], times, motions, seed),
+        told_apart(real, twin, stirred, times, motions, seed),
         told_apart(real, twin, still, times, motions, seed),
-        _real_auc(real, [~s for s in still], times, motions, seed),
+        _programs_auc(arm, own, real, stirred, times, motions, seed),
         tuple(real),
         tuple(twin),
         tuple(times),
         tuple(others),
     )
+
+
+def _begin(trace: Trace) -> int:
+    """The first row after :data:`BEGIN`."""
+    return int(BEGIN / float(np.median(np.diff(trace.t))))
+
+
+def _motion(trace: Trace) -> Array:
+    """Positions and velocities after :data:`BEGIN` in the units of likeness, shape (T, 2 n)."""
+    return np.hstack([trace.q / PLACE, trace.qd / SPEED])[_begin(trace) :]
 
 
 def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
@@ -193,8 +212,10 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
     """Groups of windows that stay in one fold: those of one motion, or of one part of a log.
 
     Where a program repeats a cycle, a classifier would else be tested on places of the cycle that
-    it was trained on, and tell two draws of one process apart.
+    it was trained on, and tell two draws of one process apart. With fewer motions than folds, as of
+    an arm that stands in few places, the groups are parts of a log: an area may then be too large.
     """
+    parts = 100_000 * logs + (starts / GROUP).astype(np.int64)
     groups = np.empty(len(place), dtype=np.int64)
     for i, here in enumerate(place):
         far = np.linalg.norm(place - here, axis=1)
@@ -206,7 +227,7 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
         repeated = bool((far < ALIKE).any())
         length = REPEATED if repeated else GROUP
         groups[i] = 2 * (100_000 * logs[i] + int(starts[i] / length)) + repeated
-    return groups
+    return groups if len(np.unique(groups)) >= FOLDS else parts
 
 
 def told_apart(
@@ -236,20 +257,33 @@ def told_apart(
     return _area(np.concatenate([a, b]), labels, np.concatenate([groups, groups]), seed)
 
 
-def _real_auc(
+def _programs_auc(
+    arm: ArmModel,
+    own: Sequence[Trace],
     real: Sequence[Array],
     rows: Sequence[Bools],
     times: Sequence[Array],
     motions: Sequence[Array],
     seed: int,
 ) -> tuple[float, float]:
-    """Area for windows of like motion, whose labels alternate."""
-    a, groups = _windows(real, rows, times, motions)
-    return _area(a, np.arange(len(a), dtype=np.float64) % 2, groups, seed)
+    """Area for moving windows of the arm's own logs and of the judged logs."""
+    if not own:
+        return (float("nan"),) * 2
+    ends = [(trace, slice(_begin(trace), None)) for trace in own]
+    residuals = [residual_of(arm, trace)[end] for trace, end in ends]
+    moving = [np.asarray((np.abs(trace.qd[end]) > SLOW).any(axis=1)) for trace, end in ends]
+    at, like = [trace.t[end] for trace, end in ends], [_motion(trace) for trace in own]
+    count = len(_windows(residuals, moving, at, like)[0])
+    table, groups = _windows(
+        [*residuals, *real], [*moving, *rows], [*at, *times], [*like, *motions]
+    )
+    if min(count, len(table) - count) < FEWEST:
+        return (float("nan"),) * 2
+    return _area(table, np.where(np.arange(len(table)) < count, 0.0, 1.0), groups, seed)
 
 
 def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> tuple[float, float]:
-    if len(table) < 2 * FEWEST or len(np.unique(groups)) < 5:
+    if len(table) < 2 * FEWEST or len(np.unique(groups)) < FOLDS:
         return (float("nan"),) * 2
     models = (
         HistGradientBoostingClassifier(max_iter=100, random_state=seed),
@@ -258,7 +292,7 @@ def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> 
     with threadpool_limits(1):  # small tables: threads cost more than they save
         chances = [
             cross_val_predict(
-                model, table, labels, groups=groups, cv=GroupKFold(5), method="predict_proba"
+                model, table, labels, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba"
             )
             for model in models
         ]

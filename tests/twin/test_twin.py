@@ -56,8 +56,11 @@ def test_friction_of_a_known_arm_is_found(twin):
 
 
 def test_the_twin_is_more_like_its_arm_than_one_without_friction(arm, logs, twin):
-    found = compare(arm, twin.drive, logs[2:])
+    found = compare(arm, twin.drive, logs[2:], own=logs[:2])
     assert found.moving_auc[0] < 0.9
+    # The arm itself errs alike in all its logs, but not in one with more noise.
+    assert found.programs_auc[0] < 0.8
+    assert compare(arm, twin.drive, [record(2, noise=0.05)], own=logs[:2]).programs_auc[0] > 0.95
     # Without friction the estimator is left with all of it.
     wrong = compare(arm, replace(twin.drive, friction=None, sensors=None), logs[2:])
     assert (wrong.rms > 4 * found.rms).all()

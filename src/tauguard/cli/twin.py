@@ -104,7 +104,8 @@ def command(
     judged, reasons = _made_of_each(given, [used], limit) if held else ([twin], [])
     likeness = None
     if judged and tried:
-        likeness = compare(judged[0].arm, judged[0].drive, list(tried.values()))
+        bare = [r.trace for r in used if _unloaded(r)]
+        likeness = compare(judged[0].arm, judged[0].drive, list(tried.values()), own=bare)
         likeness = with_alarms(likeness, used, given.arm, list(tried.values()))
     written = write_twin(replace(twin, notes=notes), robot, out, names, given.source)
     rows = report(twin.arm.robot.joint_names, likeness, list(tried), reasons)
@@ -204,7 +205,7 @@ def report(
     areas = {
         "moving": likeness.moving_auc,
         "standing": likeness.standing_auc,
-        "real against real, moving": likeness.real_auc,
+        "the arm in its own logs against the arm in these, moving": likeness.programs_auc,
     }
     text = "; ".join(f"{kind} {_two(a)}, {_two(b)}" for kind, (a, b) in areas.items())
     print(
