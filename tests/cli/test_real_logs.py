@@ -106,7 +106,7 @@ def test_held_out_residuals_have_the_joints_names(folder, capsys):
     ("scale", "order", "doubt"),
     [
         (1000.0, (0, 1, 2), "of the torque is not explained"),
-        (1.0, (2, 0, 1), "the order of the joints"),
+        (1.0, (2, 0, 1), "give the columns in the order of the robot file's joints"),
         (-1.0, (0, 1, 2), "the sign of the current"),
     ],
 )
