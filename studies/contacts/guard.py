@@ -174,10 +174,10 @@ def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Out
             exhausted |= report.exhausted
             impact_zones |= bool(report.impact_zones)
             rolled_back |= report.steps > 1
-            if report.balance is not None and not model.nu:
-                change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / energy.unit
-                added = max(added, change)
         spent += time.thread_time() - begin - paused
+        if guard is not None and not model.nu and (balance := report.balance) is not None:
+            change += float(np.diff(balance.energy.sum(axis=1))[0]) / energy.unit
+            added = max(added, change)
         if k % every == every - 1 or k == steps - 1:
             observe()
             if not np.isfinite(energy.most):

@@ -61,7 +61,8 @@ void queries(Random& random, int rounds) {
 void mesh(Random& random, int rounds) {
   constexpr int n = 400;
   auto faces = faces_of(random, n - 9, 500);
-  MeshCcd ccd(faces, {}, VolumeKind{14, true}, 3), one(faces, {}, VolumeKind{14, true}, 1);
+  MeshCcd ccd(faces, {}, VolumeKind{14, true}, true, 3),
+      one(faces, {}, VolumeKind{14, true}, true, 1);
   CallLock lock;
   const auto ask = [&](Random seed) {
     for (int round = 0; round < rounds; ++round) {
@@ -92,7 +93,7 @@ void interrupted() {
   std::vector<std::int32_t> faces(n);
   for (int i = 0; i < n; ++i) faces[i] = i;
   const std::vector<double> x(3 * n, 0.0);
-  MeshCcd ccd(faces, {}, VolumeKind{14, true}, 3);
+  MeshCcd ccd(faces, {}, VolumeKind{14, true}, true, 3);
   InterruptScope::ask = [] { return true; };
   bool stopped = false;
   try {

@@ -72,7 +72,7 @@ void mesh(Input& in) {
   const int ks[] = {6, 14, 16, 18, 26};
   const VolumeKind volume{ks[in.choice(5)], in.choice(2) == 1};
   auto faces = faces_of(in);
-  MeshCcd ccd(faces, {}, volume, 3), plain(faces, {}, {6, false}, 1);
+  MeshCcd ccd(faces, {}, volume, in.choice(2) == 1, 3), plain(faces, {}, {6, false}, false, 1);
   auto x0 = in.numbers(3 * vertices, 0x1p60, 0x1p-60);
   for (int step = in.between(1, 4); step > 0; --step) {
     if (in.choice(4) == 3) {
