@@ -1,4 +1,4 @@
-"""Momentum observer, features, collision detectors, event matching and metrics."""
+"""Momentum observer, collision detectors, diagnosis of collisions, and metrics."""
 
 from typing import TYPE_CHECKING
 

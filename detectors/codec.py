@@ -1,4 +1,4 @@
-"""Frozen dataclasses as plain dictionaries and arrays, and back, for model files."""
+"""Conversion of frozen dataclasses to plain dictionaries and arrays and back, for model files."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-#: Nesting of a file's content: no detector is deeper.
+#: Largest depth of nesting of a file's content.
 DEEPEST = 20
-#: No number of a detector is larger, in whatever unit: larger ones overflow in products.
+#: Largest absolute value of a number in a file, because products of larger ones could overflow.
 LARGEST = 1e15
 _TYPE, _FIELDS, _TUPLE = "type", "fields", "tuple"
 
@@ -20,7 +20,7 @@ def encode(value: object) -> Any:
     """``value`` as dictionaries, lists, arrays, numbers and text.
 
     Raises:
-        ValueError: something else in it; the message names the type.
+        ValueError: it contains an object of another type, which the message names.
     """
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -47,13 +47,13 @@ def decode(
     """The value that :func:`encode` has encoded.
 
     Args:
-        content: of a file.
-        known: the class of a name that :func:`type_name` gave; raises where it is not known.
-        depth: how deep in the file's content this is.
+        content: content of a file.
+        known: returns the class of a name of :func:`type_name`, or raises for an unknown name.
+        depth: depth of nesting of this content.
 
     Raises:
-        ValueError: unknown classes, other fields than theirs, numbers that are not finite or out
-            of range, or too deep a content.
+        ValueError: unknown classes, missing or additional fields, numbers that are not finite or
+            out of range, or too deep nesting.
     """
     if depth > DEEPEST:
         raise ValueError("nested too deeply")

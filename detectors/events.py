@@ -1,8 +1,9 @@
 """Definition of an alarm, and the collision-free rows of a trace.
 
-The alarm series is True where the score has stayed above the threshold for the confirmation time
-t_c. An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
-between onset and onset + 0.5 s (clamping: or its end, if that is later) detects that collision.
+The alarm series is True where the score has been above the threshold for the confirmation time t_c.
+An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm detects a
+collision if it starts between the onset and 0.5 s later or, for a clamping, its end if that is
+later.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ CONFIRMATION = 3e-3
 
 
 def confirmation_samples(confirmation: float, dt: float) -> int:
-    """How many successive True samples make ``confirmation`` seconds at interval ``dt`` [s].
+    """Number of successive True samples for a confirmation time at sample interval ``dt`` [s].
 
-    Sample k represents the interval that ends with it, so n samples are n dt; at least one.
+    A sample stands for the interval that ends with it, so n samples last n dt. At least one.
     """
     if not (np.isfinite(confirmation) and confirmation >= 0 and dt > 0):
         raise ValueError(f"confirmation {confirmation} s and dt {dt} s: expected >= 0 and > 0")
@@ -42,7 +43,7 @@ def confirmed(raw: ArrayLike, samples: int) -> Bools:
 
 
 def sustained(score: Array, samples: int) -> Array:
-    """The level that the last ``samples`` scores all reach, shape (T,): an alarm needs it."""
+    """Least of the last ``samples`` scores, shape (T,)."""
     if samples <= 1:
         return score
     padded = np.concatenate((np.full(samples - 1, -np.inf), score))
@@ -50,13 +51,11 @@ def sustained(score: Array, samples: int) -> Array:
     return lowest
 
 
-#: Alarms closer than this are one [s]; the false-alarm rate changes up to fourfold with it.
+#: Alarms less than this apart are one [s]. The false-alarm rate depends on it by up to a factor 4.
 MERGE_GAP = 0.5
-
-#: An alarm this long after the onset still detects the collision [s].
+#: Longest time from the onset of a collision to an alarm that detects it [s].
 WINDOW = 0.5
-
-#: Time after a collision that is not counted as collision-free [s].
+#: Time after a collision that does not count as collision-free [s].
 RECOVER = 0.5
 
 #: Length of a non-collision case [s].
@@ -91,17 +90,16 @@ def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) ->
 
 
 def detection_window(collision: Collision) -> Interval:
-    """When an alarm must start to detect ``collision``: [s], [s].
+    """First and last time at which an alarm that detects ``collision`` can start [s].
 
-    A clamping can be detected until its end, and one that lets go within milliseconds for as long
-    as any other collision.
+    A clamping can be detected until its end, and at least for :data:`WINDOW`.
     """
     soon = collision.onset + WINDOW
     return collision.onset, max(collision.end, soon) if collision.kind == "clamp" else soon
 
 
 def occupied(collision: Collision) -> Interval:
-    """The time that is not collision-free: contact and detection window [s], [s]."""
+    """First and last time of contact and detection window together [s]."""
     return collision.onset, max(collision.end, detection_window(collision)[1])
 
 
@@ -109,9 +107,9 @@ def free_rows(trace: Trace, settle: float = 1.0, recover: float = RECOVER) -> Bo
     """Rows outside all known collisions.
 
     Args:
-        trace: without truth all of it counts as free.
-        settle: seconds to leave out at the beginning.
-        recover: seconds to leave out after each collision.
+        trace: a trace without truth counts as collision-free.
+        settle: time to leave out at the beginning [s].
+        recover: time to leave out after each collision [s].
     """
     free = trace.t >= trace.t[0] + settle
     for collision in trace.truth.collisions if trace.truth else ():
@@ -121,12 +119,11 @@ def free_rows(trace: Trace, settle: float = 1.0, recover: float = RECOVER) -> Bo
 
 
 def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
-    """Collision-free rows to learn free motion from, shape (T,) a trace.
+    """Collision-free rows for training, shape (T,) for each trace.
 
-    After a collision, an estimator that tracks the payload holds a wrong payload and needs the
-    time ``settle`` to correct it. Rows within that time are left out: in one such second of a
-    recording the residual can be 80 times that of all other rows. If every row is that close to a
-    collision, all rows outside the collisions are used.
+    After a collision, the estimated payload is wrong and is corrected within the time ``settle``.
+    Rows within that time are left out, because their residual can be 80 times as large as
+    elsewhere. If all rows are that close to a collision, all rows outside collisions are used.
 
     Args:
         traces: recordings; every row of a trace without truth counts as collision-free.
@@ -138,4 +135,4 @@ def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
     return [free_rows(trace, settle) for trace in traces]
 
 
-SERIES = 0.2  # [s]: alarms of a trained detector that are nearer to each other are one
+SERIES = 0.2  # alarms in a real arm's log less than this apart are one [s]

@@ -1,4 +1,4 @@
-"""Immutable values that build a native form on demand."""
+"""Immutable dataclasses with native parts that are built on first use."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 
 class Frozen:
-    """Base of frozen dataclasses with cached native parts: copies and pickles hold fields only."""
+    """Base of frozen dataclasses; copies and pickles leave out their cached native parts."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: cached properties are computed again."""
+        """The fields without cached properties."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def __setstate__(self, state: dict[str, Any]) -> None:

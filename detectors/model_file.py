@@ -1,8 +1,8 @@
-"""Model files: one container with a kind, a version and what it was made with, in skops' format.
+"""Model files in skops' format, with a kind, a version and the versions of libraries.
 
-The content is dictionaries, arrays, numbers and text only: nothing in a file is code, and a class
-is built only if it is one of ours or of a module that the user has named. A checksum over the
-content refuses damage; numbers are range-checked by the classes that take them.
+The content consists of dictionaries, arrays, numbers and text, never of code. A class is built only
+if it is one of tauguard or of a module that the user has named. A checksum detects damage, and the
+classes check the ranges of their numbers.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ from tauguard.untrusted_input import check_no_device, reading
 #: free motion grows beyond the speeds and accelerations of the logs; srq-svr has the thresholds of
 #: moving-thresholds. 8: the shape of a window has no note.
 FORMAT, VERSION = "tauguard model", 8
-#: The kind of file that holds a trained detector with its threshold.
+#: The kind of a file with a trained detector and its threshold.
 ALARM = "collision-alarm"
-#: Versions that are written into a file.
+#: Packages whose versions are written into a file.
 MADE_WITH = ("tauguard", "mujoco", "numpy", "scikit-learn")
-#: Protocol of skops' files, and the version of skops that they are written as.
+#: Protocol and version of skops that are written into a file.
 PROTOCOL, SKOPS = 2, "0.13"
-#: Unpacked bytes of a file: no detector is larger.
+#: Largest size of an unpacked file [bytes].
 LARGEST = 256 * 2**20
-#: What a file of another format or version needs.
+#: Advice for a file of another format or version.
 ANEW = "train the detector anew by `tauguard train`"
-#: Formats of earlier versions, which are refused by name.
+#: Formats of earlier versions, for the error message.
 EARLIER = ("tauguard detector", "tauguard ranking detector", "tauguard free-motion detector")
 
-#: What builds the value of a file from its content, by kind.
+#: Functions that build the value of a file from its content, by kind.
 READERS: dict[str, Callable[[Any], Any]] = {ALARM: lambda content: decode(content, file_type)}
 
 
 def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:
-    """Write a fitted detector with its threshold; the whole file or nothing.
+    """Write a fitted detector with its threshold; after an error, ``path`` is unchanged.
 
     Raises:
-        ValueError: a threshold that is not finite, a detector that holds something else than
-            numbers, text, arrays and dataclasses of these, or a folder that cannot be written.
+        ValueError: a threshold that is not finite, a detector with other fields than numbers, text,
+            arrays and dataclasses of these, or a folder that cannot be written.
     """
     if not np.isfinite(alarm.threshold):
         raise ValueError(f"threshold {alarm.threshold}: expected a finite one in a model file")
@@ -64,16 +64,16 @@ def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:
 
 
 def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
-    """Read what :func:`save_model` wrote.
+    """Read a file of :func:`save_model`.
 
     Raises:
-        ValueError: missing, damaged or of another kind or version (the message says what would
-            do), with numbers that no arm has, or a detector that no impact moves or that is never
-            silent.
+        ValueError: the file is missing, damaged, or of another kind or version (the message says
+            what to do), has numbers that no arm can have, or contains a detector that raises no
+            alarm at any impact or alarms all the time.
     """
     alarm = read_model(path, ALARM)
     if not isinstance(alarm, CollisionAlarm):
-        raise ValueError(f"{path}: holds a {type(alarm).__name__}, not a detector; {ANEW}")
+        raise ValueError(f"{path}: contains a {type(alarm).__name__}, not a detector; {ANEW}")
     with reading(Path(path), ANEW), np.errstate(all="ignore"):
         check_ranges(alarm)
         check_alarms(alarm)
@@ -81,12 +81,13 @@ def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
 
 
 def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
-    """Write ``value`` (see :func:`tauguard.detectors.codec.encode`); the whole file or nothing.
+    """Write ``value``, encoded by :func:`tauguard.detectors.codec.encode`.
 
-    It is signed if the user has a key (see :mod:`tauguard.detectors.signature`).
+    After an error, ``path`` is unchanged. The file is signed if the user has a key (see
+    :mod:`tauguard.detectors.signature`).
 
     Raises:
-        ValueError: it cannot be in a file, or the folder cannot be written.
+        ValueError: the value cannot be encoded, or the folder cannot be written.
     """
     content, key = encode(value), key_of_user()
     own = checksum(content)
@@ -106,11 +107,11 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
 
 
 def read_model(path: str | os.PathLike[str], kind: str) -> Any:
-    """The value of a file of this kind.
+    """The value in a file of this kind.
 
     Raises:
-        ValueError: missing, damaged, of another kind, format or version, or with content that the
-            kind's classes refuse; one line that names the file.
+        ValueError: the file is missing, damaged, of another kind, format or version, or has values
+            out of range; one line that names the file.
     """
     container = _container(Path(path))
     version, own = container.get("version"), container.get("kind")
@@ -131,7 +132,7 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
 
 
 def _archive(container: Mapping[str, Any]) -> bytes:
-    """What ``skops.io.dumps`` makes of a container, without its imports, which take seconds."""
+    """The result of ``skops.io.dumps``, without the imports of skops, which take seconds."""
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:
         schema = _node(container, archive) | {"protocol": PROTOCOL, "_skops_version": SKOPS}
@@ -160,7 +161,7 @@ def _node(value: Any, archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def _container(path: Path) -> Mapping[str, Any]:
-    """The outer dictionary of a file of ours."""
+    """The outer dictionary of a model file."""
     check_no_device(path)
     try:
         data = path.read_bytes()
@@ -176,7 +177,7 @@ def _container(path: Path) -> Mapping[str, Any]:
                 if name.endswith(".npy")
             }
             found = _value(json.loads(archive.read("schema.json")), arrays, unknown)
-    except Exception as error:  # whatever a damaged archive makes the readers of its parts raise
+    except Exception as error:  # a damaged archive can raise any exception
         earlier = _json_format(data)
         if earlier:
             raise ValueError(f"{path}: of the earlier format {earlier!r}; {ANEW}") from None
@@ -192,14 +193,14 @@ def _container(path: Path) -> Mapping[str, Any]:
 
 
 def _value(node: Any, arrays: Mapping[str, Any], unknown: set[str]) -> Any:
-    """What a node of a skops schema holds: dictionaries, lists, arrays, numbers and text.
+    """The value of a node of a skops schema: dictionaries, lists, arrays, numbers and text.
 
-    skops itself imports scikit-learn and pytest for this, which takes seconds.
+    skops itself is not used, because it imports scikit-learn and pytest, which takes seconds.
 
     Args:
-        node: as ``skops.io`` wrote it.
-        arrays: by the names of their files.
-        unknown: gets the names of other types.
+        node: as written by ``skops.io``.
+        arrays: arrays by the names of their files.
+        unknown: output: the names of other types are added.
     """
     loader, kind = node["__loader__"], f"{node['__module__']}.{node['__class__']}"
     if (loader, kind) == ("DictNode", "builtins.dict"):
@@ -216,7 +217,7 @@ def _value(node: Any, arrays: Mapping[str, Any], unknown: set[str]) -> Any:
 
 
 def _bounded(archive: zipfile.ZipFile) -> None:
-    """Refuse an archive that unpacks to more than :data:`LARGEST`, and arrays larger than theirs.
+    """Refuse an archive larger than :data:`LARGEST`, or an array that declares a wrong size.
 
     Raises:
         ValueError: says which.
@@ -244,7 +245,7 @@ def _check_array(file: Any, size: int) -> None:
 
 
 def _json_format(data: bytes) -> str:
-    """The format that a JSON file of an earlier version names, else nothing."""
+    """The format named in a JSON file of an earlier version, else ""."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError):

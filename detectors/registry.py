@@ -1,7 +1,7 @@
-"""The registry of detection methods: a name, and what makes its settings with their defaults.
+"""The registry of detection methods by name.
 
-A method's module is imported when the method is made or read: those that learn from contacts need
-scikit-learn, which takes longer to import than a log to judge.
+A method's module is imported on first use, because some need scikit-learn, whose import takes
+longer than the detection in a log.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def _score(module: str, maker: str) -> Any:
     return getattr(importlib.import_module(f"tauguard.detectors.scores.{module}"), maker)()
 
 
-#: Every method, in the order that reports show them.
+#: Functions that make the default settings of each method, in the order of reports.
 DETECTORS: dict[str, Callable[[], Detector]] = {
     "srq-svr": partial(_score, "windowed", "SrqSvr"),
     "srq-svr-plain": partial(_score, "windowed", "PlainSrqSvr"),
@@ -31,7 +31,7 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "free-motion": partial(_score, "free_motion", "FreeMotion"),
 }
 
-#: Modules of the classes that a model file may hold, by their names there.
+#: Modules of the classes that are allowed in model files, by class name.
 FILE_TYPES: dict[str, str] = {
     name: f"tauguard.detectors.{module}"
     for module, names in {
@@ -58,21 +58,20 @@ FILE_TYPES: dict[str, str] = {
     for name in names.split()
 }
 
-#: Modules of others that the user has named in this process.
+#: User modules that were named in this process.
 _NAMED: set[str] = set()
-
-#: Names more of them, with commas between, for any command and for processes that others start.
+#: Environment variable with further user modules, separated by commas.
 MODULES = "TAUGUARD_DETECTORS"
 
 
 def make_detector(name: str) -> Detector:
-    """The settings of a method by its name, or of another's class as ``module:Class``.
+    """The settings of a method by its name, or of a user's class as ``module:Class``.
 
-    A module that is named here may also be loaded from model files, as one that the environment
-    variable ``TAUGUARD_DETECTORS`` names.
+    Classes of a module that is named here, or in the environment variable ``TAUGUARD_DETECTORS``,
+    are also allowed in model files.
 
     Raises:
-        ValueError: no such name or class; the message lists the names that there are.
+        ValueError: no such name or class; the message lists the existing names.
     """
     if ":" in name:
         return _of_another(name)
@@ -101,7 +100,7 @@ def _of_another(name: str) -> Detector:
 
 
 def admit(module: str) -> None:
-    """Allow model files to build classes of a module of others.
+    """Allow classes of a user's module in model files.
 
     Raises:
         ValueError: it cannot be imported.
@@ -117,10 +116,10 @@ def admit(module: str) -> None:
 
 
 def file_type(name: str) -> type:
-    """The class that a model file calls ``name``.
+    """The class with this name in a model file.
 
     Raises:
-        ValueError: not one of ours, nor of a module that was named in this process.
+        ValueError: neither a class of tauguard nor of a module that the user has named.
     """
     if name in FILE_TYPES:
         ours: type = getattr(importlib.import_module(FILE_TYPES[name]), name)

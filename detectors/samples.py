@@ -13,7 +13,7 @@ def common_interval(traces: Sequence[Trace], joint_names: Sequence[str]) -> floa
     """The sample interval of training traces [s].
 
     Raises:
-        ValueError: no traces, joints that are not the arm's, or rates that differ (named).
+        ValueError: no traces, another number of joints than the arm's, or different rates.
     """
     check_joints(traces, joint_names)
     dt = float(np.median([trace.dt for trace in traces]))
@@ -41,10 +41,10 @@ def check_joints(traces: Sequence[Trace], joint_names: Sequence[str]) -> None:
 
 
 def check_trace(trace: Trace, joints: int, dt: float) -> None:
-    """Refuse a trace of another arm or at another rate than training's.
+    """Refuse a trace with another number of joints or another rate than the training's.
 
     Raises:
-        ValueError: says what the trace has and what the detector works with.
+        ValueError: names the value of the trace and that of the detector.
     """
     if len(trace.joint_names) != joints:
         raise ValueError(f"the trace has {len(trace.joint_names)} joints, this detector {joints}")

@@ -1,7 +1,7 @@
 """Test of a detector from a file: no alarm while an arm stands, an alarm when it is hit.
 
-A file whose every number is in its range can still hold a detector that never raises an alarm, or
-raises one at all times. The test finds these. It does not measure how good a detector is.
+A detector whose numbers are all in range can still raise no alarm at all, or one all the time. The
+test refuses both. It does not measure the quality of a detector.
 """
 
 from __future__ import annotations
@@ -17,16 +17,17 @@ from tauguard.traces.trace import Trace
 
 #: Sample intervals [s] and settling times [s] that a recording of an arm can have.
 INTERVALS, LONGEST_SETTLE = (1e-5, 1.0), 600.0
-#: Samples of the settling time, at most: the check runs through all of them.
+#: Largest number of samples within the settling time, because the check evaluates all of them.
 MOST_SAMPLES = 100_000
-#: Torque per ampere [N m/A], mass of a link [kg] and gravity [m/s^2] that an arm can have.
+#: Range of the torque per ampere [N m/A], largest mass of a link [kg] and gravity [m/s^2].
 GAINS, HEAVIEST, GRAVITY = (1e-4, 1e4), 1e4, 100.0
-#: Impacts of which one must raise an alarm: torques at all joints [N m], length and pause [s].
+#: Impacts, at least one of which has to raise an alarm: torques of all joints [N m], duration, and
+#: pause between impacts [s].
 IMPACTS, IMPACT, PAUSE = (5.0, 20.0, 80.0, 320.0), 0.3, 0.5
 
 
 def check_ranges(alarm: CollisionAlarm) -> None:
-    """Refuse numbers that no arm and no recording has.
+    """Refuse numbers that no arm and no recording can have.
 
     Raises:
         ValueError: says which.
@@ -52,12 +53,12 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 
 
 def check_alarms(alarm: CollisionAlarm) -> None:
-    """Refuse a detector without an alarm at any impact, or with one throughout on an arm at rest.
+    """Refuse a detector that alarms at no impact, or all the time while the arm is at rest.
 
-    A learned score and the plain thresholds that it contains are checked separately.
+    A learned score and the plain thresholds of its detector are checked separately.
 
     Raises:
-        ValueError: says which, or that a score is not a number.
+        ValueError: says which of the two, or that a score is not a number.
     """
     plain = floor_of(alarm)
     if alarm.floor is not None and plain is not None:
@@ -73,13 +74,13 @@ def check_alarms(alarm: CollisionAlarm) -> None:
 
 
 def standing_then_hit(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:
-    """An arm that stands at zero as its model says, then is hit harder and harder.
+    """A trace of an arm at rest at zero, with currents by its model, then with growing impacts.
 
     Returns:
         The trace, and the row of the first impact.
     """
     seconds = settle + PAUSE + len(IMPACTS) * (IMPACT + PAUSE)
-    # At a low rate too, windows and confirmation need some samples.
+    # At low sample rates, impacts are longer, because windows and confirmation need some samples.
     slow = max(1.0, dt / 0.01)
     t = np.arange(round(seconds * slow / dt), dtype=np.float64) * dt
     begin, period = settle + PAUSE * slow, (IMPACT + PAUSE) * slow

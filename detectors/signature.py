@@ -1,4 +1,4 @@
-"""Signatures of model files for users who keep a key: a checksum finds damage, not manipulation."""
+"""Signatures of model files with a user's key, because a checksum does not detect manipulation."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import hmac
 import os
 from pathlib import Path
 
-#: Names a file with the key; its bytes are the key.
+#: Environment variable with the path of the key file, whose bytes are the key.
 KEY_FILE = "TAUGUARD_MODEL_KEY"
-#: Fewer bytes are no key.
+#: Least length of a key [bytes].
 SHORTEST = 16
 
 
@@ -17,7 +17,7 @@ def key_of_user() -> bytes | None:
     """The key in the file that the environment variable ``TAUGUARD_MODEL_KEY`` names.
 
     Raises:
-        ValueError: it cannot be read, or is shorter than 16 bytes.
+        ValueError: the file cannot be read, or is shorter than 16 bytes.
     """
     name = os.environ.get(KEY_FILE)
     return None if not name else read_key(Path(name))
@@ -40,10 +40,10 @@ def signed(checksum: str, key: bytes) -> str:
 
 
 def check_signature(checksum: str, signature: object, key: bytes) -> None:
-    """Refuse what this key has not signed.
+    """Refuse a content that was not signed with this key.
 
     Raises:
-        ValueError: no signature, or another key's.
+        ValueError: no signature, or one with another key.
     """
     if not isinstance(signature, str):
         raise ValueError("not signed, and a key is set: sign it by writing it with the key")

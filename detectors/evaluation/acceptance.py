@@ -1,4 +1,4 @@
-"""Checks by cross-validation of a calibration and of a detector from free logs."""
+"""Checks of a calibration and a detector by cross-validation on collision-free logs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import friction_levels
 from tauguard.report import poisson_rate
 
-#: Largest held-out error, in the unit of a joint's bounds; a detector tracks a part of it. Up to
-#: 1.3 on three real arms (a wrist that moves in one log only).
+#: Largest held-out error, in friction levels of the joint; the estimator of a detector reduces it.
+#: It is at most 1.3 on three real arms, for a wrist that moves in only one log.
 HELD_OUT = 2.0
-
-#: False alarms an hour that are accepted of logs without a contact.
+#: Accepted false alarms per hour of logs without a contact.
 ASKED = 10.0
 
 
@@ -40,13 +39,13 @@ def check_own_alarms(logs: Sequence[CrossValidatedLog], asked: float = ASKED) ->
     raise ValueError(
         f"{alarms} alarms in {seconds / 60:.1f} min of logs without a contact, each judged by the "
         f"others ({own}): at least {low:.0f} an hour where {asked:g} are accepted; if "
-        "something touched the arm there, leave these logs out or cut the touches out, else more "
-        "logs of such motion would help"
+        "something touched the arm there, leave these logs out or cut the touches out, else give "
+        "more logs of such motion"
     )
 
 
 def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
-    """Refuse a left-out log whose error is beyond the bounds for half of the time.
+    """Refuse logs whose held-out error exceeds the bounds for half of the time in motion.
 
     Raises:
         ValueError: names the logs.
@@ -63,16 +62,16 @@ def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
 def check_held_out(
     arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording], held: Sequence[Array]
 ) -> None:
-    """Refuse a calibration whose error in a held-out log exceeds the unit of the bounds.
+    """Refuse a calibration whose error in a held-out log exceeds HELD_OUT friction levels.
 
     Args:
-        arm: identified from all.
+        arm: identified from all recordings.
         names: names of the recordings.
         recordings: collision-free; those with a load are not checked.
-        held: held-out residual of each without its load [N m], shape (n,) each.
+        held: held-out RMS residual of each recording without a load [N m], shape (n,) each.
 
     Raises:
-        ValueError: names joint, log, error and level, the worst first.
+        ValueError: names joint, log, error and friction level of the largest excess.
     """
     if not len(held):
         return

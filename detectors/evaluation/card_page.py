@@ -1,4 +1,4 @@
-"""The threshold card for a reader: in the terminal, and as a picture."""
+"""The threshold card as text for the terminal, and as a picture."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
-#: Logs shorter than the first time allow no rate of alarms, logs shorter than the second only a
-#: rough one [s].
+#: Least length of logs for which an alarm rate is printed, and length below which the text says
+#: that longer logs would determine it better [s].
 SHORTEST, SHORT = 300.0, 1800.0
-#: A log that begins later than this was stamped by a clock [s].
+#: If the first time stamp is above this, time stamps are those of a clock [s].
 CLOCK = 1e6
-#: Alarms of a log whose seconds are listed.
+#: Largest number of alarms of a log whose times are listed.
 LISTED = 6
-#: The condition under which each force at the tool holds.
+#: The condition of each force at the tool.
 TOOL = {
     "standing": "standing for some seconds, pushed within 0.1 s",
     "slowly": "standing for some seconds, pushed over 1 s",
@@ -33,7 +33,7 @@ TOOL = {
 
 
 def text(card: ThresholdCard) -> str:
-    """One page."""
+    """The card as one page of text."""
     from tauguard.report import table
 
     rows = [
@@ -44,7 +44,7 @@ def text(card: ThresholdCard) -> str:
 
 
 def _levels(card: ThresholdCard) -> dict[str, Array]:
-    """Torques that are found, in the order of table and picture."""
+    """Least torques that are found, by their names, in the order of table and picture."""
     return {
         "standing": card.standing,
         "just stopped": card.stopped,
@@ -53,7 +53,7 @@ def _levels(card: ThresholdCard) -> dict[str, Array]:
     }
 
 
-#: The regime of :attr:`ThresholdCard.unseen` that each column is about.
+#: The regime in :attr:`ThresholdCard.unseen` of each column.
 REGIMES = {
     "standing": "standing for 2 s",
     "just stopped": "just stopped",
@@ -63,9 +63,9 @@ REGIMES = {
 
 
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
-    """A joint's number: "-" if it is not watched, in brackets if it rests on prior knowledge.
+    """A joint's torque as text: "-" if unknown, in brackets if it comes from other arms.
 
-    That is so if no log shows the regime, or none shows the joint's motion while others move.
+    It comes from other arms if the regime, or the joint's motion while others move, is in no log.
     """
     value, moving = _levels(card)[name][j], card.moving
     if value != value:
@@ -76,16 +76,16 @@ def _torque(card: ThresholdCard, name: str, j: int) -> str:
 
 
 def printed_from(begin: float) -> float:
-    """The offset that is subtracted from a log's times for printing.
+    """The offset that is subtracted from a log's times in printed text [s].
 
-    It is the beginning ``begin`` [s] if a clock stamped the log, as ROS does, and otherwise 0.
-    Files keep the log's times.
+    It is the first time stamp ``begin`` if that is a clock's, as in ROS logs, else 0. Times in
+    files are not changed.
     """
     return begin if begin > CLOCK else 0.0
 
 
 def rate_text(high: float, seconds: float, said: str) -> str:
-    """An upper bound of alarms per hour in the text ``said``, if the log is long enough.
+    """An upper bound of alarms per hour as text, if the log is long enough.
 
     Args:
         high: the upper bound.
@@ -94,7 +94,7 @@ def rate_text(high: float, seconds: float, said: str) -> str:
     """
     if seconds < SHORTEST:
         return f"; {seconds / 60:.1f} min are too short to say how many an hour"
-    more = "; longer logs would say more" if seconds < SHORT else ""
+    more = "; longer logs would give a better bound" if seconds < SHORT else ""
     return said.format(f"{high:.0f}") + more
 
 
@@ -169,7 +169,7 @@ def _newton(force: float) -> str:
 
 
 def _alarms(card: ThresholdCard) -> str:
-    """How many alarms the logs themselves raise, and in which."""
+    """Number of alarms in the training logs, and names of logs with alarms."""
     high = card.false_alarms_per_hour["high"]
     said = f"alarms in these logs: {card.alarms} in {card.seconds / 60:.1f} min, each "
     said += "log" if len(card.logs) > 1 else "part"
@@ -182,7 +182,7 @@ def _alarms(card: ThresholdCard) -> str:
 
 
 def times(log: CrossValidatedLog) -> str:
-    """How many alarms a log has, and at which seconds: "3 alarms at 1.2, 3.4, 5.6 s"."""
+    """Number and times of the alarms of a log: "3 alarms at 1.2, 3.4, 5.6 s"."""
     since = printed_from(log.begin)
     starts = [f"{alarm.start - since:.1f}" for alarm in log.alarms]
     shown = ", ".join(starts[:LISTED]) + (" ..." if len(starts) > LISTED else "")

@@ -1,8 +1,8 @@
 """Cross-validation of logs that are given as free of contacts.
 
-A contact in such a log raises the bounds, and similar contacts are then missed. So every log is
-evaluated with a calibration and bounds from the other logs, and its alarms are counted. A log with
-a far higher rate of alarms than the others stands out.
+A contact in a training log would raise the bounds, so that similar contacts are missed. So each log
+is evaluated with a calibration and bounds from all other logs, and its alarms are counted. A log
+stands out if its rate of alarms is far higher than that of all other logs.
 """
 
 from __future__ import annotations
@@ -42,16 +42,17 @@ from tauguard.detectors.scores.free_motion import (
 )
 from tauguard.traces.trace import Alarm
 
-#: Largest number of calibrations; more logs than this are left out in groups.
+#: Largest number of calibrations; more logs than this are held out in groups.
 TURNS = 12
 
-#: A log stands out if its number of alarms has less than this probability at the other logs' rate,
-#: corrected for the number of logs. On three real arms the probability of a free log is at least
-#: 0.14, and that of a log with pushes at most 1e-5.
+#: A log stands out if the probability of its number of alarms at the rate of all other logs,
+#: corrected for the number of logs, is below this. On three real arms the probability is at least
+#: 0.14 for a free log, and at most 1e-5 for a log with pushes.
 CHANCE = 0.01
 
-#: Least median of a log's residual in motion over its bound at which the log differs throughout, as
-#: with an unknown load (1.1 and 0.6 on two simulated arms; up to 0.5 in free logs of three arms).
+#: A log differs throughout, as with an unknown load, if the median ratio of residual to bound in
+#: motion is above this. The ratio is 1.1 and 0.6 with a load on two simulated arms, and at most 0.5
+#: in free logs of three arms.
 THROUGHOUT = 0.8
 
 
@@ -64,36 +65,36 @@ class CrossValidatedLog:
     """A log, evaluated with a calibration and bounds from the other logs."""
 
     name: str
-    begin: float  #: its first time [s]
-    seconds: float  #: its length [s]
-    alarms: tuple[Alarm, ...]  #: in the log's own time
-    level: float  #: median of the largest residual over bound of joints in motion
+    begin: float  #: first time of the log [s]
+    seconds: float  #: length of the log [s]
+    alarms: tuple[Alarm, ...]  #: with times of the log
+    level: float  #: median over samples of the largest residual over bound of joints in motion
 
     @property
     def throughout(self) -> bool:
-        """Whether its torques differ from the other logs' throughout."""
+        """Whether the torques differ from those of all other logs throughout."""
         return self.level > THROUGHOUT
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """The logs to learn from, and those that are left out."""
+    """The logs for training, and the logs that are left out."""
 
-    kept: tuple[CrossValidatedLog, ...]  #: each evaluated by the other kept ones
+    kept: tuple[CrossValidatedLog, ...]  #: each evaluated with all other kept logs
     left_out: tuple[CrossValidatedLog, ...]
-    """Logs that stood out, each evaluated by those that remained then."""
+    """Logs that stood out, each evaluated with the logs that were kept at that time."""
     accepted: tuple[CrossValidatedLog, ...]  #: logs that stand out and are kept on request
 
 
 def cross_validate(
     recordings: Mapping[str, Recording], arm: ArmModel, accepted: Collection[str] = ()
 ) -> CrossValidation:
-    """Leave out logs that stand out, one after the other, never more than half of them.
+    """Leave out logs that stand out, one at a time, at most half of all logs.
 
     Args:
         recordings: by name.
         arm: nominal numbers and drive gains.
-        accepted: names that are kept in any case.
+        accepted: names of logs that are always kept.
     """
     names, out = list(recordings), list[CrossValidatedLog]()
     least = min(KEPT, motion_length(list(recordings.values())))
@@ -110,7 +111,7 @@ def cross_validate(
 
 
 def standing_out(logs: Sequence[CrossValidatedLog]) -> list[CrossValidatedLog]:
-    """The logs with far more alarms for their length than the others, the least likely first."""
+    """The logs whose rate of alarms is far above that of all other logs, least likely first."""
     from scipy.stats import binom
 
     count = sum(len(log.alarms) for log in logs)
@@ -126,16 +127,16 @@ def standing_out(logs: Sequence[CrossValidatedLog]) -> list[CrossValidatedLog]:
 
 
 def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[CrossValidatedLog]:
-    """Every log's alarms with calibration and bounds from the other logs.
+    """Evaluate each log with a calibration and bounds from all other logs.
 
-    A single log is cut into parts, each of which is evaluated by the others. If the other logs have
-    too little motion for a calibration, that of all logs is used.
+    A single log is cut into parts, and each part is evaluated with all other parts. If the other
+    logs have too little motion for a calibration, the calibration from all logs is used.
 
     Returns:
-        In order.
+        The logs in their order.
 
     Raises:
-        ValueError: all together show too little motion.
+        ValueError: all logs together have too little motion.
     """
     parts = dict(recordings)
     whole = [name for name, r in parts.items() if moves(r.trace)]
@@ -159,8 +160,8 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
 
 
 def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, ...], float]]:
-    """Alarms and level of each part, under calibration and bounds from the parts of other turns."""
-    if not any(moves(part.trace) for part in parts):  # one bound for all, of their calmest pieces
+    """Alarms and level of each part, with calibration and bounds from the other turns' parts."""
+    if not any(moves(part.trace) for part in parts):  # one bound for all, from calmest pieces
         still = standing_detector(arm, parts)
         return [_alarms_and_level(with_load_of(part, still).judge(part.trace)) for part in parts]
     numbers = [k for k, part in enumerate(parts) if moves(part.trace)]

@@ -1,4 +1,4 @@
-"""Diagnoses against the truth: link, force, direction and point of the collisions found."""
+"""Comparison of diagnoses with the truth: link, force, direction and point of found collisions."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class ContactErrors:
 
     @classmethod
     def of(cls, force: ArrayLike, point: ArrayLike, truth: tuple[Array, Array]) -> ContactErrors:
-        """Of an estimated force [N] and point [m] against the true ones."""
+        """Errors of an estimated force [N] and point [m]."""
         said, place = np.asarray(force, dtype=float), np.asarray(point, dtype=float)
         size, own = float(np.linalg.norm(truth[0])), float(np.linalg.norm(said))
         cosine = float(said @ truth[0]) / (size * own) if size * own > 0 else 0.0
@@ -70,7 +70,7 @@ class TrueSeverity:
 
     @classmethod
     def of(cls, trace: Trace, collision: Collision, until: float) -> TrueSeverity:
-        """From the truth, up to the time ``until`` [s].
+        """The severity of a collision until the time ``until`` [s].
 
         Raises:
             ValueError: the trace has no truth.
@@ -85,7 +85,7 @@ class TrueSeverity:
 
 @dataclass(frozen=True)
 class MatchedDiagnosis:
-    """A diagnosis and the collision that it is about; None for a false alarm."""
+    """A diagnosis, with the collision that its alarm detected or None for a false alarm."""
 
     diagnosis: Diagnosis
     collision: Collision | None
@@ -96,8 +96,8 @@ class MatchedDiagnosis:
 def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[MatchedDiagnosis]:
     """Each diagnosis with the collision that its alarm detected.
 
-    The first alarm that starts in a collision's detection window is about it, later ones in the
-    window are left out; an alarm in no window is false.
+    A collision is detected by the first alarm that starts in its detection window. Later alarms in
+    the window are left out. An alarm in no window is false.
 
     Raises:
         ValueError: the trace has no truth.
@@ -126,8 +126,8 @@ def diagnosis_metrics(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
     Returns:
         ``link_right``, ``link_or_neighbour``, ``last_joint_right`` (the usual rule), each a rate
         with its Wilson interval over the collisions found; ``force_error_n``, ``direction_deg``
-        and ``point_cm`` (median, p95, n); ``called_payload`` over the collisions found and
-        ``false_alarms_called_payload`` over the false alarms, rates again; and those of
+        and ``point_cm`` (median, p95, n); the rates ``called_payload`` over the collisions found
+        and ``false_alarms_called_payload`` over the false alarms; and the metrics of
         :func:`severity_figures`.
     """
     several = list(matched)
@@ -150,12 +150,12 @@ def diagnosis_metrics(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
 
 
 def severity_figures(sizes: Sequence[tuple[Diagnosis, TrueSeverity]]) -> dict[str, Any]:
-    """How often the 90 % intervals of impulse and peak force hold the true value.
+    """Metrics of the 90 % intervals of impulse and peak force.
 
     Returns:
-        ``impulse_held`` and ``peak_held``, rates; ``impulse_identifiable`` and
-        ``peak_identifiable``, rates; ``impulse_width`` and ``peak_width``, the upper end over the
-        lower one (median, p95, n).
+        ``impulse_held`` and ``peak_held``, rates at which the interval contains the true value;
+        ``impulse_identifiable`` and ``peak_identifiable``, rates; ``impulse_width`` and
+        ``peak_width``, upper end divided by lower end (median, p95, n).
     """
     figures: dict[str, Any] = {}
     for name in ("impulse", "peak"):
@@ -169,7 +169,7 @@ def severity_figures(sizes: Sequence[tuple[Diagnosis, TrueSeverity]]) -> dict[st
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:
-    """Median, 95th percentile and number; None where there is none."""
+    """Median, 95th percentile and number of values; None without values."""
     if not values:
         return {"median": None, "p95": None, "n": 0}
     median, p95 = np.percentile(values, (50, 95))

@@ -1,4 +1,4 @@
-"""Alarms in a log beside the contacts that a column of it labels."""
+"""Alarms in a log compared with contacts that a column of the log labels."""
 
 from collections.abc import Sequence
 from statistics import median
@@ -6,17 +6,18 @@ from typing import Any
 
 from tauguard.traces import Alarm
 
-#: Time after the onset of a contact within which an alarm belongs to it [s].
+#: An alarm that starts within this time after the onset of a contact detects it [s].
 LATE = 0.5
 
 
 def beside_labels(
     alarms: Sequence[Alarm], touched: Sequence[tuple[float, float]], begin: float, end: float
 ) -> dict[str, Any]:
-    """Results on the labelled contacts, as JSON values.
+    """Compare alarms with labelled contacts.
 
-    A contact is found by an alarm that begins during it, or within 0.5 s of its onset, and before
-    the next contact. Without one, an earlier alarm may still be up. Any other alarm is false.
+    A contact is found by an alarm that begins before the next contact, and during the contact or
+    within 0.5 s of its onset. If an earlier alarm is still on at the onset instead, the contact
+    counts as ``still_up``. Any other alarm is false.
 
     Args:
         alarms: in order of time.
@@ -25,8 +26,8 @@ def beside_labels(
         end: end of the log [s].
 
     Returns:
-        ``contacts``, ``found``, ``still_up`` (in an alarm that began before), ``missed`` (their
-        onsets [s]), ``delays`` [s] of those found, ``false_alarms``, ``free_seconds``.
+        JSON values: numbers of ``contacts``, ``found``, ``still_up`` and ``false_alarms``; onsets
+        of ``missed`` contacts [s]; ``delays`` of found ones [s]; and ``free_seconds``.
     """
     onsets = [a for a, _ in touched]
     windows = [
@@ -59,7 +60,7 @@ def beside_labels(
 
 
 def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
-    """The figures of :func:`beside_labels` in a line or two; times count from ``since`` [s]."""
+    """Results of :func:`beside_labels` in one or two lines, with times since ``since`` [s]."""
     delays = found["delays"]
     when = (
         f" ({1e3 * median(delays):.0f} ms after the onset in the median, at most "

@@ -1,9 +1,8 @@
-"""From a boolean series to alarms, and from alarms to detected collisions and false alarms.
+"""Matching of alarms with collisions: detected and missed collisions, and false alarms.
 
-An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
-between onset and onset + 0.5 s (clamping: or its end, if that is later) detects that collision,
-and the first one counts. Any other alarm is false, one during a payload change too; an alarm
-already up at onset is false and detects nothing.
+A collision is detected by the first alarm that starts between its onset and 0.5 s later or, for a
+clamping, its end if that is later. Any other alarm is false, for example during a payload change.
+An alarm that is on at the onset of a collision does not detect it.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ class Matching:
     """The matches of one trace."""
 
     collisions: tuple[Collision, ...]
-    delays: tuple[float | None, ...]  #: alarm start less onset [s], None for a missed collision
+    delays: tuple[float | None, ...]  #: alarm start minus onset [s], None for a missed collision
     false_alarms: tuple[Alarm, ...]
     free_seconds: float  #: collision-free time [s]
-    cases: int  #: non-collision cases
-    false_cases: int  #: of them, those that a false alarm touches
+    cases: int  #: number of non-collision cases
+    false_cases: int  #: number of non-collision cases with a false alarm
 
 
 def match(
@@ -36,14 +35,14 @@ def match(
 ) -> Matching:
     """Match the alarms of one trace with its collisions.
 
-    A non-collision case is ``case_seconds`` of collision-free time. Every collision-free stretch is
-    cut into such cases from its beginning; a shorter rest at its end does not count.
+    Each collision-free interval is divided into non-collision cases of ``case_seconds``, from its
+    beginning; a shorter rest at its end does not count.
 
     Args:
         alarms: merged alarms, in order.
         collisions: the truth.
         span: first and last time that counts [s]; alarms and collisions that start before or
-            after it are left out (a detector settles in the beginning).
+            after it are left out, for example while a detector settles.
         case_seconds: length of a non-collision case [s].
     """
     begin, end = span
@@ -81,7 +80,7 @@ def match(
 
 
 def collision_free(busy: Sequence[Interval], span: Interval) -> list[Interval]:
-    """The stretches of ``span`` outside all of ``busy`` [s]."""
+    """The parts of ``span`` outside all of ``busy`` [s]."""
     free, now = [], span[0]
     for low, high in sorted(busy):
         if low > now and now < span[1]:
@@ -98,7 +97,7 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
     Args:
         detection: detection of this trace.
         trace: with truth.
-        skip: seconds at the beginning that do not count.
+        skip: time at the beginning that does not count [s].
 
     Raises:
         ValueError: the trace has no truth, or the detection belongs to another trace.
@@ -115,6 +114,6 @@ def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:
     """A detector's alarms on recordings, matched with their truth; one recording in memory.
 
     Raises:
-        ValueError: a trace without truth, or one that the detector does not take.
+        ValueError: a trace without truth, or with other joints or sample rate than the detector's.
     """
     return [match_detection(alarm.detect(trace), trace, alarm.settle) for trace in traces]

@@ -12,7 +12,7 @@ from tauguard.report import poisson_rate
 from tauguard.report import rate as wilson
 from tauguard.traces.severity import STRATA, stratum
 
-#: The headline is over collisions from here up [N m].
+#: Least peak torque of the collisions in ``headline`` [N m].
 HEADLINE = 16.0
 
 
@@ -40,7 +40,7 @@ def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
         ``confusion`` (tp, fn over collisions; fp, tn over non-collision cases), ``sensitivity``,
         ``specificity``, ``ppv``, ``accuracy`` (each value, low, high, n), ``delay_ms`` (median,
         p95, n), ``false_alarms_per_hour`` (of collision-free time), ``strata`` (by peak torque,
-        each with sensitivity and delay) and ``headline`` (the same from 16 N m up).
+        each with sensitivity and delay) and ``headline`` (sensitivity and delay from 16 N m up).
     """
     several = list(matchings)
     pairs = [

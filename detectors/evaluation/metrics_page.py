@@ -1,4 +1,4 @@
-"""The metrics of a detector: a page of text and a page of charts."""
+"""The metrics of a detector as a page of text and a page of charts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Meaning of the words in the charts.
 LEGEND = (
     "  sensitivity: collisions that raise an alarm within 0.5 s (a longer clamp: while it is held)",
-    "  specificity: pieces of 2 s without a collision that raise none; ppv: tp / (tp + fp)",
+    "  specificity: 2 s without a collision that raise no alarm; ppv: tp / (tp + fp)",
     "  delay: from the first touch to the alarm; p95: 19 of 20 are faster",
     "  peak |tau_ext|: largest torque at joints 1-4 that the collision reached",
 )

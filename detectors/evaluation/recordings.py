@@ -1,4 +1,4 @@
-"""Recordings with truth, judged one by one, with one in memory at a time."""
+"""Detection in recordings with truth, one recording in memory at a time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class JudgedRecording(NamedTuple):
     matching: Matching
 
     def diagnoses(self, alarm: CollisionAlarm) -> list[MatchedDiagnosis]:
-        """Compare the diagnoses with the truth; none without the arm's file."""
+        """Diagnoses of the alarms compared with the truth; none if no arm file is attached."""
         arm = self.trace.attachments.get("arm.xml")
         if arm is None:
             return []
@@ -37,7 +37,7 @@ def judged_recordings(
     """Detect in each recording and match with its truth.
 
     Raises:
-        ValueError: no truth, another sample rate, or other joints; the recording's number is named,
+        ValueError: no truth, another sample rate, or other joints; names the recording's number,
             counted from 0.
     """
     own = alarm.detector.arm.robot.joint_names
@@ -45,7 +45,7 @@ def judged_recordings(
         check_interval(f"recording {number}", trace, alarm.detector.dt)
         if trace.joint_names != own:
             raise ValueError(
-                f"recording {number} is of joints {', '.join(trace.joint_names)}, the model of "
+                f"recording {number} has joints {', '.join(trace.joint_names)}, the model "
                 f"{', '.join(own)}"
             )
         found = alarm.detect(trace)

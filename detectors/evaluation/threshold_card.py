@@ -1,4 +1,4 @@
-"""What a free-motion detector finds: smallest torques and forces, false alarms, blind regimes."""
+"""Least torques and forces that a free-motion detector finds, and its false alarms."""
 
 from __future__ import annotations
 
@@ -21,58 +21,59 @@ from tauguard.detectors.scores.free_motion import SETTLE, FittedFreeMotion, Judg
 from tauguard.report import poisson_rate
 from tauguard.traces.trace import Trace
 
-#: Fraction of a torque on a standing joint that the detector sees for long enough, if the torque
-#: rises within 0.1 s, and if it takes 1 s. The observer (30/s) follows it while the baseline (0.15
-#: s) absorbs it.
+#: Fraction of a torque on a standing joint that exceeds the baseline for long enough, if the torque
+#: rises within 0.1 s, and if it rises within 1 s. The observer (30/s) follows the torque, and the
+#: baseline of the residual (0.15 s) follows the observer.
 COUNTS, COUNTS_SLOWLY = 0.6, 0.15
-#: The number in motion: length of the pulses [s], least number of places, fraction of the places at
-#: which the torque suffices, and time above the bound until an alarm [s].
+#: Constants of :func:`found_in_motion`: length of the pulses [s], least number of times, fraction
+#: of the times at which the torque suffices, and time above the bound until an alarm [s].
 PULSE, PLACES, SHARE, LASTS = 0.3, 40, 0.9, 0.04
-#: The detector takes a part of a pulse for a load or for friction, so this factor is applied. With
-#: it 97 % of the pulses added to left-out logs were found on a UR10e, 90 % on a UR5 and 92 % on a
-#: UR3. Without it 75 % were found, and 40 % of pulses as large as the median bound.
+#: Factor on the torque in motion, because the estimator explains part of a pulse by load and
+#: friction. With it 97 % of the pulses added to held-out logs were found on a UR10e, 90 % on a UR5
+#: and 92 % on a UR3. Without it 75 % were found, and 40 % of pulses as large as the median bound.
 TRACKED = 1.25
-#: The number in motion over the least bound, for logs with too few places.
+#: Ratio of the torque in motion to the least bound, for logs with too few times.
 LITTLE = 1.5
-#: The upper threshold, at which a robot stops, over the lower one, which reports a contact.
+#: Ratio of the upper threshold, at which a robot stops, to the lower one, which reports a contact.
 UPPER = 1.5
-#: Joints of the arms that libfranka speaks to.
+#: Number of joints of the arms that libfranka supports.
 FRANKA_JOINTS = 7
-#: Poses and directions of the force at the tool.
+#: Numbers of poses and directions of the force at the tool.
 POSES, DIRECTIONS = 24, 100
 
 
 @dataclass(frozen=True, eq=False)
 class ThresholdCard:
-    """Estimates of what a detector finds; they replace no safety function."""
+    """Estimates of the least torques and forces that a detector finds; no safety function."""
 
     joints: tuple[str, ...]
     standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
-    stopped: Array  #: on one that has just stopped [N m], (n,)
-    moving: Array  #: on one in motion, see `found_in_motion`; NaN: no log shows it [N m], (n,)
-    starting: Array  #: on one that starts, NaN as well [N m], (n,)
+    stopped: Array  #: torque found on a joint that has just stopped [N m], (n,)
+    moving: Array  #: torque found in motion; NaN: moves in no log [N m], (n,)
+    starting: Array  #: torque found on a joint that starts; NaN: moves in no log [N m], (n,)
     tool: dict[str, tuple[float, float]]
-    """Force at the last link's origin [N]: "standing" and pushed within 0.1 s, "slowly" (the same,
-    pushed over 1 s), "stopped" or held by static friction, "moving"; found in half and in 95 % of
-    all poses and directions; infinite where no force is found in so many."""
-    moment: float  #: at the last link that is found moving, in half of them [N m]
-    seconds: float  #: of the logs
-    alarms: int  #: in all logs, each judged by the others
+    """Force at the last link's origin that is found in half, and in 95 %, of all poses and
+    directions [N]; infinite: none. Keys: "standing" (pushed within 0.1 s), "slowly" (standing,
+    pushed over 1 s), "stopped" (or held by static friction), "moving"."""
+    moment: float  #: moment on the last link found in motion, in half of them [N m]
+    seconds: float  #: total length of the logs [s]
+    alarms: int  #: number of alarms in all logs, in cross-validation
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
-    logs: tuple[CrossValidatedLog, ...]  #: each judged by the others
+    logs: tuple[CrossValidatedLog, ...]  #: the logs with their alarms in cross-validation
     left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
-    unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
+    unseen: dict[str, tuple[str, ...]]  #: by regime, joints that are in it in no log
     replay: tuple[int, int]
-    """Contacts and collisions that ``moving`` and ``starting``, and :data:`UPPER` times these, as
-    constant thresholds of the plain observer's residual would have raised in the logs."""
-    fast: Array  #: speeds up to which ``moving`` holds, those of the logs [rad/s], shape (n,)
+    """Numbers of events in the logs with constant thresholds of the plain observer's residual:
+    contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""
+    fast: Array  #: speeds in the logs, up to which ``moving`` holds [rad/s], shape (n,)
     twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
 
     @property
     def franka(self) -> dict[str, list[float]]:
-        """What ``setCollisionBehavior`` takes: torques of 7 joints [N m], forces and moments
-        along and about three axes [N, N m]; empty for an arm with other joints, or where a number
-        is not known.
+        """Arguments of libfranka's ``setCollisionBehavior``.
+
+        They are torques of 7 joints [N m], and forces and moments of three axes [N, N m]. Empty for
+        an arm with another number of joints, or if a number is unknown.
         """
         numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
         if len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
@@ -90,7 +91,7 @@ class ThresholdCard:
 
     @property
     def ur(self) -> dict[str, float]:
-        """In the form of UR's safety settings: the tool force limit [N]; empty: not known."""
+        """The tool force limit of UR's safety settings [N]; empty if unknown."""
         limit = UPPER * self.tool["moving"][1]
         known = np.isfinite([limit, *self.moving]).all()
         return {"tool_force_limit_n": limit} if known else {}
@@ -103,7 +104,7 @@ def threshold_card(
 
     Args:
         detector: fitted.
-        traces: its training logs, for poses, regimes and bounds in motion.
+        traces: training logs of the detector, for poses, regimes and bounds in motion.
         sifted: the cross-validation of these logs.
     """
     bound, robot = detector.bound, detector.arm.robot
@@ -146,11 +147,11 @@ def threshold_card(
 
 
 def found_in_motion(judged: Sequence[Judged]) -> Array:
-    """The torque [N m] whose pulses on a moving joint are found, (n,); NaN: too little motion.
+    """Torque of a pulse on a moving joint that is found [N m], (n,); NaN: too little motion.
 
-    At many places of the logs it is computed how large a pulse of 0.3 s has to be, on top of the
-    residual that the log has there, to exceed the bound for as long as an alarm needs. Pulses of
-    either sign count. The number is enough at 90 % of the places.
+    Pulses of 0.3 s and either sign are added to the residual at many times of the logs. For each,
+    the least torque is computed that exceeds the bound for the confirmation time. The result is
+    :data:`TRACKED` times the 90 % quantile of these torques.
     """
     found = np.full(judged[0].residual.shape[1], np.nan)
     needed: list[list[Array]] = [[] for _ in found]
@@ -180,16 +181,16 @@ def found_in_motion(judged: Sequence[Judged]) -> Array:
 def replayed(
     detector: FittedFreeMotion, traces: Sequence[Trace], moving: Array, starting: Array
 ) -> tuple[int, int]:
-    """Events of constant torque thresholds, and of :data:`UPPER` times these, in some logs.
+    """Numbers of events in logs with constant thresholds, and with :data:`UPPER` times these.
 
-    A robot's own thresholds work so: on the external torque of an observer, with higher ones while
-    a joint accelerates.
+    The thresholds apply to an observer's external torque, as those in the settings of a robot do,
+    with higher thresholds while a joint accelerates.
 
     Args:
-        detector: its arm explains the torques.
+        detector: its arm model is used.
         traces: logs.
         moving: thresholds [N m], shape (n,); NaN: none.
-        starting: the same for a joint that starts.
+        starting: thresholds of a joint that starts [N m], shape (n,); NaN: none.
     """
     lower = upper = 0
     for trace in traces:
@@ -206,9 +207,9 @@ def replayed(
 def _tool(
     detector: FittedFreeMotion, poses: Array, level: Array, moment: bool = False
 ) -> tuple[float, float]:
-    """Forces [N] or moments [N m] on the last link that reach some joint's level.
+    """Forces [N] or moments [N m] on the last link that reach the level of some joint.
 
-    In half and in 95 % of all poses and directions; infinite where fewer reach any joint.
+    The values suffice in half and in 95 % of all poses and directions; infinite: none does.
     """
     robot = detector.arm.robot
     directions = np.random.default_rng(0).standard_normal((DIRECTIONS, 3))

@@ -144,7 +144,7 @@ def test_an_episode_of_a_dataset_has_the_name_that_inspect_takes():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"joint_names": ("a", "b")}, "^second.mcap is of joints a, b, the model of j1, j2"),
+        ({"joint_names": ("a", "b")}, "^second.mcap has joints a, b, the model j1, j2"),
         ({"t": np.arange(50) / 100}, "^second.mcap"),
     ],
 )
