@@ -1,4 +1,4 @@
-"""A simulated arm that is like a real one: identified from free logs and tested on others."""
+"""Twins: simulated arms identified from collision-free logs of real arms, tested on other logs."""
 
 from tauguard.twin.identify import Twin, identify_twin, with_intervals
 from tauguard.twin.judge import Likeness, compare, with_alarms

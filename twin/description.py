@@ -1,4 +1,4 @@
-"""Write a twin as a robot file for the simulator: TOML, and the bodies as URDF or MJCF."""
+"""Write a twin as a robot file for the simulator (TOML), with the bodies as URDF or MJCF."""
 
 import re
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ QUANTITIES = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"
 def write_twin(
     twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: str
 ) -> tuple[Path, Path]:
-    """Write the description, and the bodies beside it.
+    """Write the description, and the bodies and left-over errors in the same folder.
 
     Args:
-        twin: identified.
-        robot: the robot file that it began with.
+        twin: identified twin.
+        robot: the robot file from which it was identified.
         out: the TOML file.
-        logs: names of the logs, for the reader.
-        scale: what fixed the scale of the torques.
+        logs: names of the logs, for a comment.
+        scale: what determined the scale of the torques, for a comment.
 
     Returns:
-        The file of the bodies, and that of the left-over errors.
+        The file of the bodies, and the file of the left-over errors.
 
     Raises:
         ValueError: ``out`` does not end in .toml.
@@ -49,7 +49,7 @@ def write_twin(
 
 
 def _without_losses(bodies: Path) -> None:
-    """The description states friction: none of the file's own is added to it."""
+    """Remove friction from the file of the bodies, because the description contains it."""
     text = re.sub(r"<dynamics\b[^>]*/>", "", bodies.read_text())
     write_atomic(bodies, re.sub(r'\s(?:damping|frictionloss)="[^"]*"', "", text))
 
@@ -64,7 +64,7 @@ def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
     lines = [
         *(f"# {note}" for note in twin.notes),
         *_bodies(twin),
-        "# +- is half of a 95 % interval, from leaving out each part of the logs",
+        "# +- is half of a 95 % interval, from the jackknife over parts of the logs",
         f'file = "{bodies}"',
         f'source = "identified from {", ".join(logs)}"',
         "",
@@ -87,7 +87,7 @@ def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
         f"velocity_quantum = {_digits(sensors.velocity_quantum)}  # rad/s",
         f"rate = {_digits(sensors.rate)}  # samples a second",
         f"jitter = {_digits(sensors.jitter)}  # s, standard deviation of a sample's time",
-        f'left_over = "{left_over}"  # errors of all this [A] along the logs, noise included',
+        f'left_over = "{left_over}"  # errors of this model along the logs [A], with noise',
     ]
     return "\n".join(lines) + "\n"
 

@@ -1,7 +1,7 @@
-"""Friction of each joint: Bayesian linear least squares with coefficients of 0 or more.
+"""Friction of each joint by Bayesian linear least squares with coefficients of 0 or more.
 
-What the logs show too little of keeps its prior: friction at rest is that at low speed, and nothing
-else changes with speed. The deviation of each prior is :data:`BELIEF` of the joint's friction.
+By the prior, friction at rest equals friction at low speed, and friction does not depend on speed.
+The standard deviation of each prior is :data:`BELIEF` times the joint's median friction.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,9 @@ from tauguard.twin.signals import Motion
 
 #: Candidates of the Stribeck velocity [rad/s].
 STRIBECK = (0.02, 0.05, 0.1, 0.2, 0.4)
-#: Candidates of the rise of friction with the load, at its median.
+#: Candidates of the relative rise of friction at the median load.
 LOADS = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.8])
-#: Speeds over which friction rises, as a gear's lubricant lets it [rad/s].
+#: Speeds over which friction rises, as with the lubricant of a gear [rad/s].
 SLOPES = (0.03, 0.1, 0.3, 1.0)
 #: Least motion of a joint that is fitted [s].
 LEAST = 1.0
@@ -25,21 +25,21 @@ LEAST = 1.0
 BELIEF = 0.3
 #: A sample has the weight 1/SOFTNESS^2, as in the calibration, because errors are not white.
 SOFTNESS = 5.0
-#: A number counts as not identified if its variance exceeds this fraction of the prior's.
+#: A number counts as not identified if its variance exceeds this fraction of the prior variance.
 SHOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionFit:
-    """Of one joint."""
+    """Friction of one joint."""
 
     coulomb: float  #: level at speed [N m]
     static: float  #: level at rest [N m]
-    load: float  #: relative rise of the level per torque that the bodies ask for [1/(N m)]
+    load: float  #: relative rise of the level per rigid-body torque [1/(N m)]
     viscous: float  #: [N m s/rad]
     slope: tuple[float, ...]  #: rises of the level over each of :data:`SLOPES` [N m]
     stribeck_velocity: float  #: [rad/s]
-    priors: tuple[str, ...] = ()  #: fields that the logs hardly show
+    priors: tuple[str, ...] = ()  #: fields that the logs do not identify
 
 
 def fit_friction(
@@ -78,10 +78,10 @@ def fit_friction(
 def _solve(
     qd: Array, load: Array, left: Array, stribeck: float, rise: float, usual: float
 ) -> tuple[Array, float, Bools]:
-    """Coefficients, norm of the residual with the priors, and which of two are identified.
+    """Coefficients, norm of the residual including the priors, and whether two are identified.
 
-    The last two coefficients are an offset of either sign. Seen are static friction, relative to
-    Coulomb friction, and viscous friction.
+    The last two coefficients are a positive and a negative offset. The two flags are for static
+    friction minus Coulomb friction, and for viscous friction.
     """
     sign, slip, one = np.sign(qd), np.exp(-((qd / stribeck) ** 2)), np.ones_like(qd)
     more, rises = 1 + rise * np.abs(load), [np.tanh(qd / speed) for speed in SLOPES]
@@ -89,7 +89,7 @@ def _solve(
     table = np.stack([*level[:2], qd, *level[2:], one, -one, left], axis=1)
     products = table.T @ table  # a small system of the same norms
     products[np.diag_indices_from(products)] *= 1 + 1e-9
-    # Rows of the priors: static less Coulomb friction, viscous friction, slopes.
+    # Rows of the priors: static minus Coulomb friction, viscous friction, slopes.
     about = np.zeros((2 + len(SLOPES), table.shape[1]))
     about[0, :2], about[1:, 2 : 3 + len(SLOPES)] = (-1, 1), np.eye(1 + len(SLOPES))
     noise = _norm(products) / np.sqrt(len(qd))
@@ -97,7 +97,7 @@ def _solve(
     products += about.T @ about
     root = np.linalg.cholesky(products).T
     x, rest = nnls(root[:, :-1], root[:, -1])
-    spread = np.linalg.pinv(products[:-2, :-2])  # without the offset's second sign
+    spread = np.linalg.pinv(products[:-2, :-2])  # without the negative offset
     both = about[:2, :-2]
     return x, float(rest), np.einsum("ij,jk,ik->i", both, spread, both) < SHOWN
 

@@ -8,7 +8,7 @@ from tauguard.twin.judge import Likeness
 
 
 def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
-    """The verdict, residuals of the first held-out log, and the spectra of all.
+    """Draw the verdict, residuals of the first held-out log, and spectra of all logs.
 
     Args:
         path: PNG.
@@ -46,7 +46,7 @@ def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
 
 
 def verdict(likeness: Likeness) -> str:
-    """The areas and the alarms in two lines."""
+    """Areas under the curves of the classifiers and numbers of alarms, in two lines."""
     moving, standing = (
         "too short" if np.isnan(area[0]) else f"{area[0]:.2f}"
         for area in (likeness.moving_auc, likeness.standing_auc)
@@ -60,7 +60,7 @@ def verdict(likeness: Likeness) -> str:
 
 
 def _ratios(likeness: Likeness, joint: int) -> str:
-    """Simulated and real residuals of one joint, if there are any."""
+    """Ratios of simulated to real residuals of one joint, as text."""
     parts = {
         "rms": likeness.rms,
         "peaks": likeness.peaks,

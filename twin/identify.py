@@ -1,4 +1,4 @@
-"""Identify a twin from free logs: bodies, friction, and the errors that remain."""
+"""Identify a twin from collision-free logs: bodies, friction, and the remaining errors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -17,11 +17,12 @@ from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, with
 
 #: Candidates and prior of the angle over which friction reverses with the joint [rad].
 PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
-#: Speeds between which a joint shows that angle [rad/s]; a slower joint is held by its controller.
+#: Speeds between which the angle is identified [rad/s]; a controller holds a slower joint.
 TURNING = (0.005, 0.1)
 #: Prior of the gear ratio.
 GEAR = 101.0
-#: Least half width of an interval, relative to the largest joint's number: the error of the law.
+#: Least half width of an interval, relative to the largest value of any joint, for the error of the
+#: friction law.
 FORM = 0.02
 #: Samples of the running median of the model's error.
 MEDIAN = 9
@@ -31,12 +32,12 @@ NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """An arm as its logs show it."""
+    """An arm identified from logs."""
 
     arm: ArmModel  #: calibrated
-    drive: Drive  #: what is simulated
+    drive: Drive  #: drives for the simulation
     fits: tuple[FrictionFit | None, ...]  #: of each joint; None: it did not move enough
-    notes: tuple[str, ...]  #: what the logs do not show, one line each
+    notes: tuple[str, ...]  #: quantities that the logs do not identify, one line each
     intervals: dict[str, Array] = field(default_factory=dict)
     """Half the width of the 95 % interval of each of :data:`NUMBERS`, shape (n,) each, and of
     ``inertial``, shape (n, 10); NaN: a prior, 0: given."""
@@ -52,12 +53,12 @@ class Twin:
 
 
 def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) -> Twin:
-    """The drives behind a calibrated arm's free logs.
+    """Identify the drives of a calibrated arm from collision-free logs.
 
     Args:
-        arm: calibrated from the same logs; its gains hold.
-        traces: free logs.
-        current_limit: [A], shape (n,).
+        arm: calibrated from the same logs; the gains are kept.
+        traces: collision-free logs.
+        current_limit: largest motor currents [A], shape (n,).
 
     Raises:
         ValueError: no joint moves for long enough.
@@ -81,11 +82,13 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
 
 
 def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
-    """The twin with intervals by the jackknife over logs, within which model errors are alike.
+    """The twin with intervals by the jackknife over parts of the logs.
+
+    Samples are not left out singly, because model errors within a part are not independent.
 
     Args:
-        twin: of all logs.
-        others: each of all logs but one part.
+        twin: identified from all logs.
+        others: twins, each identified without one part of the logs.
     """
     count = len(others)
     if count < 2:
@@ -110,7 +113,7 @@ def _notes(
 ) -> tuple[str, ...]:
     names = arm.robot.joint_names
     notes = [
-        f"{names[j]}: hardly moves; its friction is a prior, like the other joints'"
+        f"{names[j]}: hardly moves; its friction is a prior from the other joints"
         for j, fit in enumerate(fits)
         if fit is None
     ]
@@ -122,7 +125,7 @@ def _notes(
     ]
     cuts = sum(len(without_gaps(trace, 0.0)) - 1 for trace in traces)
     if cuts:
-        notes.append(f"{cuts} gaps in the logs' samples: what is beside them is used, not the gaps")
+        notes.append(f"{cuts} gaps in the logs' samples: the parts between them are used")
     return tuple(notes)
 
 
@@ -165,17 +168,17 @@ def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Arra
 
 
 def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
-    """Errors of the model along the logs, at even steps and without smoothing.
+    """Errors of the model along the logs, resampled to constant intervals without smoothing.
 
-    The error's running median is interpolated. What exceeds it goes to the nearest even time with
-    its impulse, error times step: a late sample and the early one after it would else leave an
-    impulse that neither the arm nor an observer saw. The median has none: a constant error would
-    get the jitter of the steps.
+    The running median of the error is interpolated. The deviation from the median is moved to the
+    nearest new time. There its impulse, error times interval, is kept, so that jitter of the time
+    stamps causes no impulse that the real arm did not have. For the median this would turn jitter
+    into an error.
 
     Args:
         arm: calibrated.
-        drive: its gains and friction.
-        parts: logs without gaps, each with the number of the log that it is from.
+        drive: gains and friction of the arm.
+        parts: logs without gaps, each with the number of the original log.
     """
     dt = float(np.median(np.concatenate([np.diff(part.t) for _, part in parts])))
     log, qd, errors = [], [], []
@@ -198,7 +201,7 @@ def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -
 
 
 def _sensors(traces: Sequence[Trace], n: int) -> Sensors:
-    """Quanta and times of the samples. The noise is part of the left-over errors."""
+    """Quantisation and times of the samples; the noise is part of the left-over errors."""
     one = max(traces, key=lambda trace: len(trace.t))
     steps = np.concatenate([np.diff(trace.t) for trace in traces])
     usual = float(np.median(steps))

@@ -1,4 +1,4 @@
-"""Compare a twin with its arm on held-out logs: residuals, their peaks, and a classifier."""
+"""Compare a twin with the real arm on held-out logs: residuals, peaks, and classifiers."""
 
 import itertools
 from collections.abc import Sequence
@@ -24,15 +24,17 @@ from tauguard.traces import Trace
 from tauguard.twin.play import played, residual_of
 from tauguard.twin.signals import SLOW
 
-#: Lengths [s] of the classifier's windows, of the spans of peaks, of groups of windows that stay in
-#: one fold, and of the start of a log, in which the estimator settles.
+#: Times [s]: length of the classifier's windows, of the spans of peaks, of groups of windows in one
+#: fold, and of the beginning of a log, in which the estimator settles.
 WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
-#: Windows this near repeat each other's motion, in these units [rad, rad/s], if they are apart by
-#: more than so long [s]. They stay in the group of the first, which lasts so long [s].
-ALIKE, PLACE, SPEED, APART, REPEATED = 2.0, 0.1, 0.2, 1.5, 1.0
-#: Least duration for an rms [s].
+#: Units of position [rad] and velocity [rad/s] in the distance between two windows.
+PLACE, SPEED = 0.1, 0.2
+#: Two windows repeat a motion if their distance is below ALIKE and the time between them is above
+#: APART [s]. They are put into the group of the first window, which has the length REPEATED [s].
+ALIKE, APART, REPEATED = 2.0, 1.5, 1.0
+#: Least duration for a root mean square [s].
 SHORTEST = 1.0
-#: Fewest windows of each kind for an area under a curve, and its folds.
+#: Least number of windows of each kind for an area under a curve, and number of folds.
 FEWEST, FOLDS = 40, 5
 
 
@@ -43,38 +45,39 @@ class Likeness:
     rms: Array  #: ratio while the joint moves, shape (n,)
     peaks: Array  #: ratio of the 99 % quantiles of peaks of 0.5 s, moving, shape (n,)
     standing_rms: Array  #: ratio while no joint moves, shape (n,)
-    standing_peaks: Array  #: the same of the peaks, shape (n,)
+    standing_peaks: Array  #: ratio of the peaks while no joint moves, shape (n,)
     high: Array  #: fraction of the residual's power in sample-to-sample change, real and simulated
     correlation: Array  #: of residuals 0.1 s apart, real and simulated, shape (2, n)
     moving_auc: tuple[float, float]
-    """Areas of two classifiers, trees with boosting and logistic regression; .5: real and simulated
-    cannot be told apart."""
+    """Areas under the curves of two classifiers of real and simulated residuals, boosted trees and
+    logistic regression; 0.5: they cannot distinguish them."""
     standing_auc: tuple[float, float]
     programs_auc: tuple[float, float]
-    """The same of the arm's logs that the twin is made from against these logs, moving: .5 if the
-    arm itself errs alike in both. NaN if they are not given."""
+    """Areas for real residuals of these logs and of the logs from which the twin was identified,
+    moving; 0.5 if the errors in both are alike. NaN if the latter logs are not given."""
     real_residuals: tuple[Array, ...]  #: of each log [N m]
     twin_residuals: tuple[Array, ...]
     times: tuple[Array, ...]  #: of the residuals [s]
     played: tuple[Trace, ...]  #: the logs with the twin's currents
     alarms: tuple[int, int] = (0, 0)
-    """Of free-motion on the logs and on the twin along them, see :func:`with_alarms`."""
+    """Numbers of alarms of free-motion in the real logs and in ``played``, see
+    :func:`with_alarms`."""
 
     @property
     def seconds(self) -> float:
-        """Length of the logs in all."""
+        """Total length of the logs [s]."""
         return sum(float(trace.t[-1] - trace.t[0]) for trace in self.played)
 
 
 def with_alarms(
     likeness: Likeness, recordings: Sequence[Recording], arm: ArmModel, traces: Sequence[Trace]
 ) -> Likeness:
-    """The comparison with the alarms that a detector of the twin's own logs raises.
+    """The comparison with the alarms of a free-motion detector trained on the twin's logs.
 
     Args:
-        likeness: of ``traces``.
-        recordings: the free logs that the twin is made from.
-        arm: what is believed of the arm, as :func:`tauguard.detectors.calibration.identify` has it.
+        likeness: comparison on ``traces``.
+        recordings: the collision-free logs from which the twin was identified.
+        arm: nominal arm, as in :func:`tauguard.detectors.calibration.identification.identify`.
         traces: held-out logs without a load.
 
     Raises:
@@ -95,14 +98,14 @@ def compare(
     seed: int = 0,
     own: Sequence[Trace] = (),
 ) -> Likeness:
-    """Play the twin along logs and compare its residuals with the real ones.
+    """Compute the twin's currents along logs, and compare its residuals with the real ones.
 
     Args:
-        arm: calibrated, without a look at these logs.
+        arm: calibrated without these logs.
         drive: drive of the twin.
         traces: held-out logs.
         seed: seed of sensor noise and classifier.
-        own: the logs that the twin is made from, for ``programs_auc``.
+        own: the logs from which the twin was identified, for ``programs_auc``.
     """
     real: list[Array] = []
     twin: list[Array] = []
@@ -158,7 +161,7 @@ def _motion(trace: Trace) -> Array:
 
 
 def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
-    """Rms of each joint's own rows, shape (n,); NaN if they are shorter than :data:`SHORTEST`."""
+    """Root mean square over each joint's rows, shape (n,); NaN if shorter than SHORTEST."""
     weight = rows * seconds[:, None]
     total = weight.sum(axis=0)
     square = (weight * values**2).sum(axis=0)
@@ -167,7 +170,7 @@ def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
 
 
 def _spans(t: Array, length: float) -> list[slice]:
-    """The samples of successive spans of time; those with fewer than four are left out."""
+    """The samples of successive spans of time; spans with fewer than four are left out."""
     ends = np.searchsorted(t, np.arange(t[0], t[-1], length))
     return [slice(a, b) for a, b in itertools.pairwise(ends) if b - a >= 4]
 
@@ -211,9 +214,10 @@ def _windows(
 def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.int64]:
     """Groups of windows that stay in one fold: those of one motion, or of one part of a log.
 
-    Where a program repeats a cycle, a classifier would else be tested on places of the cycle that
-    it was trained on, and tell two draws of one process apart. With fewer motions than folds, as of
-    an arm that stands in few places, the groups are parts of a log: an area may then be too large.
+    Without these groups, if a program repeats a cycle, a classifier would be tested on motion that
+    it was trained on, and could distinguish even two draws of one process. With fewer motions than
+    folds, as of an arm that stands in few poses, the groups are parts of a log, and areas can be
+    too large.
     """
     parts = 100_000 * logs + (starts / GROUP).astype(np.int64)
     groups = np.empty(len(place), dtype=np.int64)
@@ -238,18 +242,18 @@ def told_apart(
     motions: Sequence[Array],
     seed: int,
 ) -> tuple[float, float]:
-    """Areas of two classifiers that tell windows of two kinds of residual apart.
+    """Areas under the curves of two classifiers of windows of real and simulated residuals.
 
     Args:
         real: residuals of each log, shape (T, n).
-        twin: of the twin along the same motion.
-        rows: the samples that count, shape (T,).
-        times: of the samples [s].
+        twin: residuals of the twin along the same motion, shape (T, n).
+        rows: the samples that are used, shape (T,).
+        times: times of the samples [s].
         motions: positions and velocities in units of :data:`PLACE` and :data:`SPEED`, (T, 2 n).
-        seed: of the classifiers.
+        seed: seed of the classifiers.
 
     Returns:
-        Of trees with boosting and of logistic regression; NaN with too few windows or groups.
+        Areas of boosted trees and of logistic regression; NaN with too few windows or groups.
     """
     a, groups = _windows(real, rows, times, motions)
     b, _ = _windows(twin, rows, times, motions)
@@ -266,7 +270,7 @@ def _programs_auc(
     motions: Sequence[Array],
     seed: int,
 ) -> tuple[float, float]:
-    """Area for moving windows of the arm's own logs and of the judged logs."""
+    """Areas for moving windows of real residuals in the twin's own logs and in held-out logs."""
     if not own:
         return (float("nan"),) * 2
     ends = [(trace, slice(_begin(trace), None)) for trace in own]
@@ -289,7 +293,7 @@ def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> 
         HistGradientBoostingClassifier(max_iter=100, random_state=seed),
         make_pipeline(StandardScaler(), LogisticRegression(max_iter=1000)),
     )
-    with threadpool_limits(1):  # small tables: threads cost more than they save
+    with threadpool_limits(1):  # for small tables, threads cost more time than they save
         chances = [
             cross_val_predict(
                 model, table, labels, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba"

@@ -1,4 +1,4 @@
-"""Currents that a drive would report along a given motion."""
+"""Currents that a twin's drives report along a given motion."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _TRACKED = Unknowns.for_detection()
 
 
 def modelled(arm: ArmModel, friction: Friction | None, gain: Array, trace: Trace) -> Array:
-    """Currents that bodies and friction need along a log's motion [A], shape (T, n)."""
+    """Currents for the torques of bodies and friction along a log's motion [A], shape (T, n)."""
     motion = motion_of(arm, trace)
     torque = motion.bodies
     if friction is not None:
@@ -24,12 +24,12 @@ def modelled(arm: ArmModel, friction: Friction | None, gain: Array, trace: Trace
 
 
 def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
-    """Currents of the twin along a log's own motion [A], shape (T, n).
+    """Currents of the twin along a log's motion [A], shape (T, n).
 
     Args:
-        arm: its bodies.
-        drive: what is simulated: friction, ripple, sensors.
-        trace: the motion; its currents are not used.
+        arm: bodies of the twin.
+        drive: friction, ripple and sensors of the twin.
+        trace: the motion; the currents in it are not used.
         seed: seed of the sensors' noise.
     """
     current = modelled(arm, drive.friction, drive.gain, trace)
@@ -54,7 +54,7 @@ def friction_torque(friction: Friction, qd: Array, torque: Array, steps: Array) 
     Args:
         friction: the parameters, at the reference temperature.
         qd: velocities [rad/s], shape (T, n).
-        torque: torque that the joints transmit [N m], shape (T, n).
+        torque: torque of the bodies at the joints [N m], shape (T, n).
         steps: time before each sample [s], shape (T,).
     """
     slip = np.exp(-((qd / friction.stribeck_velocity) ** 2))

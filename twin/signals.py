@@ -1,4 +1,4 @@
-"""Motion of a log, and the torque of the bodies along it, before any model of the drives."""
+"""Motion of a log, and the rigid-body torque along it."""
 
 import itertools
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from tauguard.detectors.calibration.recording import cut
 from tauguard.detectors.dynamics.robot import momentum_terms
 from tauguard.traces import Trace
 
-#: A joint that is slower stands [rad/s].
+#: A joint slower than this is at rest [rad/s].
 SLOW = 0.02
 #: Standard deviation of the velocity filter for the friction [s].
 SMOOTHING = 0.02
-#: Gap at which a log is split, in sample intervals.
+#: Least length of a gap at which a log is split, in sample intervals.
 GAP = 4.0
 #: Time around a log's last stop that is left out [s].
 STOP = 0.05
@@ -24,12 +24,12 @@ STOP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A log's motion, and the drive torques for bodies and rotors."""
+    """A log's motion, and the torques of bodies and rotors."""
 
     t: Array  #: [s], shape (T,)
     qd: Array  #: smoothed without delay [rad/s], shape (T, n)
     load: Array  #: torque of gravity and inertia along the smoothed motion [N m], shape (T, n)
-    bodies: Array  #: the same, with which the momentum observer sees nothing [N m], shape (T, n)
+    bodies: Array  #: torque without smoothing, see :func:`motion_of` [N m], (T, n)
 
     @property
     def moving(self) -> Bools:
@@ -38,14 +38,14 @@ class Motion:
 
 
 def motion_of(arm: ArmModel, trace: Trace) -> Motion:
-    """The motion of a log, and its torque by the calibrated bodies.
+    """The motion of a log, and the torque of the calibrated bodies along it.
 
-    ``bodies`` is the step of the measured momentum over each interval. What the velocities shake
-    is in it, as it is in the currents: a smoothed torque would leave one without the other.
+    ``bodies`` is the torque with which the residual of a momentum observer is 0. It contains the
+    change of the measured momentum over each interval, with vibrations, as the currents do.
 
     Args:
         arm: calibrated.
-        trace: of the same joints.
+        trace: a log of this arm.
     """
     width = SMOOTHING / float(np.median(np.diff(trace.t)))
     qd = gaussian_filter1d(trace.qd, width, axis=0)
@@ -67,8 +67,8 @@ def without_gaps(trace: Trace, shortest: float = 1.0) -> list[Trace]:
 def bridged_stop(trace: Trace, error: Array) -> Array:
     """The error along a log, interpolated over its last stop, shape (T, n).
 
-    A program that is cut off brakes all joints within a sample or two, which the log does not
-    resolve: hundreds of N m that are none of the arm.
+    When a program is interrupted, all joints brake within one or two samples. The log does not
+    resolve this, so the model's torque is wrong by hundreds of N m.
     """
     moves = np.flatnonzero((np.abs(trace.qd) > SLOW).any(axis=1))
     if not len(moves):
@@ -79,10 +79,10 @@ def bridged_stop(trace: Trace, error: Array) -> Array:
 
 
 def quantum(signal: Array) -> float:
-    """The step of a quantised signal, 0 where none is seen; shape (T,).
+    """The quantum of a signal of shape (T,), or 0 if the signal is not quantised.
 
-    The step is the smallest distance between values that occur, if nearly all distances are
-    multiples of it.
+    It is the smallest distance between values that occur, if nearly all distances are multiples of
+    it.
     """
     gaps = np.diff(np.unique(np.round(signal, 9)))
     gaps = gaps[gaps > 1e-8]

@@ -1,4 +1,4 @@
-"""Check that all logs are of one arm with the stated loads, because others distort a twin."""
+"""Check that all logs are of one arm with the given loads; other logs would distort a twin."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,23 +11,24 @@ from tauguard.detectors.calibration.assessment import OUTLYING, outlier, residua
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import Load, Recording
 
-#: Logs are of two arms if each half predicts its own logs better than all logs do by this factor.
-#: Splitting the logs of one arm by program gives factors of 1.0 to 1.2 (UR5, UR3, UR10e). Two arms,
-#: or an unstated load in some logs, give 2.9 to 66.
+#: Logs are of two arms if calibrations from each of two groups of logs reduce the sum of the logs'
+#: residuals by this factor, compared with one calibration from all logs. The factor is 1.0 to 1.2
+#: for groups of one arm by program (UR5, UR3, UR10e), and 2.9 to 66 for two arms, or if a load in
+#: some logs was not given.
 TWO = 2.0
 ROUNDS = 4
 
 
 def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[int]:
-    """Indices of logs without a load that the others do not predict, at most a third of them.
+    """Indices of logs without a load that differ from all other logs, at most a third of them.
 
     Args:
-        arm: nominal numbers; its gains hold.
+        arm: nominal numbers, and gains that are kept.
         names: names of the logs.
         recordings: with their loads, all with motion.
 
     Raises:
-        ValueError: the logs are of two arms, or two loads; it names those of each.
+        ValueError: the logs are of two arms or two loads; names the logs of each.
     """
     told = [k for k, r in enumerate(recordings) if r.load == Load()]
     errors = _Errors(arm, [recordings[k] for k in told])
@@ -51,7 +52,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
 
 
 class _Errors:
-    """Residual of a log with a calibration from others [N m]; inf if they are too short."""
+    """Residual of a log with a calibration from other logs [N m]; inf if these are too short."""
 
     def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
         self._recordings = recordings
@@ -72,9 +73,9 @@ class _Errors:
 
 
 def _two_sides(errors: _Errors, logs: Sequence[int]) -> Bools | None:
-    """Which logs are of the second of two arms, shape (len(logs),); None: all are of one.
+    """Whether each log is of the second of two arms, shape (len(logs),); None: all are of one.
 
-    As k-means does: a log goes to the group whose other logs predict it better, in turn.
+    As in k-means, each log is moved to the group whose other logs predict it better, in turn.
     """
 
     def of(side: Bools) -> tuple[Array, Array]:
