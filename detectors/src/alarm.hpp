@@ -1,6 +1,6 @@
-// From scores to an alarm. A score is normalised over the speed. The alarm is up after the score
-// has exceeded the threshold for the confirmation time, and never before the detector has settled.
-// The batch form gives the same bits.
+// The alarm on a stream of scores. Scores are normalised by speed. The alarm is on while the score
+// has exceeded the threshold for at least the confirmation time, and off until the detector has
+// settled. Results are bit-equal to those of the batch form in Python.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@
 
 namespace tauguard::detectors {
 
-// The sum of |x|, added in the order in which NumPy sums up to 128 numbers: the same bits.
+// The sum of |x|, bit-equal to NumPy's for up to 128 numbers, because the order is the same.
 inline double sum_of_sizes(const double* x, std::size_t n) {
   double sum = 0.0;
   std::size_t k = 0;
@@ -59,7 +59,7 @@ class RecentSpeed {
   std::vector<Candidate> kept_;
 };
 
-// Peaks of collision-free scores at K increasing speeds. Without levels scores are not normalised.
+// Speed normalisation at K increasing speeds; with K = 0 scores are not normalised.
 struct Levels {
   std::vector<double> speed, base, unit;
 
@@ -68,7 +68,7 @@ struct Levels {
   }
 
  private:
-  // Linear between the speeds and constant beyond them; the same bits as NumPy's interp.
+  // Linear between the speeds and constant beyond them, bit-equal to NumPy's interp.
   double at(double now, const std::vector<double>& y) const {
     const std::size_t last = speed.size() - 1;
     if (std::isnan(now)) return now;
@@ -82,13 +82,13 @@ struct Levels {
 };
 
 struct AlarmSettings {
-  double dt = 0;             // sample interval where a sample has none of its own [s]
+  double dt = 0;             // default sample interval [s]
   double settle = 0;         // least time before an alarm [s]
   double threshold = 0;      // of the normalised score
-  std::int64_t samples = 1;  // in a row above the threshold
+  std::int64_t samples = 1;  // successive samples above the threshold for an alarm
   std::int64_t memory = 1;   // window of the largest speed, in samples
   Levels levels;
-  Levels floor;  // levels of the plain thresholds; without levels they are not used
+  Levels floor;  // normalisation of the plain thresholds; with K = 0 they are not used
 };
 
 class Alarm {
@@ -107,7 +107,7 @@ class Alarm {
     run_ = 0, time_ = -1.0, score_ = 0.0;
   }
 
-  // Whether the alarm is up at this sample, `dt` s after the last.
+  // Whether the alarm is on at this sample, `dt` s after the last one.
   bool step(const double* q, const double* qd, const double* current, double dt) {
     double score = scores_->step(q, qd, current, dt);
     const bool floored = !set_.floor.speed.empty();

@@ -32,7 +32,7 @@ inline bool finite(const double* v, std::size_t n) {
   return true;
 }
 
-// One sample of n joints. `name` is the third signal's, for the message of an error.
+// Checks a sample of n joints. `name`: name of the third signal, for error messages.
 inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& drive,
                          const char* name) {
   const std::pair<const char*, const In1*> signals[] = {{"q", &q}, {"qd", &qd}, {name, &drive}};

@@ -18,7 +18,7 @@ bool Chain::operator==(const Chain& other) const {
          std::equal(joints.begin(), joints.end(), other.joints.begin(), other.joints.end(), same);
 }
 
-// The frame of link i in its parent's.
+// Computes the frame of link i in the parent's frame.
 void Chain::place(int i, double q, Workspace& work) const {
   const Joint& joint = joints[i];
   Link& link = work.links[i];
@@ -55,7 +55,7 @@ void Chain::velocities(const double* q, const double* qd, Workspace& work) const
 
 namespace {
 
-// What link i's subtree has gathered, added to its parent's.
+// Adds the sums over a link's subtree to the sums of the parent.
 void hand_over(const Link& link, Link& parent) {
   const Vec3 k = link.rotation * link.k;
   parent.h += link.rotation * link.h + cross(link.origin, k);
@@ -67,7 +67,7 @@ void hand_over_mass(const Link& link, Link& parent) {
   parent.moment += link.rotation * link.moment + link.mass * link.origin;
 }
 
-// (S . H, H . (V x S) + S . gravity wrench) of joint i from what its subtree has gathered.
+// (S . H, H . (V x S) + S . gravity wrench) of joint i, from the sums over its subtree.
 struct Projection {
   double p, beta;
 };
@@ -127,8 +127,7 @@ void Chain::momentum(const double* q, const double* qd, double* p, double* beta,
   }
 }
 
-// One column of the regressor: what a unit of one parameter of `body` does at the joints that carry
-// it.
+// One column of the regressor: effect of a unit of one parameter of `body` on the joints before it.
 void Chain::column(int body, int parameter, double* p, double* beta, std::size_t stride,
                    Workspace& work) const {
   for (int i = 0; i < size(); ++i) p[i * stride] = beta[i * stride] = 0.0;
@@ -205,7 +204,7 @@ void Chain::rnea(const double* q, const double* qd, const double* qdd, double* t
   for (int i = 0; i < size(); ++i) {
     const Joint& joint = joints[i];
     Link& link = work.links[i];
-    Vec3 aw, av = -1.0 * gravity;  // the base accelerates upwards instead of gravity pulling down
+    Vec3 aw, av = -1.0 * gravity;  // an upward acceleration of the base represents gravity
     if (joint.parent >= 0) {
       const Link& parent = work.links[joint.parent];
       aw = parent.aw;

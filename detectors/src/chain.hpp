@@ -1,9 +1,10 @@
-// The rigid-body terms that an observer needs, by O(n) recursions over a tree of one-degree joints.
+// Rigid-body terms of a momentum observer, by O(n) recursions over a tree of joints with one degree
+// of freedom.
 //
-// Notation: link i moves with joint i and carries its frame; all quantities of a link are in its
-// own frame, about its origin. w, v: angular and linear velocity; h, k: angular and linear
-// momentum. With S_i the joint's motion axis and H_i = (h, k) the momentum of the whole subtree of
-// joint i,
+// Notation: link i moves with joint i. The frame of joint i is fixed to link i. All quantities of a
+// link are in this frame, about its origin. w, v: angular and linear velocity; h, k: angular and
+// linear momentum; V_i = (w, v). With S_i the joint's motion axis and H_i = (h, k) the momentum of
+// the whole subtree of joint i,
 //
 //   p_i      = S_i . H_i + armature_i qd_i                    (generalised momentum M(q) qd)
 //   dT/dq_i  = H_i . (V_i x S_i)                              (= (C(q, qd)^T qd)_i)
@@ -41,7 +42,7 @@ struct Inertial {
 
 struct Joint {
   int parent = -1;           // -1: the base
-  bool prismatic = false;    // else revolute
+  bool prismatic = false;    // false: revolute
   Vec3 axis;                 // unit, in the link's frame
   Vec3 offset;               // origin of the joint in the parent's frame
   Vec3 slide;                // prismatic: the axis in the parent's frame
@@ -85,9 +86,8 @@ class Chain {
   // n x count.
   void link_regressor(int link, int count, const double* q, const double* qd, double* p,
                       double* beta, Workspace& work) const;
-  // Derivatives of p and beta by the mass and first moment of link `link`; both are n x 4. The
-  // state is the one that the previous call left in `work`. The motion of each joint and its effect
-  // on the velocities are expressed in the link's frame.
+  // Derivatives of p and beta by the mass and first moment of link `link`; both are n x 4. `work`
+  // has to contain the link velocities of a previous call.
   void load_columns(int link, double* p, double* beta, const Workspace& work) const;
 
   // Inverse dynamics: tau = M qdd + C qd + g.

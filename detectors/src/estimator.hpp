@@ -1,44 +1,42 @@
-// The estimator: friction compensation, the momentum observer, and a Kalman filter of what the
-// model does not know (payload, changed friction). The residual that remains is evidence of a
-// collision.
+// The estimator: friction compensation, the momentum observer, and a Kalman filter of errors of the
+// model (payload, friction). The residual that they do not explain indicates a collision.
 //
-// The residual of a wrong model is linear in the unknowns: r = Phi theta + tau_ext. The columns of
-// Phi have passed the observer's own filter. theta holds the payload at the
-// last link (mass and first moment in that link's frame) and, per joint, a torque offset and the
-// relative errors of viscous and Coulomb friction; slow_errors.hpp tracks them.
+// The residual is linear in the unknowns: r = Phi theta + tau_ext. The columns of Phi have passed
+// the observer's filter. theta consists of the payload at the last link (mass and first moment in
+// that link's frame) and, per joint, a torque offset and the relative errors of viscous and Coulomb
+// friction; slow_errors.hpp estimates them.
 //
 // Errors of the model last for many samples, so successive corrections are not independent. The
-// variance of their noise is therefore multiplied by `inflation`. Without it the filter soon trusts
-// a wrong payload and wrong friction more than new residuals. The gate of an innovation does not
-// use `inflation`; otherwise a held contact would be learned as a payload.
+// variance of their noise is therefore multiplied by `inflation`. Otherwise the filter would soon
+// ignore new residuals, whatever its errors. The clipping of innovations does not use `inflation`,
+// because with it the filter would explain a long contact by a payload.
 //
-// The friction of a joint at rest can hold any torque. If `started` is above 0, a joint corrects
-// the unknowns only after it has moved for that time.
+// The friction of a joint at rest can hold an unknown torque. If `started` is above 0, a joint
+// corrects the unknowns only after it has moved for that time.
 //
-// Where friction has just changed (a joint breaks away, stops or turns), the model is wrong by a
-// fraction `transition` of the change. Its square is added to the variance of a correction.
+// If friction has just changed (a joint breaks away, stops or reverses), the error of the model is
+// the fraction `transition` of the change. Its square is added to the variance of a correction.
 //
-// With `weighted`, the unexplained residual counts less where the payload is uncertain. It is
-// multiplied by the noise's deviation over that of noise and payload together.
+// With `weighted`, the unexplained residual is multiplied by the standard deviation of its noise,
+// divided by that of noise and payload together.
 //
 // The noise of the residual grows with the speed and with `motion_numbers` more quantities of a
-// joint (only if there are unknowns; M is the mass matrix of arm and tracked payload):
-// * the torque of accelerations, sum_k |M_jk qdd_k|, because inertia is known to some percent;
-// * the norm of the joint's row of M, because at rest most of the noise is that of the velocities
-//   times inertia;
-// * the recent deviation of friction from its usual value (a joint breaks away, stops or turns);
-// * in a slow log, half the change of torque since the last sample.
+// joint (only if there are unknowns; M is the mass matrix of arm and estimated payload):
+// * the torque of accelerations, sum_k |M_jk qdd_k|, because inertia is uncertain;
+// * the norm of the joint's row of M, because at rest most of the noise is velocity noise times
+//   inertia;
+// * the recent change of friction (a joint breaks away, stops or reverses);
+// * with `sampled`, half the change of torque since the last sample.
 //
-// A torque acts until the next sample. With `sampled` (a slow log) torques are instants instead,
-// and the mean of two samples acts between them, as for gravity. Without it the error by a lag of
-// half a sample is, while an arm accelerates, as large as a collision. The mean is wrong by up to
-// half the difference of the two samples, because a brake acts at an unknown time between them.
+// Without `sampled`, a measured torque acts until the next sample. With it, for low sample rates,
+// the mean of two samples acts between them. Otherwise the lag of half a sample would cause errors
+// as large as a collision while an arm accelerates. The error of the mean is at most half the
+// difference of the two samples, which occurs if a brake acts just after one of them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 //
-// Two estimators of one arm at the same sample need the same momentum, and the same drive torques
-// if their friction has seen the same motion. An estimator without unknowns takes them from the
-// other.
+// An estimator without unknowns copies momentum and drive torques from another estimator of the
+// same arm at the same sample, if possible, instead of computing them again.
 #pragma once
 
 #include <algorithm>
@@ -57,9 +55,9 @@ namespace tauguard::detectors {
 
 constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
-constexpr int motion_numbers = 4;           // torque of accelerations, inertia, change, half a step
+constexpr int motion_numbers = 4;           // number of the quantities above without the speed
 constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
-constexpr double slow = 0.02;               // a slower joint is at rest [rad/s]
+constexpr double slow = 0.02;               // largest speed of a joint at rest [rad/s]
 
 struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
@@ -70,13 +68,13 @@ struct EstimatorSettings {
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
   double every = 0.01;         // time between two corrections [s]
-  double inflation = 1.0;      // number of corrections over which an error of the model lasts
-  double transition = 0.0;     // error just after a change of friction, as a fraction of it
-  double started = 0.0;        // motion of a joint before its first correction [s]
+  double inflation = 1.0;      // number of corrections with the same error of the model
+  double transition = 0.0;     // error just after a change of friction, relative to the change
+  double started = 0.0;        // time that a joint has to move before its first correction [s]
   bool weighted = false;       // see above
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
   double plain_gain = 100.0;   // [1/s]
-  bool sampled = false;        // torques are instants; false: they act until the next sample
+  bool sampled = false;        // the mean of two samples' torques acts between them, see above
 };
 
 class Estimator {
@@ -111,7 +109,7 @@ class Estimator {
   const std::vector<double>& plain() const { return plain_; }
   double moved(std::size_t j) const { return moved_[j]; }  // time for which joint j has moved [s]
   const std::vector<double>& acceleration() const { return acceleration_; }  // sizes [rad/s^2]
-  // Standard deviation of joint j's residual because of uncertain unknowns [N m].
+  // Standard deviation of joint j's residual due to the unknowns [N m].
   double spread(std::size_t j) {
     return adapts_ ? std::sqrt(std::max(errors_.variance(j, load(j), own(j)), 0.0)) : 0.0;
   }
@@ -121,17 +119,17 @@ class Estimator {
     decay_dt_ = -1.0;
   }
 
-  // Finds out whether `other` is of the same arm, so that a step can take from it.
+  // Checks whether `other` is of the same arm, so that steps can copy from it.
   void compare(const Estimator& other) {
     if (arm_ != other.arm_ && chain_ == other.chain_ && basis_ == other.basis_ &&
         set_.drive_gain == other.set_.drive_gain && set_.weights == other.set_.weights)
       arm_ = other.arm_;
   }
 
-  // One sample. It gives the observer's residual r, the part of it that the unknowns do not
-  // explain, and the quantities with which its noise grows (motion_numbers rows of n).
-  // Accelerations are velocities differentiated at the rate acceleration_rate. `other` has just
-  // stepped with the same q, qd and current, or is null.
+  // Processes a sample. Outputs: the observer's residual r, the part that the unknowns do not
+  // explain, and the quantities of the noise (motion_numbers rows of n). Accelerations are
+  // velocities differentiated at acceleration_rate. `other` is null, or an estimator whose last
+  // step was with the same q, qd and current.
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
             double* unexplained, double* motion, const Estimator* other = nullptr) {
     if (!started_) begin(q, qd);
@@ -201,7 +199,7 @@ class Estimator {
     if (adapts_) weigh(q);
   }
 
-  // The sizes of the entries of the mass matrix of arm and tracked payload, the norms of its rows.
+  // Absolute entries of the mass matrix of arm and estimated payload, and norms of its rows.
   void weigh(const double* q) {
     Inertial& held = carrying_.joints.back().inertial;
     const Inertial& empty = chain_.joints.back().inertial;
@@ -218,8 +216,7 @@ class Estimator {
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
-  // Drive torques minus friction, and what a unit of each of a joint's own unknowns takes from
-  // them.
+  // Drive torques minus friction, and the reduction of each by a unit of the joint's own unknowns.
   void drive(const double* q, const double* qd, const double* current) {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {
@@ -244,8 +241,8 @@ class Estimator {
     }
   }
 
-  // Torque that arm and tracked payload need at joint j, accelerations aside. The residual of a
-  // payload that the model lacks has the sign of what is missing: theta is less than 0 for it.
+  // Torque of arm and estimated payload at joint j without accelerations. theta of a payload that
+  // the model does not contain is negative, as its residual is.
   double carried(std::size_t j) const {
     double sum = beta_[j];
     if (adapts_)
@@ -306,7 +303,7 @@ class Estimator {
     return more > 0 ? std::sqrt(noise / (noise + more)) : 1.0;
   }
 
-  // Variance of the residual because of the recent deviation of friction [(N m)^2].
+  // Variance of the residual due to the recent change of friction [(N m)^2].
   double changed(std::size_t j) const {
     const double off = set_.transition * (own_[per_joint * j + coulomb_at] - usual_[j]);
     return off * off;
@@ -335,7 +332,7 @@ class Estimator {
   std::vector<double> own_now_, own_before_, own_, smooth_, usual_, moved_, half_step_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
   std::shared_ptr<int> arm_ = std::make_shared<int>();  // one for all estimators of one arm
-  Chain carrying_;                                      // the arm with the tracked payload
+  Chain carrying_;                                      // the arm with the estimated payload
   std::vector<double> mass_, inertia_, change_, acceleration_;
   double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0, change_decay_ = 0.0;
   double since_ = 0.0;  // last correction [s]

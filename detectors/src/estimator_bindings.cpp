@@ -34,7 +34,7 @@ FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Nu
   return basis;
 }
 
-// Columns of every joint: (T, n, c).
+// Friction columns of each joint, (T, n, c).
 void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, In2 load, Out3 out) {
   const std::size_t rows = q.shape(0), n = q.shape(1), c = basis.columns();
   require(qd.shape(0) == rows && qd.shape(1) == n && tau.shape(0) == rows && tau.shape(1) == n &&

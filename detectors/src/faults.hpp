@@ -1,4 +1,4 @@
-// Faults of a stream that the samples alone show, without a model of the arm.
+// Faults of a stream of samples that are found without a model of the arm.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ enum class Fault : std::int32_t {
   torque_size,
 };
 
-// Usual values of one arm's samples; all arrays hold one entry a joint.
+// Usual values of one arm's samples; all arrays have one entry per joint.
 struct Usual {
   double dt = 0;         // sample interval [s]
   double longest = 0;    // longest interval that is not a gap [s]
@@ -37,10 +37,10 @@ struct Usual {
   std::int64_t repeats = 0;     // allowed number of successive samples without any change
   std::int64_t window = 0;      // samples over which velocities are summed
   std::vector<double> current;  // largest |current| [A]
-  double fraction = 0;          // of the travel: allowed difference of position and summed velocity
-  double step_fraction = 0;     // the same over one sample, whose time stamp may be late
-  std::vector<double> step;     // |change of q less qd dt| beyond that, over one sample [rad]
-  std::vector<double> drift;    // the same summed over `window` samples [rad]
+  double fraction = 0;          // allowed |dq - sum qd dt| of a window, relative to |sum qd dt|
+  double step_fraction = 0;     // allowed |dq - qd dt| of one sample, relative to |qd dt|
+  std::vector<double> step;     // allowed |dq - qd dt| of one sample beyond that [rad]
+  std::vector<double> drift;    // allowed |dq - sum qd dt| of a window beyond that [rad]
   std::vector<std::int64_t>
       stuck;  // allowed number of successive samples without a change of the current
 };
@@ -48,7 +48,7 @@ struct Usual {
 struct Verdict {
   Fault fault = Fault::none;
   std::int32_t joint = -1;  // 0-based, -1 for the sample as a whole
-  double value = 0;         // in the fault's own unit
+  double value = 0;         // value that is at fault; the unit depends on the fault
 };
 
 // Checks one sample after another. The work is bounded, and nothing is allocated after
@@ -99,7 +99,7 @@ class FaultCheck {
   }
 
  private:
-  // What a single sample shows.
+  // Faults of a single sample.
   Verdict values(double t, const double* q, const double* qd, const double* current) const {
     if (!std::isfinite(t)) return {Fault::time_not_finite, -1, t};
     for (std::size_t j = 0; j < n_; ++j) {
@@ -114,7 +114,7 @@ class FaultCheck {
     return {};
   }
 
-  // What it shows in comparison with earlier samples.
+  // Faults in comparison with earlier samples.
   Verdict differences(double dt, const double* q, const double* qd, const double* current) {
     Verdict found;
     const auto say = [&](Fault fault, std::int32_t joint, double value) {
@@ -126,7 +126,7 @@ class FaultCheck {
       begun_ = true;
       return {Fault::gap, -1, dt};
     }
-    // No interval as in training for a while: the rate is wrong; late samples look different.
+    // Many successive intervals unlike those in training: the sample rate is wrong.
     const double ratio = dt / usual_.dt, late = std::fabs(dt - usual_.dt);
     odd_ = ratio > 0.8 && ratio < 1.25 ? 0 : odd_ + 1;
     if (odd_ > usual_.odd) say(Fault::rate, -1, dt);
@@ -141,7 +141,7 @@ class FaultCheck {
     for (std::size_t j = 0; j < n_; ++j) {
       const auto joint = static_cast<std::int32_t>(j);
       const double travel = dt * (qd[j] + lqd[j]) / 2, error = q[j] - lq[j] - travel;
-      // Differences that a velocity or a time stamp one sample late causes.
+      // Difference due to a velocity or a time stamp that is one sample late.
       const double bend =
           usual_.dt * std::fabs(qd[j] - lqd[j]) + std::min(late, usual_.dt) * std::fabs(qd[j]);
       sums_[j] += error - errors_[row + j];
@@ -158,7 +158,7 @@ class FaultCheck {
       unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
       if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);
     }
-    // Rounding accumulates in running sums, so they are added up anew once per window.
+    // Rounding errors accumulate in running sums, so they are computed anew once per window.
     if (++filled_ % usual_.window == 0) sum_anew();
     return found;
   }

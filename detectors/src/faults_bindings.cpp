@@ -1,4 +1,4 @@
-// Faults that a stream of samples shows by itself, on arrays.
+// Fault checks of streams of samples, on arrays.
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 

@@ -1,8 +1,7 @@
-// From an arm's samples to each joint's ratio of signal to bound: the free-motion detector.
+// The free-motion detector: each joint's ratio of signal to bound from the samples of an arm.
 //
-// Samples that come faster than `interval` are averaged, because a joint must exceed its bound for
-// tens of milliseconds to count as struck. The estimator gets the last sample but one, with the
-// median of three currents.
+// Samples are averaged over `interval`, because an alarm needs tens of milliseconds above a bound.
+// The estimator gets the mean before the last one, with the median of the last three currents.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +15,9 @@ namespace tauguard::detectors {
 
 class FreeMotion {
  public:
-  static constexpr double interval = 4e-3;  // [s]
+  static constexpr double interval = 4e-3;  // least time between two means [s]
 
-  // `bounds` are of the estimator's joints.
+  // Both arguments are of the same joints.
   FreeMotion(Estimator estimator, RegimeBounds bounds)
       : estimator_(std::move(estimator)),
         n_(estimator_.joints()),
@@ -33,8 +32,10 @@ class FreeMotion {
   std::size_t joints() const { return n_; }
   const std::vector<double>& ratio() const { return ratio_; }
   const std::vector<double>& bound() const { return bound_; }
-  const std::vector<double>& residual() const { return left_; }  // without slow errors
-  const std::vector<double>& qdd() const { return estimator_.acceleration(); }  // sizes
+  // Residual minus the estimated errors of the model [N m].
+  const std::vector<double>& residual() const { return left_; }
+  // Absolute accelerations [rad/s^2].
+  const std::vector<double>& qdd() const { return estimator_.acceleration(); }
   bool rest(std::size_t j) const { return regimes_.rest(j); }
 
   void reset() {
@@ -48,7 +49,7 @@ class FreeMotion {
     regimes_.reset();
   }
 
-  // One sample, `dt` s after the last.
+  // Processes a sample, `dt` s after the last one.
   void step(const double* q, const double* qd, const double* current, double dt) {
     for (std::size_t j = 0; j < n_; ++j) {
       sum_[j] += q[j];

@@ -1,17 +1,16 @@
 // A friction model that is linear in its weights: columns of position, velocity and drive torque.
 //
 // Presliding and Coulomb friction come in two forms, both in [-1, 1] and rate-independent:
-//   a Dahl bristle of settling length d:   ds = (dq - s |dq|) / d   (exact over a step:
-//   exponential) a stop operator of width d:            s = (q - rest) / d, rest dragged along
-//   beyond d
-// The bristle forgets under jitter, so it follows a position that moves only when the measured one
-// has left a dead zone of `play` around it. With b the first bristle (the first stop where there is
-// none), the columns of one joint are, in this order,
+// * a Dahl bristle of settling length d: ds = (dq - s |dq|) / d, integrated exactly over a step;
+// * a stop operator of width d: s = (q - rest) / d, where rest follows q beyond the distance d.
+// Noise of the position would reset a bristle. So the bristle follows a position that moves only if
+// the measured one is more than `play` away. With b the first bristle, or the first stop if there
+// is no bristle, the columns of one joint are, in this order,
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
 //   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
-//   ripple frequency c, tau |tau| where the drive's torque per ampere changes with the current
-// The load is the drive's torque, or with `modelled` the torque by the arm's model. A joint without
-// gravity needs hardly any torque but friction, and friction must not be predicted from itself.
+//   ripple frequency c, tau |tau| with `saturation`
+// The load is the drive's torque or, with `modelled`, the torque by the arm's model. The drive
+// torque of a joint without gravity is mostly friction, which would be predicted from itself.
 #pragma once
 
 #include <algorithm>
@@ -38,16 +37,16 @@ class FrictionBasis {
   static constexpr std::size_t offset_at = 0, viscous_at = 1, first_at = 2;
 
   std::size_t columns() const { return smooth() + 2 * ripples + (saturation ? 1 : 0); }
-  // Columns [first_at, smooth()) are Coulomb friction in its forms.
+  // Columns [first_at, smooth()) are the columns of Coulomb friction.
   std::size_t smooth() const {
     return first_at + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 +
            loaded.size();
   }
 
-  // Columns [loaded_at, smooth()) are the load-dependent ones among them.
+  // Columns [loaded_at, smooth()) are the load-dependent columns of Coulomb friction.
   std::size_t loaded_at() const { return smooth() - 1 - loaded.size(); }
 
-  // State variables of a joint: the followed position, the bristles, the stops' rests.
+  // Number of a joint's states: position with play, bristles, rest positions of the stops.
   std::size_t memory() const { return 1 + bristles.size() + stops.size(); }
 
   void reset(double q, double* memory) const {

@@ -1,10 +1,9 @@
-// From residuals to the score of a kernel machine: the scaling of residuals, the window over them,
-// the SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and its sums. Nothing here depends on Python, and
-// nothing is allocated after construction.
+// Scaling of residuals, windows of them, and sums of the SRQ kernel
+// 1 / (1 + |x - z|^2 / sigma^2)^2. Nothing is allocated after construction.
 //
-// The lanes hold support vectors. Every lane does the same arithmetic in the same order at any
-// vector width, so all code paths give the same bits. A result depends on its row alone, so any
-// number of threads and online evaluation give the same bits, too.
+// Each lane evaluates one support vector, with the same arithmetic at any vector width, so all code
+// paths give the same bits. A result depends only on its row, so any number of threads and the
+// evaluation of single rows give the same bits, too.
 #pragma once
 
 #include <algorithm>
@@ -63,7 +62,7 @@ class KernelSum {
   std::vector<double> vectors_, coef_;
 };
 
-// Terms of the noise model, a row of n each: 1, the joint's speed, and the estimator's motion rows.
+// Terms of the noise model for each joint: 1, speed, and the estimator's motion rows.
 constexpr std::size_t motion_rows = 4, noise_terms = 2 + motion_rows;
 
 // Residuals of the chosen joints in units of their noise, one row at a time.
@@ -80,7 +79,7 @@ class Scaling {
         compress_(compress) {}
 
   std::size_t columns() const { return joints_.size(); }
-  // Whether it fits an arm of n joints.
+  // Whether all chosen joints are below n.
   bool fits(std::size_t n) const {
     for (const auto j : joints_)
       if (j < 0 || static_cast<std::size_t>(j) >= n) return false;
@@ -112,7 +111,7 @@ class Scaling {
 };
 
 // The window that ends with the latest row of a signal: `count` rows, `lag` apart, oldest first,
-// stored column by column. The first row stands for the rows before it.
+// stored column by column. The first row replaces rows before it.
 class Window {
  public:
   Window(std::size_t columns, std::size_t lag, std::size_t count)

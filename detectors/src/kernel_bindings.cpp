@@ -21,7 +21,7 @@ void rows(const KernelSum& kernel, In2 x, Out1 out, int threads) {
 }
 
 // The window that ends with row t of a signal of m columns: `count` rows `lag` apart, oldest first,
-// one column after the other; rows before the first are the first.
+// one column after the other; the first row replaces rows before it.
 void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag, std::size_t count,
             double* out) {
   for (std::size_t i = 0; i < count; ++i) {

@@ -1,6 +1,6 @@
-// Free, collision or fault: a detector together with the checks of its samples. A sample allocates
-// nothing, and its work is bounded: samples are interpolated for at most `span` seconds, or
-// `bridged` in number if that is more.
+// The state free, collision or fault, from a detector and checks of its samples. A step allocates
+// nothing, and its work is bounded: gaps are interpolated up to `span` [s], or up to `bridged`
+// samples if that is more.
 #pragma once
 
 #include <cmath>
@@ -17,23 +17,23 @@ enum class State : int { free, collision, fault };
 
 struct Thought {
   State state = State::free;
-  bool alarm = false;  // during a fault: whether it was up when the fault began
+  bool alarm = false;  // during a fault: whether it was on when the fault began
   double score = 0;    // the last known score
-  Verdict why;         // the present or the last fault
+  Verdict why;         // the current or the last fault
   bool settling = false;
 };
 
 struct MonitorSettings {
-  double dt = 0;       // of the samples [s]
-  double settle = 0;   // of the detector [s]
-  double span = 0;     // an alarm that began within this time before a fault is caused by it [s]
-  double window = 0;   // time after a bridged fault in which nothing is judged [s]
-  double bridged = 0;  // number of successive samples that may always be interpolated
+  double dt = 0;       // sample interval [s]
+  double settle = 0;   // settling time of the detector [s]
+  double span = 0;     // an alarm within this time before a fault is attributed to the fault [s]
+  double window = 0;   // time after an interpolated gap in which no alarm starts [s]
+  double bridged = 0;  // number of successive samples that are always interpolated
 };
 
 class Monitor {
  public:
-  // `observer` gives the residual that `torques` judges; all are of one arm.
+  // `torques` checks the residual of `observer`; all are of one arm.
   Monitor(FaultCheck check, Alarm alarm, Estimator observer, TorqueCheck torques,
           MonitorSettings settings)
       : check_(std::move(check)),
@@ -50,7 +50,7 @@ class Monitor {
 
   std::size_t joints() const { return n_; }
   bool settled() const { return time_ >= ready_; }
-  // The detector's estimator if it has stepped with the last sample as it was, else null.
+  // The detector's estimator if it has stepped with the last sample as given, else null.
   const Estimator* fed() const { return bad_ ? nullptr : alarm_.estimator(); }
 
   const Thought& step(double t, const double* q, const double* qd, const double* current) {
@@ -77,7 +77,7 @@ class Monitor {
     known_ = true;
     time_ = t;
     const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
-    // When an alarm ends the averages are reset, so the contact's torques are not called a fault.
+    // When an alarm ends, the averages are reset, so that a contact's torques are not a fault.
     if (said_.alarm && !up) torques_.reset();
     const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
     if (t < ready_ && reason_.fault != Fault::none)
@@ -97,8 +97,8 @@ class Monitor {
     return torques_.step(out_.data(), current, dt);
   }
 
-  // Interpolates the samples that are missing before this one and returns their number. If they are
-  // too many, the detector starts again.
+  // Interpolates the missing samples before this one and returns their number. If there are too
+  // many, the detector is reset.
   double bridge(double t, const double* q, const double* qd, const double* current) {
     if (!known_) {
       ready_ = t + set_.settle;

@@ -1,4 +1,4 @@
-// Streams of scores, the alarm on them, and the monitor: one call from a sample to the answer.
+// Streams of scores, alarms and monitors; one call per sample.
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/vector.h>
 
@@ -15,7 +15,7 @@ using Numbers = std::vector<double>;
 using Source = std::shared_ptr<Scores>;
 using Flags = nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// A stream that is written in Python: `make` returns a new one. A step allocates.
+// A stream that is written in Python; `make` returns a new one. Its steps allocate.
 class PythonScores final : public Scores {
  public:
   PythonScores(nb::object make, std::size_t joints) : make_(std::move(make)), n_(joints) {
@@ -107,9 +107,9 @@ nb::typed<nb::tuple, int, bool, double, int, int, double, bool> step(Monitor& mo
                         said.settling);
 }
 
-// A block of samples in turn, (T, n): alarms (T,), and residuals (T, n) of another estimator. A
-// residual stays, from `last` on, where a sample is not finite. Returns the first fault: its number
-// or 0, joint, value, settling.
+// Processes T samples: writes alarms (T,), and residuals (T, n) of another estimator. At a sample
+// that is not finite, the residual is that of the sample before, initially `last`. Returns the
+// first fault: number or 0, joint, value, settling.
 nb::typed<nb::tuple, int, int, double, bool> steps(Monitor& monitor, In1 t, In2 q, In2 qd,
                                                    In2 current, Estimator& estimator, double dt,
                                                    Out1 last, Out2 residuals, Flags alarms) {

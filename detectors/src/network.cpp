@@ -1,5 +1,5 @@
 // tauguard.detectors._network: feed-forward networks.
-// A result depends on its row alone: one row or many give the same bits.
+// A result depends only on its row, so that one row or many give the same bits.
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
@@ -25,8 +25,8 @@ TAUGUARD_CLONES void affine(const double* x, const double* weight, const double*
   for (std::size_t j = 0; j < out; ++j) y[j] += bias[j];
 }
 
-// Affine layers with rectifiers in between, on inputs (x - centre) / scale. `widths` holds the
-// inputs' number and every layer's outputs; `weights` and `biases` the layers' one after another.
+// Affine layers with rectifiers between them, for inputs (x - centre) / scale. `widths`: number of
+// inputs, then of outputs of each layer. `weights` and `biases` are concatenated over the layers.
 void network(In2 x, Ids widths, In1 weights, In1 biases, In1 centre, In1 scale, Out2 out,
              int threads) {
   const std::size_t layers = widths.shape(0) - 1;

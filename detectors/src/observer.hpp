@@ -34,7 +34,7 @@ class Observer {
   bool started() const { return started_; }
   const std::vector<double>& residual() const { return residual_; }
 
-  // Starts with a residual of 0; these values are those of the last sample.
+  // Sets the residual to 0, and the last sample to these values.
   void reset(const double* q, const double* qd, const double* tau) {
     chain_.momentum(q, qd, p_before_.data(), beta_before_.data(), work_);
     for (std::size_t j = 0; j < gain_.size(); ++j) {
@@ -44,7 +44,7 @@ class Observer {
     started_ = true;
   }
 
-  // The residual at the sample (q, qd), `dt` after the last; tau is kept for the next step.
+  // The residual at the sample (q, qd), `dt` s after the last one; the next step uses tau.
   const double* step(const double* q, const double* qd, const double* tau, double dt) {
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (dt != decay_dt_) {
@@ -61,7 +61,7 @@ class Observer {
     return residual_.data();
   }
 
-  // Its state between two steps, as numbers.
+  // The state between two steps.
   std::vector<double> state() const {
     std::vector<double> out = {started_ ? 1.0 : 0.0};
     for (const auto* v : {&p_before_, &beta_before_, &tau_before_, &residual_})

@@ -1,6 +1,6 @@
-// tauguard.detectors._observer: chains of one-degree joints and the momentum observer on arrays;
-// with it what stands on them, up to the monitor of a stream. Rows are samples and independent of
-// each other in all batch functions; shapes are checked in Python.
+// tauguard.detectors._observer: kinematic chains and the momentum observer on arrays, and all that
+// uses them, up to the monitor of a stream. In batch functions, each row is a sample, and rows are
+// independent; shapes are checked in Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -20,7 +20,7 @@ using namespace tauguard::detectors;
 using tauguard::geometry::load;
 using tauguard::geometry::ThreadPool;
 
-constexpr std::size_t grain = 512;  // samples a chunk
+constexpr std::size_t grain = 512;  // samples per chunk
 
 namespace {
 
@@ -191,11 +191,10 @@ void bind_chain(nb::module_& m) {
           "link"_a, "q"_a, "qd"_a, "p"_a.noconvert(), "beta"_a.noconvert(), "threads"_a);
 }
 
-// Samples in turn of an observer with fixed thresholds: residuals, and where one is beyond its
-// bound. Numbers of the joints, a row each: drive gain, Coulomb friction (times `direction`),
-// viscous friction, least and largest position, bound of the residual. Beyond these positions, and
-// for `hold` samples after, a joint feels its stop and its residual counts as 0; `left` has what is
-// left of them.
+// Residuals of an observer along samples, and whether one exceeds its fixed bound. Rows of
+// `numbers`: drive gain, Coulomb friction (times `direction`), viscous friction, least and largest
+// position, bound of the residual. Beyond these positions, and for `hold` samples after, a joint
+// touches its stop, so its residual is set to 0; `left` counts the remaining samples of each joint.
 void alarms(Observer& observer, In2 q, In2 qd, In2 direction, In2 current, In2 numbers, double dt,
             std::int64_t hold, nb::ndarray<std::int64_t, nb::ndim<1>, nb::c_contig> left, Out2 out,
             nb::ndarray<bool, nb::ndim<1>, nb::c_contig> up) {

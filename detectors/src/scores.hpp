@@ -18,11 +18,11 @@ class Scores {
   virtual ~Scores() = default;
   virtual std::size_t joints() const = 0;
   virtual void reset() = 0;  // the next sample is the first
-  // The score of a sample, `dt` s after the last; n numbers each.
+  // The score of a sample, `dt` s after the last one; n numbers each.
   virtual double step(const double* q, const double* qd, const double* current, double dt) = 0;
   // The score of the plain thresholds that this detector contains, at the same sample.
   virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
-  // The estimator that steps at each sample as it is; null: none does.
+  // An estimator that steps with each sample as given, or null.
   virtual const Estimator* estimator() const { return nullptr; }
 };
 
@@ -69,7 +69,7 @@ class ScaledResidual {
     scale(scaling_, qd, row_.data());
     return row_.data();
   }
-  // The residual of the last step by another scaling.
+  // The unexplained residual of the last step with another scaling.
   void scale(const Scaling& scaling, const double* qd, double* out) const {
     scaling.row(unexplained_.data(), qd, motion_.data(), joints(), out);
   }
@@ -113,7 +113,7 @@ inline double severity(double target) {
   return bounded / (1 - bounded);
 }
 
-// Plain thresholds on the residual in another scaling. Without limits there are none.
+// Plain thresholds on the residual with another scaling; none if `limits` is empty.
 struct Floor {
   Scaling scaling;
   std::vector<double> limits;

@@ -2,12 +2,12 @@
 // errors that concern one joint each.
 //
 // Each state is an Ornstein-Uhlenbeck process with a standard deviation and a time constant.
-// Without measurements it decays to zero, the calibrated model. A deviation of 0 removes a state. A
-// measurement is one joint's residual. Its row has entries for the payload and for the joint's own
-// errors alone.
+// Without measurements it decays to zero, which is the calibrated model. A standard deviation of 0
+// removes a state. A measurement is one joint's residual. It depends only on the payload and on the
+// joint's own errors.
 //
-// A collision must not change the states. An innovation z of more than c = `clip` standard
-// deviations counts as c^2 / z: the larger it is, the less it says about the model.
+// To limit the effect of collisions, an innovation of z standard deviations, z above c = `clip`, is
+// replaced by one of c^2 / z standard deviations.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace tauguard::detectors {
 
 constexpr int payload_numbers = 4;  // mass [kg] and first moment in the last link's frame [kg m]
-constexpr int per_joint = 3;        // errors of a joint's own: offset, viscous, Coulomb
+constexpr int per_joint = 3;        // errors of one joint: offset, viscous, Coulomb
 
 class SlowErrors {
  public:
@@ -55,7 +55,7 @@ class SlowErrors {
     return sum;
   }
 
-  // Variance of the residual because the payload is uncertain.
+  // Variance of the residual due to the payload.
   double payload_variance(const double* payload) const {
     double sum = 0.0;
     for (int a = 0; a < payload_numbers; ++a)
@@ -64,13 +64,13 @@ class SlowErrors {
     return sum;
   }
 
-  // Variance of the residual because any state is uncertain.
+  // Variance of the residual due to all states.
   double variance(std::size_t j, const double* payload, const double* own) {
     set_row(j, payload, own);
     return gather(j);
   }
 
-  // Time update over `elapsed` seconds.
+  // Time update over `elapsed` [s].
   void fade(double elapsed) {
     for (std::size_t a = 0; a < m_; ++a)
       row_[a] = a >= per_joint && persistence_[a] == persistence_[a - per_joint]
@@ -83,9 +83,9 @@ class SlowErrors {
     }
   }
 
-  // Corrects the states by joint j's residual, whose noise has `variance`. The noise is correlated
-  // over `inflation` corrections, which together count as one measurement. The gate uses the
-  // variance of one.
+  // Corrects the states by joint j's residual, whose noise has `variance`. Because the noise is
+  // correlated over `inflation` corrections, the variance is multiplied by that number, except for
+  // the clipping of the innovation.
   void correct(std::size_t j, double residual, const double* payload, const double* own,
                double variance, double inflation) {
     set_row(j, payload, own);

@@ -1,9 +1,9 @@
 // Checks whether the drives' torques fit the arm's motion: signs, exchanged joints, gains, load.
 //
-// `given` is the drives' torque by the measured currents. `needed` = r + given is the torque that
-// the motion takes by the model. Both pass the observer's filter. The ratio E[given needed] /
-// E[needed^2] of a joint is 1 without errors and contacts, and -1 if the sign is wrong. E is an
-// exponential average: a fast one finds torques of the wrong sign, a slow one those of wrong size.
+// `given` is the drives' torque by the measured currents. `needed` = r + given is the torque of the
+// motion by the model. Both pass the observer's filter. The ratio E[given needed] / E[needed^2] of
+// a joint is 1 without errors and contacts, and -1 if the sign is wrong. E is an exponential
+// average. A fast average finds torques of the wrong sign, a slow one torques of the wrong size.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +17,13 @@
 namespace tauguard::detectors {
 
 struct TorqueBounds {
-  double rate = 20;   // of the observer that gives the residual [1/s]
-  double fast = 0.5;  // time constants of the averages [s]
-  double slow = 4.0;
-  double heard = 8.0;           // least signal for a ratio, as a multiple of the joint's noise
-  std::vector<double> opposed;  // fast ratio below which a torque works against the motion, n
-  std::vector<double> least;    // slow ratios outside of which a torque has another size, n
-  std::vector<double> most;
+  double rate = 20;             // rate of the observer [1/s]
+  double fast = 0.5;            // time constant of the fast average [s]
+  double slow = 4.0;            // time constant of the slow average [s]
+  double heard = 8.0;           // least RMS of `needed` for a ratio, as a multiple of the noise
+  std::vector<double> opposed;  // least fast ratio, n
+  std::vector<double> least;    // least slow ratio, n
+  std::vector<double> most;     // largest slow ratio, n
 };
 
 class TorqueCheck {
@@ -46,7 +46,7 @@ class TorqueCheck {
     for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) std::fill(v->begin(), v->end(), 1.0);
   }
 
-  // The smallest fast, smallest slow and largest slow ratio, among those so far and 1; n each.
+  // Least fast, least slow and largest slow ratio until now, initially 1; n each.
   std::vector<double> extremes() const {
     std::vector<double> all(fast_least_);
     all.insert(all.end(), slow_least_.begin(), slow_least_.end());
@@ -54,7 +54,7 @@ class TorqueCheck {
     return all;
   }
 
-  // One sample: the residual of the plain observer [N m], the currents [A], the time step [s].
+  // Processes a sample: residual of the plain observer [N m], currents [A], time step [s].
   Verdict step(const double* residual, const double* current, double dt) {
     const bool first = time_ == 0;
     const double low = first ? 1.0 : 1 - std::exp(-set_.rate * dt);

@@ -1,6 +1,5 @@
 // Joint velocity from measured position and velocity: a steady-state Kalman filter on position,
-// velocity and acceleration. The acceleration is a random walk. Below some hundred rad/s the
-// measured positions determine the velocity better than the measured velocity does.
+// velocity and acceleration. The model of the acceleration is a random walk.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +26,7 @@ class VelocityFusion {
     }
   }
 
-  // One sample; the fused velocities.
+  // Processes a sample and returns the fused velocities.
   const double* step(const double* q, const double* qd, double dt) {
     for (std::size_t j = 0; j < velocity_.size(); ++j) {
       double* x = &state_[3 * j];

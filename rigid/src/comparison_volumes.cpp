@@ -6,7 +6,7 @@
 namespace tauguard::rigid {
 namespace {
 
-constexpr double up = 1 + 0x1p-46;  // more than the relative error of any short chain below
+constexpr double up = 1 + 0x1p-46;  // exceeds the relative rounding error of each expression below
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -191,7 +191,9 @@ KDop::Cone KDop::Cone::around(const double* d) {
 }
 
 KDop::Relation::Relation(const Tree& a, const Tree& b, const Pose& pose) : at(a, b, pose) {
-  at.pad *= 4;  // directions of length sqrt 2, weights that sum to at most sqrt 3
+  // `pad` is for unit directions. Directions of length up to sqrt 2 and weights with a sum of at
+  // most sqrt 3 increase an error by at most sqrt 6.
+  at.pad *= 4;
   for (int k = 0; k < directions; ++k) {
     const auto* axis = geometry::k_dop_axes[k];
     double in_b[3], in_a[3];
