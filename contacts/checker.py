@@ -73,10 +73,10 @@ class State:
 
     @classmethod
     def of(cls, model: Any, data: Any, scratch: Any = None) -> State:
-        """The state of ``data`` at ``data.qpos``; ``data`` is not changed.
+        """The state of ``data``, with the kinematics of ``data.qpos``; ``data`` is not changed.
 
-        After ``mj_step``, ``data.xpos`` and the like are still those of the start of the step. So
-        the kinematics are computed again, in ``scratch``.
+        ``mj_step`` leaves ``data.xpos`` and the other poses at their values of the start of the
+        step. So the kinematics are computed again, in ``scratch``.
 
         Args:
             model: MjModel.
@@ -141,10 +141,10 @@ class Contacts:
 
     Attributes:
         time: Fraction of the step in [0, 1]; 0 for contacts that exist at the start. Shape (K,).
-        geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
-        flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
-        feature: Vertex, edge or element of each partner, numbered by the checker (in MuJoCo:
-            ``contact.vert`` or ``contact.elem``); -1 if not given. Shape (K, 2).
+        geom: Geom id of each partner, -1 for a flex. Shape (K, 2).
+        flex: Flex id of each partner, -1 for a geom. Shape (K, 2).
+        feature: Vertex, edge or element of each partner, numbered by the checker (the checker
+            ``mujoco``: ``contact.elem``, else ``contact.vert``); -1 if not given. Shape (K, 2).
         point: Contact point, world frame; NaN if unknown. Shape (K, 3), m.
         normal: Unit vector from the first partner to the second; NaN if unknown. Shape (K, 3).
         distance: Signed distance of the surfaces at ``time``, negative in penetration. Shape (K,),
@@ -212,7 +212,7 @@ class Checker(Protocol):
 
     Attributes:
         name: The registered name.
-        covers: Pairs of :data:`KINDS` that the checker can test, see :func:`pair_kind`.
+        covers: Pairs of :data:`KINDS` that the checker can test, ordered by :func:`pair_kind`.
     """
 
     name: str
@@ -237,7 +237,7 @@ def asked(one: Checker, before: State, after: State) -> Contacts:
     if not isinstance(found, Contacts):
         raise TypeError(
             f"checker {one.name!r}: check returned {type(found).__name__}, expected Contacts "
-            "(Contacts.empty() where nothing touches)"
+            "(Contacts.empty() if nothing touches)"
         )
     return found
 
@@ -251,7 +251,7 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
         replace: Whether to replace an existing factory of this name.
 
     Raises:
-        ValueError: an empty name, a name of another factory, or a factory that is not callable.
+        ValueError: an empty name, a name that is in use, or a factory that is not callable.
     """
     if not name:
         raise ValueError("name: empty, expected the name of a checker")
@@ -274,8 +274,8 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
 
     Raises:
         ValueError: an unknown checker or option (the message lists the known ones), a geom that
-            this checker cannot handle, a checker without ``name``, ``covers`` or ``check``, or a
-            ``covers`` with anything but pairs of kinds.
+            this checker cannot handle, a checker without ``name``, ``covers`` or ``check``, or an
+            item of ``covers`` that is no pair of kinds in the order of :func:`pair_kind`.
     """
     if name not in _FACTORIES:
         raise ValueError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")

@@ -18,10 +18,10 @@ class ClothChecker:
     """Times of impact of cloth with linearly moving vertices.
 
     A flex is the union of its triangles, thickened by its radius, as in MuJoCo. Triangles are
-    tested against geoms by conservative advancement on support functions. Cloth against cloth, and
-    against itself: :class:`tauguard.cloth.MeshCCD` finds candidates at the distance of both radii,
-    and then pairs of triangles are tested. Times are never late. At a time of impact the surfaces
-    are at most 1e-10 of the shapes' size apart.
+    tested against geoms by conservative advancement on support functions. For cloth against cloth
+    or itself, :class:`tauguard.cloth.MeshCCD` finds vertices, edges and faces that come near each
+    other, and then the triangles around them are tested. Reported times are never later than the
+    impact. At a time of impact the surfaces are at most 1e-10 of the shapes' size apart.
 
     Args:
         model: MjModel.
@@ -30,8 +30,8 @@ class ClothChecker:
         self_collision: Whether to test cloth against cloth (the pairs that MuJoCo would test).
 
     Raises:
-        ValueError: a flex that can collide and is not two-dimensional, a geom that may touch a flex
-            and is of a kind that cannot be handled (both named), or an unknown threshold.
+        ValueError: a flex that can collide but is not two-dimensional, a geom of an unsupported
+            kind that can touch a flex (the message names it), or an unknown threshold.
     """
 
     name = "cloth"
@@ -127,7 +127,7 @@ class _Flex:
             name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, number)
             raise ValueError(
                 f"cloth: flex {name!r} has dimension {dim}; this checker handles 2 "
-                '(contype="0" conaffinity="0" leaves such a flex out)'
+                '(contype="0" conaffinity="0" excludes the flex)'
             )
         start, count = int(model.flex_elemdataadr[number]), int(model.flex_elemnum[number])
         local = model.flex_elem[start : start + 3 * count].reshape(-1, 3)
@@ -137,7 +137,7 @@ class _Flex:
         self.bodies = model.flex_vertbodyid[self.elements]
 
     def hangs_on(self, body: int) -> NDArray[np.bool_]:
-        """Mask of triangles with a corner on ``body``, which MuJoCo does not test with it."""
+        """Mask of triangles attached to ``body`` by a corner; MuJoCo does not test them with it."""
         return np.asarray((self.bodies == body).any(axis=1), dtype=bool)
 
 
@@ -191,7 +191,7 @@ class _Cloths:
         return out
 
     def _triangle_pairs(self, vf: Index, ee: Index) -> Index:
-        """Pairs of triangles that contain these features and have no body in common."""
+        """Pairs of triangles around the vertex-face and edge-edge pairs, without a common body."""
         of_vertex, faces = _expand(self._of_vertex, vf[:, 0], vf[:, 1])
         one, rest = _expand(self._of_edge, ee[:, 0], ee[:, 1])
         other, one = _expand(self._of_edge, rest, one)
@@ -203,7 +203,7 @@ class _Cloths:
 
 
 def _incidence(keys: NDArray[Any], values: NDArray[Any], repeat: int) -> tuple[Any, Any]:
-    """``start`` and sorted values: those of key k are ``values[start[k]:start[k + 1]]``."""
+    """``start``, and values sorted by key: key k has ``values[start[k]:start[k + 1]]``."""
     order = np.argsort(keys, kind="stable")
     counts = np.bincount(keys)
     start = np.concatenate([[0], np.cumsum(counts)])
@@ -211,7 +211,7 @@ def _incidence(keys: NDArray[Any], values: NDArray[Any], repeat: int) -> tuple[A
 
 
 def _expand(table: tuple[Any, Any], keys: NDArray[Any], beside: NDArray[Any]) -> tuple[Any, Any]:
-    """All values of all keys, and for each value the entry of ``beside`` of its key."""
+    """All values of ``keys``, and for each value the entry of ``beside`` for its key."""
     start, values = table
     counts = start[keys + 1] - start[keys]
     offset = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

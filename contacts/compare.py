@@ -49,11 +49,11 @@ def compare(
         checkers: Names of registered checkers.
         timestep: MuJoCo's time step [s]; ``None``: the time step of the scene.
         seconds: Duration [s]; ``None``: the duration of the scene.
-        options: Keyword arguments of the factory, by checker.
+        options: Keyword arguments of each checker, by the checker's name.
         ground_truth: Whether to compute true contacts, which is slow. Without them there is no
             precision or recall.
-        fine: If given, the scene is also run with steps this many times shorter, up to its first
-            contact, as a second reference. (After the first contact the two runs differ.)
+        fine: If given, MuJoCo runs the scene once more, in steps that are ``fine`` times shorter,
+            until the first contact. :attr:`Score.first_error_ms` is relative to its time.
         keep: Whether the report keeps the states for a recording.
 
     Raises:
@@ -79,7 +79,7 @@ def compare(
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
     }
-    # MuJoCo's own contacts are always needed, as the reference of leads and depths.
+    # Leads and depths are measured against MuJoCo's own contacts, so these are always computed.
     yardstick = chosen.get("mujoco") or MujocoChecker(model)
     truth = GroundTruth(model) if ground_truth else None
     judged = truth.covers if truth is not None else None
@@ -180,7 +180,7 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
         )
     if ((found.geom < 0) == (found.flex < 0)).any():
         raise ValueError(
-            f"checker {name!r}: a partner with a geom and a flex, or neither; expected one id of -1"
+            f"checker {name!r}: a partner has a geom and a flex, or neither; expected one of both"
         )
     return found
 
@@ -188,7 +188,7 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
 def _first_contact(
     scene: ContactScene, timestep: float, seconds: float
 ) -> tuple[float, set[tuple[str, str]]] | None:
-    """Time [s] and :func:`pair_kind` of MuJoCo's first touching contacts with ``timestep`` [s]."""
+    """Time [s] and kinds of pairs of MuJoCo's first touching contacts, at ``timestep`` [s]."""
     model, data = scene.start(timestep)
     kinds = geom_kinds(model)
     for _ in range(max(1, round(seconds / timestep))):

@@ -18,7 +18,7 @@ _NONE = np.zeros((0, 3))
 
 
 def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool = False) -> Scene:
-    """Make a native scene of some geoms, which are numbered as in the list.
+    """Make a native scene of ``geoms``; their positions in the list are their native numbers.
 
     Args:
         model: MjModel.
@@ -27,7 +27,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
         surfaces: Whether to use the surface of a mesh instead of its convex hull.
 
     Raises:
-        ValueError: a geom of a kind that has no convex shape (named).
+        ValueError: a geom of a kind that has no convex shape (the message names the geom).
     """
     scene = Scene()
     kinds = geom_kinds(model)
@@ -36,7 +36,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
         if kind not in _CORES:
             raise ValueError(
                 f"{checker}: geom {geom_name(model, int(geom))} is a {kind}; this checker handles "
-                f"{', '.join(CONVEX)} (skip=({kind!r},) leaves such geoms out)"
+                f"{', '.join(CONVEX)} (skip=({kind!r},) excludes this kind)"
             )
         _add(scene, model, int(geom), kind)
         if surfaces and kind == "mesh":

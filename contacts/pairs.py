@@ -86,7 +86,7 @@ def geom_flex_pairs(model: Any) -> Pairs:
 
 
 def flex_pairs(model: Any) -> Pairs:
-    """Pairs of flexes, including flexes with themselves; these have margin 0."""
+    """Pairs of flexes, including flexes with themselves (at margin 0)."""
     rows = []
     for f in range(0 if _disabled(model) else model.nflex):
         own = int(model.flex_contype[f]) & int(model.flex_conaffinity[f])

@@ -39,7 +39,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Score:
-    """The score of one checker. ``None``: there was nothing to count, or no ground truth.
+    """The score of one checker. A field is ``None`` if it has nothing to count or no ground truth.
 
     Attributes:
         checker: Name of the checker.
@@ -48,8 +48,8 @@ class Score:
         recalled: Number of events reported during the event or within a step of it.
         reports: Number of reports; a report is a step and a pair that touches in it.
         correct: Number of reports that are true, or no deeper than the tolerance.
-        steps: Number of steps and pairs that touch, deeper than the tolerance.
-        steps_found: Number of ``steps`` that were reported in the same step.
+        steps: Number of touches: in one step, one pair gets deeper than the tolerance.
+        steps_found: Number of these touches that were reported in the same step.
         delay_ms: Median time from the onset of an event to its first report [ms].
         first: Time of the first report of any pair [s].
         first_error_ms: ``first`` minus the time of the first contact in a run of MuJoCo with fine
@@ -104,7 +104,7 @@ class Score:
 class Report:
     """The comparison of several checkers on one run of a scene.
 
-    It prints as a table with a line per checker; :class:`Score` explains the columns.
+    It prints as a table with one line per checker; :class:`Score` explains the columns.
 
     Attributes:
         scene: Name of the scene.

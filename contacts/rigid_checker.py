@@ -19,7 +19,7 @@ class Work:
 
     Attributes:
         moved: Bodies whose motion changed since the previous call.
-        reused: Pairs whose result was copied from the previous call, as neither body has moved.
+        reused: Pairs whose result was copied from the previous call because neither body moved.
         candidates: Pairs whose swept boxes overlap.
     """
 
@@ -33,12 +33,12 @@ class RigidChecker:
 
     Boxes and meshes (their convex hulls) are tested by the kernel of :mod:`tauguard.rigid`; planes,
     spheres, capsules, cylinders and ellipsoids by conservative advancement on support functions.
-    Times are never late. At a time of impact the surfaces are at most 1e-10 of the shapes' size
-    apart.
+    Reported times are never later than the impact. At a time of impact the surfaces are at most
+    1e-10 of the shapes' size apart.
 
     Args:
         model: MjModel.
-        threshold: Which distance of two surfaces counts as a contact. ``"surface"``: 0 (they
+        threshold: Largest distance of two surfaces that counts as a contact. ``"surface"``: 0 (they
             touch). ``"margin"``: MuJoCo's margin, below which a force acts. ``"gap"``: margin +
             gap, below which MuJoCo lists contacts. If the surfaces do not touch, ``distance`` is
             positive.
@@ -47,8 +47,8 @@ class RigidChecker:
             triangles, without inside; contacts with meshes and boxes then have no margin or depth.
 
     Raises:
-        ValueError: a geom that may touch another and is of a kind that cannot be handled (named),
-            or an unknown ``threshold`` or ``mesh``.
+        ValueError: a geom of an unsupported kind that can touch another geom (the message names
+            it), or an unknown ``threshold`` or ``mesh``.
     """
 
     name = "rigid"

@@ -16,7 +16,7 @@ TOUCHING = 1e-8
 
 @dataclass
 class Run:
-    """The record of a run, step by step; ``times`` has one entry more than the lists.
+    """The record of a run, step by step; ``times`` has one entry more than there are steps.
 
     Attributes:
         model: MjModel.

@@ -14,7 +14,7 @@ from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
 from tauguard.contacts.run import TOUCHING, Run
 
 Covers = frozenset[tuple[str, str]]
-#: Depth [m], inner radius [m] and normal, by geoms, flexes and features.
+#: Depth [m], inner radius [m] and normal of contacts, by the ids of geoms, flexes and features.
 _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 
 
@@ -23,9 +23,9 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 
     Recall counts events. An event is a contact of two partners from the first touch to separation;
     events that stay within the tolerance are not counted. Precision counts reports. A report is a
-    step and two partners whose surfaces touch in it; contacts within a margin are not counted. Both
-    count only kinds of pairs that the checker and the ground truth cover. All other metrics count
-    the kinds that the checker covers.
+    step and two partners whose surfaces touch in it; contacts within a margin are not counted. For
+    precision and recall, only kinds of pairs that both the checker and the ground truth cover are
+    counted, for all other metrics the kinds that the checker covers.
     """
     kinds = geom_kinds(model)
     given = run.contacts[name]
@@ -82,8 +82,8 @@ def judge(
 ) -> tuple[Outcome, ...]:
     """Whether MuJoCo listed each event, and whether the contact held.
 
-    A contact held if MuJoCo listed it, it was never deeper than the inner radius of the thinner
-    partner (planes and cloth have none), and no normal reversed from one step to the next.
+    A contact held if MuJoCo listed it, its depth stayed below half the thickness of the thinner
+    partner (planes and cloth have no limit), and no normal reversed from one step to the next.
     """
     if not touches:
         return ()
@@ -162,14 +162,14 @@ def _precision(
         for pair, distance in said.items():
             total += 1
             if pair in true or distance > -TOLERANCE:
-                right += 1  # no deeper than the tolerance: not scored
+                right += 1  # a report no deeper than the tolerance counts as correct
             else:
                 false.append((run.times[k], pair, -distance))
     return right, total, false
 
 
 def _steps(model: Any, mine: Sequence[Contacts], touches: Sequence[Touches]) -> tuple[int, int]:
-    """Number of steps and pairs that touch beyond the tolerance, and of those reported in it."""
+    """Number of touches (a step and a pair) beyond the tolerance, and how many were reported."""
     positive = found = 0
     for contacts, touch in zip(mine, touches, strict=True):
         true = {
@@ -199,7 +199,7 @@ def _delay(truth: Sequence[Event], reports: dict[Pair, list[float]], step: float
 
 
 def _lead(mine: dict[Pair, list[float]], theirs: dict[Pair, list[float]]) -> float | None:
-    """Median lead of the first report of a pair before MuJoCo's [ms]."""
+    """Median time by which a pair's first report is earlier than MuJoCo's [ms]."""
     leads = [1e3 * (theirs[pair][0] - mine[pair][0]) for pair in mine if pair in theirs]
     return float(np.median(leads)) if leads else None
 
@@ -227,7 +227,7 @@ def _differences(
 
 
 def _deepest(contacts: Contacts) -> dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]]:
-    """Distance and normal of the deepest row of each pair, with the lower number first."""
+    """Distance and normal of each pair's deepest contact, with the lower ids as first partner."""
     out: dict[tuple[Any, ...], tuple[float, NDArray[np.float64]]] = {}
     element = np.where(contacts.flex >= 0, contacts.feature, -1)
     partners = np.stack([contacts.geom, contacts.flex, element], axis=2).tolist()
@@ -240,7 +240,7 @@ def _deepest(contacts: Contacts) -> dict[tuple[Any, ...], tuple[float, NDArray[n
 
 
 def _passed(before: _Rows, rows: _Rows) -> bool:
-    """Whether a partner passed through: too deep, or with a reversed normal."""
+    """Whether partners passed through: a contact is too deep, or its normal has reversed."""
     if any(depth >= inner for depth, inner, _ in rows.values()):
         return True
     return any(before[key][2] @ rows[key][2] < 0 for key in before.keys() & rows.keys())

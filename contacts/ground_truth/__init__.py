@@ -1,4 +1,4 @@
-"""The ground truth of `compare`, on the same path as the checkers, by independent code."""
+"""True contacts for `compare`, found by independent code on the same path as the checkers use."""
 
 from tauguard.contacts.ground_truth.events import Event, Pair, events, pair_of
 from tauguard.contacts.ground_truth.touches import TOLERANCE, GroundTruth, Touches

@@ -6,7 +6,8 @@ from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
 
-#: Longest interruption within one event [s]. Interruptions of up to two steps never end an event.
+#: Longest time without contact within one event [s]. Up to two steps without contact are always
+#: allowed.
 GAP = 5e-3
 
 #: Two partners, sorted: ("body", id) or ("flex", id).
@@ -21,15 +22,15 @@ class Event:
     onset: float  #: first touch [s]
     end: float  #: end of the last step in which they touch [s]
     depth: float  #: largest penetration depth [m]
-    counts: bool  #: False: never deeper than the tolerance, so not scored
+    counts: bool  #: whether it is scored: the depth exceeds the tolerance
 
     def seen(self, times: Sequence[float], timestep: float) -> bool:
-        """Whether one of the ``times`` [s] is in the event or within a step of it."""
+        """Whether one of ``times`` [s] is in the event, or at most one timestep outside it."""
         return any(self.onset - timestep <= t <= self.end + timestep for t in times)
 
 
 def pair_of(model: Any, geom: Any, flex: Any) -> Pair:
-    """The partners of one row of contacts or touches: bodies of geoms, or flexes."""
+    """The partners of one contact, sorted: each is a flex, or the body of a geom."""
     partners = [
         ("flex", int(f)) if g < 0 else ("body", int(model.geom_bodyid[g]))
         for g, f in zip(geom, flex, strict=True)

@@ -14,7 +14,7 @@ from tauguard.contacts.checker import State
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a scene, by geoms.
+    """The motion of all geoms and flex vertices of a scene in one step.
 
     A point y of a body moves as ``xpos + s dx + exp(s [w]x) xmat y``, s in [0, 1]. Flex vertices
     move linearly.

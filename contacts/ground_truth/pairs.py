@@ -10,7 +10,7 @@ Index = NDArray[np.int32]
 
 
 def geom_pairs(model: Any) -> Index:
-    """Pairs of geoms that may touch, smaller first. Shape (P, 2)."""
+    """Ids of the geoms that may touch, the smaller id first. Shape (P, 2)."""
     explicit = {tuple(sorted(p)) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)}
     excluded = {(int(e) >> 16, int(e) & 0xFFFF) for e in model.exclude_signature}
     weld, parent = model.body_weldid, model.body_parentid

@@ -1,4 +1,4 @@
-"""Find first contact and depth along a path, from a distance and a bound on its change.
+"""Find first contact and depth along a path, from the distance and a bound on its change.
 
 Let d(s) be the signed distance of two objects whose points move by at most L relative to each other
 in the step. Then |d(s) - d(t)| <= L |s - t|, so d has no zero in [a, b] if d(a) + d(b) > L (b - a).
@@ -23,9 +23,9 @@ Distance = Callable[[NDArray[Any], Array], Array]
 class Found:
     """The result of a search for each pair; every field has shape (N,)."""
 
-    time: Array  #: fraction of the step at first touch, late by less than resolution / L; or inf
+    time: Array  #: first touch (fraction of the step), late by less than resolution / L; or inf
     depth: Array  #: largest depth found [m]; 0 without penetration
-    near: NDArray[np.bool_]  #: within the resolution of contact, and no depth above the tolerance
+    near: NDArray[np.bool_]  #: nearer than the resolution, but never deeper than the tolerance
 
 
 def search(
@@ -36,8 +36,8 @@ def search(
     Args:
         distance: Distances of pairs at given times.
         bound: Bound L of each pair [m], shape (N,).
-        tolerance: Depth at which the search for greater depths ends [m].
-        resolution: Smaller distances may count as touching [m].
+        tolerance: Depth above which a pair is not searched any further [m].
+        resolution: Distance below which a pair may be reported as touching [m].
     """
     n = len(bound)
     rows = np.arange(n)

@@ -26,11 +26,11 @@ class Touches:
     """Pairs that touch within one step, one per row.
 
     Attributes:
-        geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
-        flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
+        geom: Geom id of each partner, -1 for a flex. Shape (K, 2).
+        flex: Flex id of each partner, -1 for a geom. Shape (K, 2).
         time: Time of the first touch, as a fraction of the step. Shape (K,).
-        depth: Largest depth found; the search ends above the tolerance. Shape (K,), m.
-        counts: Whether the depth exceeds :data:`TOLERANCE`; otherwise not scored. Shape (K,).
+        depth: Largest depth found; the search ends above :data:`TOLERANCE`. Shape (K,), m.
+        counts: Whether the row is scored: the depth exceeds :data:`TOLERANCE`. Shape (K,).
     """
 
     geom: Index
@@ -46,17 +46,17 @@ class Touches:
 class GroundTruth:
     """True contacts of geoms with each other and with flexes.
 
-    The distance of two geoms is that of ``mj_geomDistance``. The distance of flex elements
-    (triangles of thickness 2 ``flex_radius``) is computed in closed form from spheres, capsules and
-    planes, and by coal's GJK from other convex geoms. Margins are ignored. The code is slow and
-    independent of the checkers.
+    ``mj_geomDistance`` computes the distance of two geoms. The distance of a flex element (a
+    triangle of thickness 2 ``flex_radius``) from a sphere, capsule or plane has a closed form. From
+    other convex geoms it is computed by GJK of the library coal. Margins are ignored. The code is
+    slow and independent of the checkers.
 
     Args:
         model: MjModel.
 
     Raises:
-        ValueError: a flex that is not two-dimensional, or that may meet a geom of another kind than
-            :data:`FLEX_MEETS`.
+        ValueError: a flex that is not two-dimensional, or that can touch a geom whose kind is not
+            in :data:`FLEX_MEETS`.
     """
 
     def __init__(self, model: Any) -> None:
@@ -89,7 +89,7 @@ class GroundTruth:
         }
 
     def touches(self, before: State, after: State) -> Touches:
-        """The pairs that touch anywhere between both states."""
+        """The pairs that touch at some time between the two states."""
         step = Step.between(self.model, before, after)
         rows = self._rigid(step)
         for flex, geom, kind in self._meets:

@@ -1,4 +1,4 @@
-"""Distances between flex elements (triangles) and geoms, row by row, in closed form or by coal."""
+"""Distances of flex elements (triangles) from geoms: closed forms, or GJK of the library coal."""
 
 from typing import Any
 

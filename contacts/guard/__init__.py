@@ -1,4 +1,4 @@
-"""The guarded stepper: no covered pair passes through itself, at any timestep."""
+"""The guarded stepper: covered partners do not pass through each other, at any timestep."""
 
 from tauguard.contacts.guard.energy_budget import EnergyBalance
 from tauguard.contacts.guard.report import Cut, StepReport

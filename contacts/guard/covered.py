@@ -17,11 +17,11 @@ from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
 #: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes of
 #: the last level never meet, no part of one partner has passed through the other.
 LEVELS = (0.0, 0.5, 0.75, 0.95)
-#: Geoms have one more level against flexes, with a layer of at most half this many radii of the
-#: flex: MuJoCo pushes each triangle of a cloth out of a geom in its own direction.
+#: Against a flex, a geom has one more level, with a layer of at most NEAR_FLEX / 2 flex radii. The
+#: reason is that MuJoCo pushes the triangles of a cloth out of a geom in different directions.
 NEAR_FLEX = 4.0
 
-#: Native numbers of the objects that have contact parameters.
+#: Native number of each kind of object that has contact parameters.
 _PLACES = {"pair": 0, "geom": 1, "flex": 2}
 
 
@@ -119,7 +119,7 @@ def _row(pair: Pair, carrier: Partner, last: int) -> NDArray[np.int32]:
 
 
 def names(covers: Sequence[str]) -> tuple[bool, bool]:
-    """Whether ``rigid`` and ``cloth`` are among the covered kinds of pairs.
+    """Whether ``rigid`` is in ``covers``, and whether ``cloth`` is.
 
     Raises:
         ValueError: another name.

@@ -41,7 +41,7 @@ class ErodedShapes:
         return self._hull(geom).radius if kind == "mesh" else 0.0
 
     def add(self, geom: int, layer: float) -> int:
-        """Erode ``geom`` by ``layer`` [m], below its radius, and return the shape's number."""
+        """Erode ``geom`` by ``layer`` < ``radius(geom)`` [m], and return the shape's number."""
         key = (geom, layer)
         if key not in self._added:
             self._added[key] = self._new(geom, layer)

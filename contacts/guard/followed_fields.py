@@ -1,8 +1,8 @@
 """The model's fields that a guard compares between two steps, and values that it refuses.
 
 The guard copies some fields; if one of them has changed, it reads pairs and shapes again. All other
-numbers must only be valid. The contact parameters that the guard itself writes are followed by the
-native part (stiffening.hpp).
+numbers may change, but must be valid. The contact parameters that the guard itself writes are
+compared by the native part (stiffening.hpp).
 """
 
 import functools
@@ -30,7 +30,7 @@ _SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
     *("flex_radius", "flex_elem"),
 )
-#: Stiffness and rest lengths of elastic flexes, and the objects that equalities connect.
+#: Stiffness and rest lengths of elastic flexes, and the objects of equality constraints.
 _MOTION = (
     *("flex_stiffness", "flexedge_length0", "eq_type", "eq_objtype", "eq_obj1id", "eq_obj2id"),
 )

@@ -15,13 +15,13 @@ from tauguard.contacts.guard.report import Pair
 
 @dataclass(frozen=True)
 class Hit:
-    """A pair that would pass through itself."""
+    """A pair whose partners would pass through each other."""
 
     pair: Pair
     vertices: NDArray[np.int32]  #: affected vertices of flexes; empty for two geoms
 
 
-#: Number of times that pairs are added before everything is stopped.
+#: Largest number of attempts, each with more pairs. After the last one everything is stopped.
 ROUNDS = 8
 
 
@@ -33,15 +33,15 @@ def impact_zone(
     hits: Sequence[Hit],
     judge: Callable[[], list[Hit]],
 ) -> tuple[list[Hit], float]:
-    """Repeat a sub-step so that no pair passes through.
+    """Repeat a sub-step so that no partners pass through each other.
 
     The velocity at the end of the sub-step is changed by as little as possible, in the metric of
     the inertia, so that the partners of each hit do not move relative to each other (rigid impact
     zones: Provot 1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds
     none, except for the work of mocap bodies. The bodies move with this velocity for the sub-step.
-    Pairs that pass through on the new path are added, and the computation is repeated. If the limit
-    of repetitions is reached, or if an edited inertia gives no finite velocity, everything except
-    mocap bodies stands still for the sub-step.
+    Pairs that pass through on the new path are added, and the computation is repeated. If this has
+    no success in :data:`ROUNDS` attempts, or an edited inertia gives no finite velocity, everything
+    except mocap bodies stands still for the sub-step.
 
     Args:
         model: MjModel.
@@ -74,7 +74,7 @@ def impact_zone(
 def _joined(
     model: Any, data: Any, velocity: Array, hits: Sequence[Hit], length: float
 ) -> tuple[Array, float] | None:
-    """The velocity nearest to ``velocity`` at which the partners of each hit move as one.
+    """The velocity nearest to ``velocity`` at which the partners of each hit move rigidly together.
 
     With J the Jacobian of relative motion, M the inertia, c the mocap velocity and S the impulses:
     J M^-1 J' S = J v + c, and mocap bodies do the work S c. ``None`` if a result is not finite, for

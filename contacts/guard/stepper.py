@@ -31,13 +31,13 @@ from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
 #: Settings of the native part; "held" pairs are those whose approach the solver stops.
 SETTINGS = {
-    "beyond": 1e-5,  # penetration at the end of a cut sub-step, so that MuJoCo lists it [m]
+    "beyond": 1e-5,  # a cut sub-step ends this deep, so that MuJoCo lists the contact [m]
     "room": 1.25,  # margin of a held pair divided by its approach in the failed attempt
     "smallest": 1 / 64,  # sub-steps of at most this fraction of the step are not cut further
     "push": 0.2,  # fraction of a penetration that is pushed out in each step
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
     "look": 16,  # largest number of steps between two tests whether held pairs have separated
-    "allowed": 0.01,  # energy that contacts may add, as a fraction of the first kinetic energy
+    "allowed": 0.01,  # energy that contacts may add, as a fraction of the initial kinetic energy
     "deeper_geom": 1 / 8,  # in longer sub-steps (fraction of the step) no held pair may get deeper
     "deeper_flex": 1 / 2,  # the same for pairs with a flex
     "turned": 1.0,  # rotation in a step above which full turns are counted [rad]
@@ -45,7 +45,7 @@ SETTINGS = {
 
 
 class GuardedStepper:
-    """``mj_step`` without tunnelling: no covered pair passes through itself.
+    """``mj_step`` without tunnelling: covered partners do not pass through each other.
 
     A step has these stages:
 
@@ -69,7 +69,7 @@ class GuardedStepper:
         checkers: The covered pairs: ``rigid`` for geoms with geoms, ``cloth`` for flexes with
             geoms, other flexes and themselves. :attr:`uncovered` lists the other pairs.
         stiff: Whether pairs that cause a rollback are made stiff.
-        most: Largest number of calls of ``mj_step`` in one step, before partners are stopped.
+        most: Largest number of calls of ``mj_step`` in one step; the last resort is stage 3.
 
     Raises:
         ValueError: an unknown checker, ``most`` below 2, or a model that :meth:`step` refuses.
@@ -159,7 +159,7 @@ class GuardedStepper:
 
     @property
     def most(self) -> int:
-        """Largest number of calls of ``mj_step`` in one step, before partners are stopped."""
+        """Largest number of calls of ``mj_step`` in one step."""
         return self._most
 
     @property
@@ -332,7 +332,7 @@ def _refuse(model: Any, data: Any) -> None:
         raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
         raise ValueError(
-            "mjcb_contactfilter: a guard cannot know which pairs the filter rejects; remove it"
+            "mjcb_contactfilter: a guard cannot know which pairs the filter rejects; unset it"
         )
     refuse_values(model)
     for name in ("mocap_pos", "mocap_quat"):

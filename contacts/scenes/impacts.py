@@ -11,13 +11,13 @@ from tauguard.models.scene import INTEGRATORS
 BALL_RADIUS = 0.010  #: [m]
 PLATE_HALF_THICKNESS = 0.001  #: [m]
 BALL_MASS = 0.020  #: [kg]
-#: Young's modulus of the cloth: 20 kN/m over its width, a woven fabric [Pa].
+#: Young's modulus of the cloth [Pa]. Times its thickness of 2 mm: 20 kN/m, as of a woven fabric.
 CLOTH_YOUNG = 1e7
 #: Initial distance of the surfaces of ball and cloth or plate, without ``offset`` [m].
 BALL_GAP = 0.005
 #: solref and solimp of contacts so stiff that a fast ball does not sink through.
 STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))
-#: MuJoCo's extra contact modes by name: the enable bit of each.
+#: Enable bits of MuJoCo's extra contact modes, by name of the mode.
 MODES = {
     "plain": 0,
     "speculative": int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
@@ -36,7 +36,7 @@ def ball_cloth(
     count: int = 15,
     pinned: str = "frame",
 ) -> ContactScene:
-    """A ball (10 mm, 20 g) flies straight into a stretched cloth of 0.3 m; no gravity.
+    """A ball (radius 10 mm, 20 g) flies straight into a stretched cloth of 0.3 m; no gravity.
 
     Args:
         speed: speed of the ball, along -z [m/s].
@@ -95,7 +95,7 @@ def _impact_point(model: mujoco.MjModel, impact: str) -> Array:
 def sphere_plate(
     speed: float = 10.0, offset: float = 0.0, stiff: bool = True, mode: str = "plain"
 ) -> ContactScene:
-    """A rigid sphere (10 mm, 20 g) flies straight into a fixed plate 2 mm thick; no gravity.
+    """A rigid sphere (radius 10 mm, 20 g) flies straight into a fixed 2 mm plate; no gravity.
 
     Args:
         speed: speed of the sphere, along -z [m/s].

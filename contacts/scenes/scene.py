@@ -15,7 +15,7 @@ Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 @dataclass(frozen=True)
 class ContactScene:
-    """One contact scene; the same arguments give the same bits."""
+    """One contact scene. A builder that is called with the same arguments gives the same bits."""
 
     name: str
     model: mujoco.MjModel

@@ -108,7 +108,7 @@ class Scene {
   std::mutex busy_;
 };
 
-// World positions of points `local` (V, 3) on bodies, with MuJoCo's order of sums and its bits.
+// World positions of points `local` (V, 3) on bodies, summed in MuJoCo's order for equal bits.
 auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
   std::vector<double> out(3 * body.size());
   for (std::size_t i = 0; i < body.size(); ++i) {
@@ -135,7 +135,7 @@ bool all_finite(Anything a, Anything b, Anything c) {
   return true;
 }
 
-// Contacts of pairs of simplices, of two lists, that come within `distance` of each other.
+// Contacts of simplices from the lists `a` and `b`: the `pairs` that come within `distance`.
 Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, double distance) {
   std::vector<Row> rows;
   {

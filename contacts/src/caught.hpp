@@ -38,7 +38,7 @@ class Catching {
   Logging::Handler before_, outer_before_;
 };
 
-// The jump target of errors of the thread; nullptr outside of calls.
+// The jump target of the thread's innermost call of MuJoCo; nullptr outside of calls.
 std::jmp_buf*& landing();
 [[noreturn]] void throw_error();
 

@@ -112,8 +112,8 @@ struct Engine {
 };
 
 // Detects whether MuJoCo resets the data while this object lives, because numbers are not finite or
-// too large. At time 0 a reset does not change the time, so counts of warnings are compared. They
-// are restored afterwards.
+// too large. At time 0 a reset does not change the time, so warnings are counted from 0. If no
+// reset happened, the earlier counts are restored.
 class ResetWatch {
  public:
   explicit ResetWatch(const Engine& engine) : e_(engine) {

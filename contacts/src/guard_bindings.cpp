@@ -261,7 +261,7 @@ class Guard {
                           r.rolled_back ? array_of(stepper_->first()) : nb::none());
   }
 
-  // The pairs that pass through themselves between the start and the present state of the data.
+  // The pairs whose partners pass through each other from the start to the data's present state.
   nb::typed<nb::list, nb::any> passing() {
     std::vector<PairHit> through;
     for (PairHit& hit : stepper_->judge())
@@ -291,8 +291,8 @@ class Guard {
   void refuse_within_step() const {
     if (stepping_ != std::thread::id{})
       throw std::runtime_error(
-          "this guard is in a step, by another thread or around this callback: wait for "
-          "its end, or use a guard and an MjData per thread");
+          "this guard is in a step, called by another thread or around this callback: wait until "
+          "the step ends, or use one guard and one MjData per thread");
   }
 
   // Saves MuJoCo's stack pointers and restores them after an error, which does not reset them.

@@ -32,14 +32,15 @@ class Mocap {
   bool begin();
   bool moves() const { return moves_; }  // whether some mocap body moves in this step
 
-  // Sets the part of the motion, as fractions, for the next attempt; the data is at its start.
+  // Sets the part of the motion for the next attempt, from and to fractions of the step. The data
+  // must be at the start of this part.
   void sub_step(double from, double to);
-  // Write the poses of the sub-step's start, of its end, and the poses commanded by the user.
+  // Write poses to the data: of the sub-step's start, of its end, or as commanded by the user.
   void depart() { write(from_); }
   void arrive() { write(to_); }
   void command() { write(commanded_); }
 
-  // Positions at the start. In whole steps the data has the mocap poses of their end instead.
+  // Poses at the start. In a whole step the data has mocap poses of the end, so `other` is read.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
   const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
   const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }
@@ -47,7 +48,7 @@ class Mocap {
   void add_turns(double* turn) const;
 
   // For a sub-step: computes the potential energy [J] and the vertices for the joint positions of
-  // the start and the mocap poses of the end. False if nothing moves or the data has these poses.
+  // the start and the mocap poses of the end. False if no mocap body moves, or in a whole step.
   bool shifted();
   double potential() const { return e_.other_energy[0]; }
   const double* vertices() const { return e_.other_flexvert; }

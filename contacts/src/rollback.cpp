@@ -98,8 +98,8 @@ std::vector<Held> Stepper::held(double length) const {
   return out;
 }
 
-// Whether the hits are acceptable: no pair passes through, and pairs only become deeper if they are
-// held and the sub-step is short already.
+// Whether the hits are acceptable: no pair passes through, and a pair becomes deeper only if it is
+// held and the sub-step is already short.
 bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
@@ -141,8 +141,8 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     again();
   }
   if (!mocap_.moves()) return change;
-  // A mocap body may pass through bodies that were slowed down. Too much energy is the smaller
-  // error.
+  // A mocap body may pass through bodies that were slowed down. Then they get their full speed
+  // again: too much energy is the smaller error.
   if (passes()) go(1), note_passed(), again();
   return change;
 }

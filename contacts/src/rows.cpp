@@ -43,7 +43,7 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
-  // With other solvers, stiff rows do not converge within the iterations, and pairs pass through.
+  // With a solver other than Newton, stiff rows do not converge in time, and pairs pass through.
   *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {

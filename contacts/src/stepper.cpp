@@ -242,8 +242,8 @@ void Stepper::note_lost(const std::vector<PairHit>& hits) {
     if (hit.lost) passed_[hit.pair] = 1;
 }
 
-// Removes pairs that are no longer guarded, and pairs that only touched if MuJoCo listed the
-// contact.
+// Removes hits of pairs that are no longer guarded. Also removes hits that touched and parted
+// within the step if MuJoCo listed a contact.
 std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
   hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
@@ -273,7 +273,7 @@ std::vector<char> Stepper::listed() const {
   return seen;
 }
 
-// Releases the pairs that have separated. Returns those whose parameters were restored.
+// Releases the pairs that have separated. Returns the pairs whose parameters were restored.
 std::vector<int> Stepper::release() {
   std::vector<int> out;
   if (!guarded_count_) return out;

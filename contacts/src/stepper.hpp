@@ -17,10 +17,10 @@ namespace tauguard::contacts {
 struct PairHit {
   int pair, deepest;  // number of the pair; deepest level (verdict.hpp) whose eroded shapes met
   bool passed;        // the eroded shapes of the last level met: the pair would have passed through
-  bool lost;  // these shapes meet at the start, but had been apart: the pair is no longer guarded
-  bool brushed;  // the pair touched and separated within the step; no eroded shapes met
-  double time;   // first touch, as a fraction of the step; 0 if the pair touched at the start
-  double way;    // upper bound of the approach of the pair's points in the step [m]
+  bool lost;          // the last shapes meet at the start, but had been apart: no longer guarded
+  bool brushed;       // the pair touched and separated within the step; no eroded shapes met
+  double time;        // first touch, as a fraction of the step; 0 if the pair touched at the start
+  double way;         // upper bound of the approach of the pair's points in the step [m]
   std::vector<std::int32_t> features;  // deepest simplices of the flex
   std::vector<std::int32_t> corners;   // of a pair of flexes: the vertices that crossed
 };

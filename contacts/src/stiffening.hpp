@@ -25,7 +25,7 @@ struct Partners {
 
 class Stiffening {
  public:
-  // Stiff enough that a fast body does not sink through within its own radius.
+  // So stiff that a fast body sinks in by less than its own radius.
   static constexpr std::array<double, 2> solref = {1e-4, 1.0};
   static constexpr std::array<double, 5> solimp = {0.99, 0.999, 0.001, 0.5, 2.0};
 

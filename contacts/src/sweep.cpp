@@ -44,7 +44,7 @@ rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const R
 }  // namespace
 
 // The box of both ends contains the chord of every point's path. The distance of the path from its
-// chord is at most rho (1 - cos(angle / 2)). The last term covers rounding.
+// chord is at most reach (1 - cos(angle / 2)). The last term of `bulge` covers rounding.
 Aabb swept(SupportShape m, const RigidMotion& motion) {
   if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
   m.move_to(0);
@@ -109,7 +109,7 @@ Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& orig
                   impact.t);
 }
 
-// First contact with a triangle of b's surface; of several at the same time, with the deepest.
+// First contact of geom a with a triangle of b's surface; the deepest, if several are first.
 Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec3& origin,
                     std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);

@@ -6,13 +6,13 @@
 namespace tauguard::contacts {
 namespace {
 
-// Shapes nearer than this fraction of their size count as touching at the start. It is above the
-// fraction `touching` of the sweeps, so that a pair that parts from there is no hit.
+// Shapes nearer than the fraction `resting` of their size count as touching at the start. Sweeps
+// report a touch below the fraction `touching`, so a resting pair that separates is no hit.
 constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
-// Distances in roundings of the positions. `rounded` is the margin by which pairs must be apart at
-// the start. `left_over` is the least distance that a sweep of the last eroded shapes leaves
-// (first_contact leaves 128).
+// Distances in unit roundoffs of the positions. `rounded` is the margin by which pairs must be
+// apart at the start. `left_over` is below the least distance that a sweep of the last eroded
+// shapes leaves (first_contact leaves 128).
 constexpr double rounded = 512, left_over = 64;
 
 bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
@@ -24,8 +24,8 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
   return !d.overlap && d.lower > needed;
 }
 
-// The memory of a pair from earlier steps: nothing, that some of its eroded shapes were apart,
-// or that none were.
+// The memory of a pair from earlier steps. apart: the eroded shapes of some level were apart.
+// sunk: those of every level overlapped.
 enum : char { unknown, apart, sunk };
 
 // `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never
@@ -41,8 +41,8 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
     SupportShape a = a_at(level), b = b_at(level);
     return apart_at(a, b, t, resting, rounded);
   };
-  // If the last eroded shapes have not met so far, they may be as near as rounding allows, but must
-  // not meet now.
+  // If the shapes of the last level have never met, they may be as near as rounding allows, but
+  // must not meet now.
   const auto hardly = [&] {
     SupportShape a = a_at(levels - 1), b = b_at(levels - 1);
     return apart_at(a, b, 0, 0, left_over);

@@ -1,9 +1,9 @@
 // Finds the pairs that pass through each other in a step, by their eroded shapes.
 //
-// A shape is eroded by a layer of its surface. Levels go from the whole shape (0) to almost its
-// middle (the last). A pair is judged at the shallowest level at which it is apart at the start. As
-// long as the shapes of the last level never meet, no part of one partner has passed through the
-// other.
+// A shape is eroded by a layer of its surface. Level 0 is the whole shape; of the last level almost
+// only the middle remains. A pair is judged at the shallowest level at which its shapes are apart
+// at the start. As long as the shapes of the last level never meet, no part of one partner has
+// passed through the other.
 #pragma once
 
 #include "sweep.hpp"
@@ -14,20 +14,20 @@ struct Hit {
   std::int32_t pair;     // pairs of geoms come first, then those with a flex
   std::int32_t feature;  // the simplex of a flex, -1 for geoms
   std::int32_t level;    // 0: touched and parted again; otherwise the level whose shapes met
-  std::int32_t deepest;  // the deepest level that met; the number of levels: all shapes meet at
-                         // the start, and did not at the start of the step before
-  double t;              // when the whole shapes first touch; 0 where they do at the start
+  std::int32_t deepest;  // the deepest level whose shapes met; or the number of levels if all
+                         // shapes meet at the start and did not one step earlier
+  double t;              // when the whole shapes first touch; 0 if they touch at the start
   double way;            // upper bound of the approach of the pair's points in the step [m]
 };
 
 class Verdict {
  public:
-  // A shape at some level, on a body; returns its number.
+  // Adds a shape of some level to a body and returns the shape's number.
   int add(Shape shape, int body, const LocalFrame& in_body);
-  // Both partners' shapes, level by level.
+  // Adds a pair: the numbers of both partners' shapes, level by level.
   void add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b);
-  // A geom's shapes and the flex's radii, level by level. elements: (count, corners), numbers of
-  // vertices. `skip` leaves out a simplex.
+  // Adds a pair: a geom's shapes and the flex's radii, level by level. elements: (count, corners),
+  // numbers of vertices. skip: (count,), whether to leave a simplex out.
   void add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
                      std::vector<std::int32_t> elements, int corners,
                      std::vector<std::uint8_t> skip);
@@ -41,7 +41,7 @@ class Verdict {
   std::vector<char> known(std::size_t pair) const;
   // Sets the memory of a pair. Ignored if the number of entries differs.
   void set_known(std::size_t pair, const std::vector<char>& known);
-  // Pairs whose shapes were too deep in one another for even the last eroded ones to be apart.
+  // Pairs so deep in one another that even the shapes of the last level were not apart.
   std::vector<int> sunk_pairs() const;
   template <class Archive>
   void archive(Archive& a) {
