@@ -1,4 +1,4 @@
-"""Wrappers that add to the observation: a camera beside the arm, and a detector in the loop."""
+"""Wrappers that add camera images, or a detector's residual and alarm, to the observation."""
 
 from typing import Any
 
@@ -26,11 +26,11 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
 
     | key | shape | type | unit |
     |---|---|---|---|
-    | state | of the environment | float64 | as its table says |
+    | state | as in the environment | float64 | see the environment's table |
     | rgb | (height, width, 3) | uint8 | |
     | depth | (height, width, 1) | float32 | m along the optical axis, at most 10 |
 
-    It needs OpenGL; without a display this is the library libegl1 or libosmesa6. The pixels depend
+    It needs OpenGL. Without a display, install the library libegl1 or libosmesa6. The pixels depend
     on the renderer, so they can differ between machines.
     """
 
@@ -108,7 +108,7 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
 
         Args:
             env: an environment of tauguard.
-            detector: a value of the keyword ``detector``; ``None``: the environment's own detector.
+            detector: as the keyword ``detector`` of environments; ``None``: the environment's own.
 
         Raises:
             ValueError: there is no detector, or it was trained on another arm or sample rate.
@@ -120,7 +120,7 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
             inner.batch.attach(detector)
         elif inner.compiled.settings.detector is None:
             raise ValueError(
-                "detector: the environment has none; give one to the wrapper or to make: "
+                "detector: the environment has none; give one to the wrapper or gymnasium.make: "
                 f"{', '.join(DETECTORS)}, or the path of a trained detector"
             )
         n = len(inner.compiled.scene.joint_names)

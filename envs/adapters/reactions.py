@@ -15,7 +15,7 @@ from tauguard.envs.gym.settings import one_of
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
 #: Trigger of a reaction: the detector's alarm, or the true contact, which no real robot measures.
 TRIGGERS = ("alarm", "contact")
-#: Delay from power-off until the brakes hold [s]; assumed, data sheets state 10 to 50 ms.
+#: Assumed delay from power-off until the brakes hold [s]. Data sheets state 10 to 50 ms.
 BRAKE_DELAY = 0.02
 #: A retraction goes back along the path at this fraction of the arm's former speed.
 RETRACT_SPEED = 0.5
@@ -33,12 +33,12 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     * ``stop0``: stop category 0 of IEC 60204-1: power off at once, brakes after
       :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
-      The deceleration is limited to the arm's acceleration limit, which is below that of the
-      brakes. The peak force occurs within 50 ms of the contact and is higher than with ``stop0``.
+      The drives decelerate at the arm's acceleration limit, more gently than the brakes. So the
+      peak force, within 50 ms of the contact, is higher than with ``stop0``.
       ``stop2`` and ``retract`` begin with the same stop and have the same peak.
     * ``stop2``: category 2: the drives stop the arm and hold it.
-    * ``retract``: stop as in category 2, go back along the path to a point before the place of the
-      trigger, hold.
+    * ``retract``: the arm stops as with ``stop2``, goes back along its path past the place where
+      the reaction was triggered, and holds.
     * ``admittance``: ``M dv/dt = tau - D v`` in every joint, so that the arm yields. tau is the
       part of the residual beyond the detector's thresholds, or the true external torque if the
       trigger is the contact.
@@ -133,7 +133,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._tau = info["residual"] if self.trigger == "alarm" else info["tau_ext"]
 
     def _react(self) -> tuple[int, Array]:
-        """The replacement of the next action: native code and joint velocities [rad/s]."""
+        """The replacement of the next action: an :class:`Override`, joint velocities [rad/s]."""
         assert self._since is not None
         if self.reaction == "stop0":
             return (
@@ -144,7 +144,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             damping = ADMITTANCE_INERTIA / ADMITTANCE_TIME
             push = np.sign(self._tau) * np.maximum(np.abs(self._tau) - self._dead, 0)
             push = push / self._inertia
-            # Implicit in the damping: stable for any period.
+            # The damping is integrated implicitly, so this is stable for any period.
             self._speed = (self._speed + step * push) / (1 + step * damping)
             return Override.VELOCITY, self._speed
         stopped = self._slow_down()
@@ -158,7 +158,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         """Slow all joints together, so that the arm stays on its path; True once it stands still.
 
         If the contact has already slowed the arm down, the stop continues from the measured speed.
-        A ramp over time alone would accelerate the arm against the person.
+        A speed that depended on time alone would accelerate the arm against the person.
         """
         squared = float(self._speed @ self._speed)
         if squared > 0:

@@ -36,7 +36,7 @@ class _Rows:
 
 
 class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """Writes ``FOLDER/episode_00000.mcap`` and so on, each when its episode ends.
+    """Writes one file ``FOLDER/episode_00000.mcap``, ... at the end of each episode.
 
     A recording has one row per physics step. Its positions, velocities and currents are measured
     if the environment has a detector or noise, and true otherwise. Its truth consists of external

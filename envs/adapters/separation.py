@@ -18,7 +18,7 @@ FAR = 3.0
 
 
 class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """Stops the arm (category 2) while a body region is nearer than the protective distance S.
+    """Stops the arm (stop category 2) while a body region is nearer than a protective distance S.
 
     ``S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z`` (ISO 13855, as ISO 10218-2 uses it).
     v_h is the approach speed of the region and v_r the speed of the arm's nearest point. T_r is the
@@ -69,7 +69,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         self._arm: ArmEnv = arm_env(env)
         compiled = self._arm.compiled
         if not compiled.regions:
-            raise ValueError("no body regions to keep away from: make the environment with some")
+            raise ValueError("no body regions to keep away from: name some with obstacles=")
         self._terms = (approach_speed, reaction_time, intrusion + uncertainty, hysteresis)
         model = compiled.scene.model
         self._geoms = [

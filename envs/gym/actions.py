@@ -11,7 +11,7 @@ from tauguard.envs.gym.compiled import CompiledScene
 
 #: Speed [m/s] and angular speed [rad/s] of the tool at an action of 1 in Cartesian mode.
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5
-#: An action of 1 in position mode is this far from home [rad], or at the end of the joint's range.
+#: In position mode an action of 1 is this far from home [rad], or the joint's limit if nearer.
 POSITION_REACH = 2.0
 #: At a joint without torque limit, an action of 1 is the servo's torque at this error [rad].
 SOFT_LIMIT = 0.1
@@ -45,7 +45,7 @@ def action_table(compiled: CompiledScene) -> list[Entry]:
             for name, c, s in zip(compiled.scene.joint_names, centre, scale, strict=True)
         ]
     names = [f"{kind} {axis}" for kind in ("move along", "turn about") for axis in "xyz"]
-    units = ["m a step"] * 3 + ["rad a step"] * 3
+    units = ["m per action"] * 3 + ["rad per action"] * 3
     return [
         Entry(f"tool {a + 1}: {name}", -float(s), float(s), u)
         for a in range(len(compiled.tools))

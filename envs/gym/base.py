@@ -38,19 +38,19 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     |---|---|
     | time, distance, success | time [s], distance to the target [m], goal reached |
     | force, link | peak contact force on a link [N], and which link |
-    | cost | impulse beyond the limits of body regions, and between two arms [N s] |
+    | cost | impulse beyond the limits of body regions, plus that between two arms [N s] |
     | cost_sum | sum of the costs of the episode [N s] |
     | limit_ratio, region | peak of force over limit, and of which region |
     | pressure | peak mean pressure [N/cm^2]; 0 without the keyword ``contact_area`` |
     | tau_ext, tau_ext_peak | external torque by joint, last and peak [N m] |
-    | residual, alarm, fault | of the detector; fault: what is wrong with its samples, or "" |
-    | onset, onset_time | a collision began; time of the latest one [s], -1 for none |
+    | residual, alarm, fault | of the detector; fault: defect of the detector's samples, or "" |
+    | onset, onset_time | whether a collision began; start of the latest one [s], -1: none |
     | alarm_delay | delay of the latest collision's alarm [s]; -1 without an alarm |
     | reason | why the episode was terminated or cut short, or "" |
     | reward_NAME | a term of the reward; the reward is their sum |
     | region_force, region_pressure | peaks of each of the k regions, shape (k,) [N, N/cm^2] |
     | region_point, region_direction | where [m], and the force's direction, shape (k, 3) |
-    | contacts | with checkers: number of pairs that each reported |
+    | contacts | with the keyword ``checkers``: number of pairs that each checker reported |
 
     The limit of a region's force is the transient limit. After 0.5 s of contact, or if the region
     cannot move, it is the quasi-static limit. In the cost, a force counts at most as much as the
@@ -240,7 +240,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         return info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture (480, 640, 3) in ``rgb_array`` mode; in ``human`` mode the window follows."""
+        """A picture (480, 640, 3) in ``rgb_array`` mode; ``human`` mode updates the window."""
         if self.render_mode is None:
             gymnasium.logger.warn("render_mode was not given to make: nothing to render")
             return None

@@ -49,8 +49,8 @@ class StepMetrics(NamedTuple):
 
 #: Fields of :class:`StepMetrics` as columns of :attr:`Batch.metrics`.
 METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
-#: Contact of the arm at a physics step: net force on the arm [N]; and of the largest force on one
-#: link, that link (1-based, 0: none), the point [m] and the force [N].
+#: Contact of the arm at a physics step: net force on the arm [N]; the link with the largest force
+#: (1-based, 0: none); point [m] and force [N] of this link's contact.
 CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
 #: Position of a body [m], and its orientation as w, x, y, z.
 POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
@@ -185,7 +185,7 @@ class Batch:
             self._become(i, draw(known, self.compiled, rng, stated))
 
     def _become(self, i: int, drawn: dict[str, Array]) -> None:
-        """Apply the drawn values to copy ``i``, which gets a model and a plant of its own."""
+        """Apply the drawn values to copy ``i``, which gets its own model and native plant."""
         if not drawn:
             return
         model = self.model(i) if self._variants[i] else own_model(self.compiled)
@@ -228,7 +228,7 @@ class Batch:
         physics = np.empty(mujoco.mj_stateSize(model, STATE))
         mujoco.mj_getState(model, data, physics, STATE)
         listener = self.sensing[i].detector if self.sensing else None
-        # Labels and kinematics are read before the next mj_forward, which computes these fields.
+        # Sensors and poses are read before the next mj_forward, which computes these fields.
         derived = {name: getattr(data, name).copy() for name in DERIVED}
         return {
             "scene": self._scene,
@@ -267,7 +267,7 @@ class Batch:
             getattr(self, name)[i : i + 1] = values
         if self.sensing is not None:
             self.sensing[i].reset()
-            listener = self.sensing[i].detector  # the reset has made another
+            listener = self.sensing[i].detector  # reset() made a new one
             if listener is not None:
                 listener.set_state(state["detector"])
 
@@ -316,7 +316,7 @@ class Batch:
     def _time_alarm(self, i: int, before: bool) -> None:
         """Set the delay of the alarm after the onset.
 
-        Only a rise of the alarm after the onset detects the collision.
+        An alarm that is already on at the onset does not count; a later rise of the alarm does.
         """
         alarms = self.sensing[i].alarms if self.sensing else np.zeros(0)
         dt, now = self.compiled.settings.timestep, self.metrics["time"][i]

@@ -1,4 +1,4 @@
-"""The compiled side of an environment: its scene and what a controller knows about the arm."""
+"""The compiled scene of an environment, and the numbers of the arm that its controller uses."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from tauguard.models import (
 
 #: Least height of a target and its least distance from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
-#: Least height and least distance as fractions of the reach; for a short arm these are smaller.
+#: The same two as fractions of the arm's reach. The smaller value holds: it is this for short arms.
 SHORT = (0.25, 0.4)
 #: Least reach of an arm [m].
 LEAST_REACH = 0.02
-#: Tolerance of the conjugate gradients for a cloth's edges; it changes forces by 1e-4.
+#: Tolerance of the conjugate gradient solver for a cloth's edges; it changes forces by 1e-4.
 CLOTH_TOLERANCE = 1e-6
 
 
@@ -57,7 +57,7 @@ class ForceBound:
 
     @property
     def total(self) -> float:
-        """At the arm's largest speeds [N]."""
+        """Largest force at the arm's largest speeds [N]."""
         return math.hypot(self.moving, self.driven)
 
 
@@ -116,7 +116,8 @@ def compile_scene(
         places: places of body regions and people that are given by name.
         arms: number of arms, 1 or 2.
         moved: see :attr:`tauguard.envs.gym.placing.Layout.moved`.
-        default: "table", "cloth" or both if they are the task's defaults, fitted to the arm.
+        default: "table", "cloth" or both, if the task's defaults have them; they are fitted to
+            the arm.
 
     Raises:
         ValueError, FileNotFoundError: the robot cannot be used.
@@ -166,7 +167,7 @@ def compile_scene(
 def _people(
     settings: Settings, bare: Scene, layout: Layout, places: type[Usual]
 ) -> tuple[tuple[BodyProxy, ...], tuple[Person, ...]]:
-    """The body regions and the people that were asked for, placed."""
+    """The body regions and the people of the keyword ``obstacles``, with their places."""
     proxies: list[BodyProxy] = []
     people: list[Person] = []
     for item in settings.obstacles:
@@ -215,7 +216,7 @@ def _known(
 def _force_bound(
     settings: Settings, scene: Scene, bare: Scene, speed: Array, arms: int
 ) -> ForceBound:
-    """The largest force of the scene's energies against its stiffest contact."""
+    """The force bound of the scene at its stiffest contact."""
     limit = bare.facts.drive.torque_limit
     moving, driven = derive.largest_energy(bare.model, bare.facts.joints, speed, limit)
     moving, driven = arms * moving, arms * driven
@@ -233,7 +234,7 @@ def _force_bound(
 
 
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
-    """The drive that the controller assumes: nominal, with all known friction."""
+    """The drive that the controller assumes; ``ideal_drive``: without the robot file's friction."""
     return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
 
 

@@ -16,9 +16,9 @@ REACHES, WALKS = 24, 8
 PAUSE, HOLD = (0.2, 1.5), (0.2, 1.0)
 #: Range of the time at the work place, and away from it [s].
 STAY, AWAY = (3.0, 8.0), (1.0, 3.0)
-#: Range of the distance of the place away: to the side of the work place, and behind it [m].
+#: Range of the distance of the place away from work: beside and behind the work place [m].
 ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
-#: Least distance of a walk from tables and objects [m]; smaller if the work place is closer.
+#: Least distance of a walk from tables and objects [m]; less if the work place itself is nearer.
 CLEAR = 0.3
 DRAWN = 20  #: number of draws for one walk, after which it is left out
 STEP_BACK = 0.3  #: longest step back [m]
@@ -29,7 +29,7 @@ AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
 
 
 def anatomy(person: Person, blocked: Array) -> _plant.Anatomy:
-    """The native form; ``blocked`` as for :func:`draw_script`."""
+    """The person's numbers for native code; for ``blocked`` see :func:`draw_script`."""
     back = -np.array([np.cos(person.facing), np.sin(person.facing)])
     far = np.linspace(0.0, STEP_BACK, 13)
     free = [d for d in far if _clear(person, blocked, person.position + d * back)]

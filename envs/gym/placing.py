@@ -15,7 +15,7 @@ from tauguard.models.scene import people_parts
 
 Vector = tuple[float, float, float]
 
-#: Line on which each body region crosses the workspace: position [reach] and direction.
+#: Line on which each body region crosses the workspace: position [times the reach], direction.
 LINES = {
     "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
     "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
@@ -30,9 +30,9 @@ OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 USUAL_REACH = 1.146
 #: Names of a second arm's parts begin with this.
 SECOND = "arm2_"
-#: Step by which an overlapping table, person or object is moved [m]; longer for a long arm.
+#: Step by which an overlapping thing (a table, person, ...) is moved [m]; longer for a long arm.
 STEP = 0.05
-MOVES = 16  #: largest number of such steps
+MOVES = 16  #: largest number of these steps
 #: If the first joint is higher above the floor than this [reach], the arm stands on a pedestal.
 SHOULDER = 0.5
 #: Height of the first joint above the floor, if the arm works below that joint [reach].
@@ -53,7 +53,7 @@ class StartsInContact(ValueError):
         self.kind = kind
         super().__init__(
             f"the episode begins in contact: {link} is {1000 * depth:.1f} mm inside {other}; "
-            "expected a place that is free at the beginning, the arm at home"
+            "expected a place that is free while the arm is at home"
         )
 
 
@@ -124,7 +124,7 @@ class Layout:
         return BodyProxy(region, position=self.at(place), direction=self.turn(direction))
 
     def someone(self, ahead: float, left: float, facing: float, **about: Any) -> Person:
-        """A person at a place in the arm's frame [m], facing a direction in it [rad]."""
+        """A person at a place [m] who faces a direction [rad], both in the arm's frame."""
         x, y, z = self.at((ahead, left, 0.0))
         floor = z + Person.floor if self.base[2] else Person.floor
         return Person(position=(x, y), facing=facing + self.yaw, floor=floor, **about)
@@ -134,7 +134,7 @@ class Layout:
         return self.someone(max(OPPOSITE * self.reach, NEAREST_PERSON), 0.0, np.pi)
 
     def person(self, someone: Person) -> Person:
-        """The person, farther from the arm if needed."""
+        """``someone``, farther from the arm by ``moved["person"]``."""
         far = self.moved.get("person", 0.0)
         if not far:
             return someone
@@ -143,7 +143,7 @@ class Layout:
         return replace(someone, position=(x, y))
 
     def table(self, board: Table) -> Table:
-        """A table for this arm."""
+        """``board``, scaled and placed for this arm."""
         if self.own and not self.moved.get("table"):
             return board
         x, y, z = (self.scale * c for c in board.position)
@@ -152,7 +152,7 @@ class Layout:
         return Table(self.at((x, y, z - self.moved.get("table", 0.0))), extents)
 
     def cloth(self, sheet: Cloth) -> Cloth:
-        """A cloth for this arm."""
+        """``sheet``, scaled and placed for this arm."""
         if self.own and not self.moved.get("cloth"):
             return sheet
         x, y, z = (self.scale * c for c in sheet.position)
@@ -293,7 +293,7 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def carried(model: mujoco.MjModel, body: int, by: int) -> bool:
-    """Whether ``body`` is ``by`` or is carried by it."""
+    """Whether ``body`` is the body ``by`` or one of its descendants."""
     while body > by:
         body = int(model.body_parentid[body])
     return body == by

@@ -97,7 +97,7 @@ _OF_PERSON = ("stature", "hand_speed", "walk_speed", "reaction_time")
 
 
 def distributions(given: Mapping[str, Any]) -> dict[str, Distribution]:
-    """The keyword ``randomize``, checked.
+    """Check the keyword ``randomize``, and convert its values to distributions.
 
     Raises:
         ValueError: an unknown name or a value out of range; the message says what would work.

@@ -19,7 +19,7 @@ TOLERANCE = 0.03  #: distance at which a target counts as reached [m]
 BONUS = 1.0  #: reward for a reached target
 #: One second of contact at this force or more costs as much reward as a target gives [N].
 CONTACT_FORCE = 100.0
-#: Largest distance of the initial pose from home, by joint [rad].
+#: Largest distance of each joint's initial position from home [rad].
 START_SPREAD = 0.1
 CANDIDATES = 6  #: number of candidates for the next target
 #: Probability that the next target is the candidate whose straight path passes closest to the
@@ -42,7 +42,7 @@ class Reach(Task):
     terms: ClassVar[tuple[str, ...]] = ("progress", "target")
 
     def __init__(self, batch: Batch, **options: Any) -> None:
-        """Prepare drawing targets."""
+        """Prepare to draw targets."""
         super().__init__(batch)
         self._scratch = mujoco.MjData(batch.compiled.scene.model)
         low, high = pose_box(batch.compiled.scene)
@@ -95,7 +95,7 @@ class Reach(Task):
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, i: int, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
-        """Draw a place [m] that the tool can reach, with the least distance from ``apart``."""
+        """Draw a place [m] that the tool can reach, not too near to ``apart``."""
         compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
@@ -115,7 +115,7 @@ class Reach(Task):
         return True
 
     def aim_near_person(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
-        """Put the first arm's target near the person, or the person's hand onto the path to it."""
+        """Draw whether the path passes near the person, and whether a hand moves onto it."""
         batch, data = self.batch, self.batch.datas[i]
         tool = tool_position(batch.compiled, data)
         behind, reaches = rng.random(2) < NEAR_PERSON
@@ -136,7 +136,7 @@ class Reach(Task):
         return Outcome(rewards, reached, step.distance)
 
     def after(self, i: int, rng: np.random.Generator) -> None:
-        """The next target."""
+        """Draw the next target of each arm."""
         batch = self.batch
         for arm in range(batch.compiled.arms):
             batch.target[i, arm] = self.draw(i, rng, arm, batch.target[i, arm].copy())

@@ -32,9 +32,9 @@ class RegionInfo:
     transient: float  #: limit [N]; 0: no impact is allowed
     mocap: int  #: mocap index of the frame that moves a person's region; -1: not of a person
     held: bool  #: the region cannot move away, so its limit is the quasi-static one
-    stiffness: float  #: of its contact [N/m]
+    stiffness: float  #: stiffness of the region's contact [N/m]
     radius: float  #: [m]
-    span: float  #: distance from the middle of its line at which it turns back [m]
+    span: float  #: distance from the middle of its line at which the region turns back [m]
     speed: float  #: along its line or path [m/s]
     unconfirmed: tuple[str, ...]  #: values that no open source confirmed
 

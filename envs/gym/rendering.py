@@ -19,7 +19,7 @@ HEIGHT, WIDTH = 480, 640
 #: Geom groups that are shown: bodies, obstacles, and the arm's visual shapes. The arm's collision
 #: shapes are not shown.
 SHOWN = (0, 1, 2)
-#: Shadows fall this far from the middle of the scene [m].
+#: Shadows are drawn within this distance of the middle of the scene [m].
 SHADOW_REACH = 3.0
 
 

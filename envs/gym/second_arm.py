@@ -42,7 +42,7 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0
     for i, geom in enumerate(shapes):
         geom.name = geom.name or f"{SECOND}collision{i}"
     if scene.spec.labels:
-        # The sensors of all links must be in sequence, so those of other bodies are added again.
+        # The sensors of all links must be in sequence, so other bodies' sensors are added again.
         for sensor in [s for s in whole.sensors if s.name.startswith("contact_")]:
             if sensor.objname not in first:
                 whole.delete(sensor)

@@ -34,7 +34,7 @@ FRICTION_FACTOR, TORQUE_FACTOR = 1.5, 0.03
 PLAIN_THRESHOLD = 5.0
 #: Largest residual without contact for a trained detector [standard deviations].
 SIGMAS = 3.0
-#: Speed scale of the change of sign of the nominal friction around standstill [rad/s].
+#: The nominal friction changes its sign smoothly, as tanh of the speed divided by this [rad/s].
 STANDSTILL = 0.05
 #: Within this distance of an end of its range a joint is treated as touching its stop [rad].
 MARGIN = 0.005
@@ -268,14 +268,14 @@ def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
         )
     if not same_rate(compiled.settings.timestep, alarm.detector.dt):
         raise ValueError(
-            f"detector: works at {1e3 * alarm.detector.dt:g} ms a sample, the scene's time step is "
-            f"{1e3 * compiled.settings.timestep:g} ms; train one at this rate"
+            f"detector: needs a sample every {1e3 * alarm.detector.dt:g} ms, but the scene's time "
+            f"step is {1e3 * compiled.settings.timestep:g} ms; train one at this rate"
         )
     return alarm
 
 
 def _arms(compiled: CompiledScene) -> list[tuple[RobotNumbers, Drive]]:
-    """Nominal numbers of each arm; equal, because a turn about the vertical changes none."""
+    """Nominal numbers of each arm. All are equal: turning about the vertical changes none."""
     robot = RobotNumbers.from_pin(pin_model(compiled.scene.arm_model))
     drive = compiled.scene.facts.nominal
     if compiled.settings.ideal_drive:

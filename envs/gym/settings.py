@@ -55,7 +55,7 @@ class Settings:
         timestep: time step of the physics [s].
         integrator: integrator of the physics.
         robot: a name, a robot file or a ``Robot``, see ``tauguard robot``.
-        payload_g: load at the flange, which controller and observer do not assume [g].
+        payload_g: load at the flange, unknown to controller and detector [g].
         mismatch: difference between the simulated and the nominal arm, or the seed to draw it.
         obstacles: "person", names of body regions, or :class:`BodyProxy` and :class:`Person`.
         table: a board that the arm can touch.
@@ -64,7 +64,7 @@ class Settings:
         detector: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``.
         checkers: names of contact checkers that check every physics step.
         labels: contact sensors; without them force, cost and tau_ext stay 0.
-        noise: observe measured instead of true positions, velocities and currents.
+        noise: whether observations are measured instead of true positions, speeds and currents.
         ideal_drive: no friction, ripple, lag or sensor errors.
         max_speed: largest speed of every joint [rad/s]; default: the arm's own, else 2.
         randomize: quantities drawn in each episode, see :mod:`tauguard.envs.gym.randomization`.
@@ -107,7 +107,7 @@ class Settings:
         if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(
                 f"control_rate {self.control_rate} Hz at a timestep of {self.timestep} s: "
-                f"{steps:g} physics steps an action; expected a whole number, 1 or more"
+                f"{steps:g} physics steps per action; expected a whole number, 1 or more"
             )
         check_load(self.payload_g)
         if isinstance(self.mismatch, int):

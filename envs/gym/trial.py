@@ -30,7 +30,7 @@ class ArmTrial:
     diverged: int  #: episodes that diverged
     still: int  #: episodes in which an arm that stands still succeeds
     moved: dict[str, float]  #: things placed farther from the arm, and how far [m]
-    refused: str = ""  #: why there is no such environment
+    refused: str = ""  #: why the environment cannot be made with this arm
 
     @property
     def passed(self) -> bool:

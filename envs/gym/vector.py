@@ -51,7 +51,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         """Compile the scene once.
 
         Args:
-            num_envs: how many copies.
+            num_envs: number of copies.
             max_episode_steps: number of actions after which an episode is truncated.
             threads: number of threads; 0 means all processors.
             autoreset_mode: "NextStep", "SameStep" or "Disabled".
@@ -92,7 +92,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         try:
             check_options(stated, self.compiled.settings.randomize or {})
         except ValueError as error:
-            raise ValueError(f"{error}; reset_mask always works") from None
+            raise ValueError(f"{error}, or reset_mask") from None
         if isinstance(seed, list):
             seeds = seed
         else:

@@ -131,5 +131,5 @@ def test_threads_on_one_guard_are_refused_not_mixed():
     for thread in threads:
         thread.join()
     assert len(made) + len(refused) == 40
-    assert all("use a guard and an MjData per thread" in text for text in refused)
+    assert all("use one guard and one MjData per thread" in text for text in refused)
     assert data.time == pytest.approx(len(made) * 5e-3)
