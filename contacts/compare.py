@@ -180,7 +180,7 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
         )
     if ((found.geom < 0) == (found.flex < 0)).any():
         raise ValueError(
-            f"checker {name!r}: a partner has a geom and a flex, or neither; expected one of both"
+            f"checker {name!r}: a partner with a geom and a flex, or neither; expected exactly one"
         )
     return found
 

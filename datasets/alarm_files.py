@@ -23,7 +23,7 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
     """The alarms of each episode, in order; alarms less than 0.5 s apart are merged.
 
     Raises:
-        ValueError: other columns, or a line with a wrong value; file and line are named.
+        ValueError: other columns, or a line with a wrong value; the message names file and line.
         OSError: no such file.
     """
     found: dict[str, list[Alarm]] = {}
@@ -56,7 +56,7 @@ def judged_alarms(
         splits: names of splits (default: all whose name begins with "test").
 
     Raises:
-        ValueError: not such a CSV file, or an episode that the splits do not have.
+        ValueError: not a CSV file of alarms, or an episode that is in none of the splits.
         OSError: no such file or folder.
     """
     alarms = read_alarm_file(path)

@@ -26,7 +26,7 @@ class ArmLogs:
     """Logs of one arm, and the numbers of the robot that they were recorded on."""
 
     traces: dict[str, Trace]  #: by file name, joints in the robot's order
-    numbers: RobotNumbers  #: numbers of the joints that the logs have
+    numbers: RobotNumbers  #: the robot's numbers for the joints that the logs have
     notes: tuple[str, ...]  #: one line for each repair and each joint that is held fixed
 
 
@@ -58,7 +58,7 @@ def read_one(
     Args:
         log: CSV or MCAP.
         columns: preset or JSON file of a column map.
-        torque: the log's currents or efforts are joint torques [N m].
+        torque: whether the log's currents or efforts are joint torques [N m].
         reading: repairs and sample rate (default: the log unchanged).
 
     Raises:
@@ -88,8 +88,8 @@ def reduced(log: Log, hz: float) -> Log:
     except ValueError as error:
         raise ValueError(f"--resample {hz:g}: {error}") from None
     note = (
-        f"{1 / own:.3g} Hz reduced to {hz:g} Hz by means: alarms come {500 / hz - 500 * own:.3g} "
-        f"ms later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
+        f"{1 / own:.3g} Hz averaged down to {hz:g} Hz: alarms come {500 / hz - 500 * own:.3g} ms "
+        f"later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
     )
     return dataclasses.replace(log, trace=trace, notes=(*log.notes, note))
 
@@ -101,13 +101,13 @@ def read_logs(
     torque: bool = False,
     reading: Reading | None = None,
 ) -> ArmLogs:
-    """The logs of one arm to learn from.
+    """Read logs of one arm that show free motion, from which a detector or calibration learns.
 
     Args:
         logs: files or folders.
         columns: preset or JSON file of a column map.
         robot: URDF or MJCF file of the arm.
-        torque: the logs hold joint torques [N m] in place of currents.
+        torque: whether the logs hold joint torques [N m] in place of currents.
         reading: repairs and sample rate (default: the logs unchanged).
 
     Raises:
@@ -123,7 +123,7 @@ def read_logs(
     for name, trace in traces.items():
         _refuse_saturated(name, trace)
     if len({is_torque(trace) for trace in traces.values()}) > 1:
-        raise ValueError("some logs hold currents, others torques: give those of one kind")
+        raise ValueError("some logs hold currents, others torques: give logs of one kind")
     return ArmLogs(traces, numbers, (*notes, *held))
 
 
@@ -135,7 +135,7 @@ def _refuse_touched(name: str, log: Log) -> None:
             f"{name}: a column labels {len(log.touched)} contact"
             f"{'' if len(log.touched) == 1 else 's'} ({times}"
             f"{', ...' if len(log.touched) > 3 else ''} after the beginning); expected free "
-            "motion: leave this log out, or cut the free seconds out of it"
+            "motion: leave this log out, or keep only its seconds without contact"
         )
 
 

@@ -95,11 +95,11 @@ class ColumnMap:
             scales += one if isinstance(one, tuple | list) else (one,)
         for scale in scales:
             if isinstance(scale, bool) or not (isinstance(scale, float | int) and abs(scale) > 0):
-                raise ValueError(f"columns: {scale!r} as a scale, expected a number, not 0")
+                raise ValueError(f"columns: scale {scale!r}, expected a number other than 0")
         if not (isinstance(self.separator, str) and len(self.separator) == 1):
             raise ValueError(f"columns.separator: {self.separator!r}, expected one character")
         if self.decimal not in (".", ",") or self.decimal == self.separator:
-            raise ValueError(f"columns.decimal: {self.decimal!r}, expected . or , as no separator")
+            raise ValueError(f"columns.decimal: {self.decimal!r}, expected . or , but no separator")
 
     def groups(self) -> dict[str, tuple[Column, ...]]:
         """The columns of each signal that the map has, by the name of the trace's field."""
@@ -155,13 +155,13 @@ AS_IS = Reading()
 
 
 def numbered(prefix: str, joints: int = 6, first: int = 0, end: str = "") -> tuple[str, ...]:
-    """``prefix0end``, ``prefix1end``, ... from ``first`` on."""
+    """Names of ``joints`` columns: ``prefix0end``, ``prefix1end``, ..., numbered from ``first``."""
     return tuple(f"{prefix}{i}{end}" for i in range(first, first + joints))
 
 
 PRESETS = {
-    # The headerless files of the UR10e identification data of Mamedov et al. 2020: t, q, qd, i,
-    # i_des, tau_des, six of each.
+    # The headerless files of the UR10e identification data of Mamedov et al. 2020: t, then six
+    # columns each of q, qd, i, i_des and tau_des.
     "ur10e": ColumnMap(
         t=0,
         q=tuple(range(1, 7)),

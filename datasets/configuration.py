@@ -48,7 +48,7 @@ class Split:
     links: tuple[int, ...]  #: links that collisions act on, 1-based
     severities: tuple[tuple[float, float], ...]  #: ranges of peak ``|tau_ext|``, joints 1-4 [N m]
     temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
-    picks: float  #: fraction of collision-free episodes with a payload picked up
+    picks: float  #: fraction of collision-free episodes in which the arm picks up a payload
     unseen: tuple[str, ...]  #: properties ("arm", ...) whose values the first split does not have
     clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: range of a clamp's duration [s]
     paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
@@ -74,7 +74,7 @@ class Configuration:
         for name in ("robots", "objects"):
             if not values[name]:
                 del values[name]
-        for split in values["splits"]:  # without defaults of later keys: hashes do not change
+        for split in values["splits"]:  # hashes must not change: omit later keys at their default
             for name in LATER_KEYS:
                 if split[name] == SPLIT[name].default:
                     del split[name]
@@ -273,7 +273,7 @@ def _check_splits(splits: list[Split]) -> None:
     for number, split in enumerate(splits):
         where = f"splits[{number}].unseen"
         if number == 0 and split.unseen:
-            refuse(where, split.unseen, "nothing: the others are compared with the first split")
+            refuse(where, split.unseen, "nothing: other splits are compared with the first one")
         for what in split.unseen:
             shared = values_of(first, what) & values_of(split, what)
             if shared:
@@ -284,7 +284,7 @@ def _check_splits(splits: list[Split]) -> None:
 
 
 def values_of(split: Split, what: str) -> set[Any]:
-    """The planned values of one of "arm", "individual", "payload" and "speed"."""
+    """The planned values of ``what``: "arm", "individual", "payload" or "speed"."""
     if what == "individual":
         return {(arm, number) for arm in split.arms for number in split.individuals}
     return set({"arm": split.arms, "payload": split.payloads_g, "speed": split.speeds}[what])

@@ -71,7 +71,7 @@ def checked_table(
 
 
 def number(low: float, high: float, above: bool = False) -> Read:
-    """A finite number in [low, high], or (low, high] with ``above``."""
+    """Reader of a finite number in [low, high], or (low, high] with ``above``."""
 
     def read(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -85,7 +85,7 @@ def number(low: float, high: float, above: bool = False) -> Read:
 
 
 def integer(low: int, high: int) -> Read:
-    """A whole number in [low, high]."""
+    """Reader of a whole number in [low, high]."""
 
     def read(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
@@ -98,7 +98,7 @@ def integer(low: int, high: int) -> Read:
 
 
 def several(read: Read, least: int = 1, distinct: bool = False) -> Read:
-    """A list of values."""
+    """Reader of a list of at least ``least`` values."""
 
     def read_all(value: Any) -> tuple[Any, ...]:
         if not isinstance(value, list | tuple):
@@ -112,7 +112,7 @@ def several(read: Read, least: int = 1, distinct: bool = False) -> Read:
 
 
 def one_of(*words: str) -> Read:
-    """One of ``words``."""
+    """Reader of one of ``words``."""
 
     def read(value: Any) -> str:
         if value not in words or not isinstance(value, str):
@@ -123,7 +123,7 @@ def one_of(*words: str) -> Read:
 
 
 def span(low: float, high: float, equal: bool) -> Read:
-    """Two increasing numbers in [low, high]; they may be equal with ``equal``."""
+    """Reader of two increasing numbers in [low, high]; with ``equal`` they may be equal."""
     inner = number(low, high)
 
     def read(value: Any) -> tuple[float, float]:
@@ -136,14 +136,14 @@ def span(low: float, high: float, equal: bool) -> Read:
 
 
 def text(value: Any) -> str:
-    """A text."""
+    """Read a text."""
     if not isinstance(value, str):
         raise TypeError
     return value
 
 
 def split_name(value: Any) -> str:
-    """A name that can be part of a file's name."""
+    """Read a name that can be part of a file's name."""
     if not isinstance(value, str) or not value.replace("-", "").replace("_", "").isalnum():
         raise ValueError
     if not value.isascii() or len(value) > 40 or value.startswith(("-", "_")):
@@ -152,14 +152,14 @@ def split_name(value: Any) -> str:
 
 
 def flag(value: Any) -> bool:
-    """True or false."""
+    """Read true or false."""
     if not isinstance(value, bool):
         raise TypeError
     return value
 
 
 def rows_a_second(value: Any) -> int:
-    """A sample rate that divides the 1000 Hz of the physics."""
+    """Read a sample rate that divides the 1000 Hz of the physics."""
     rate = int(integer(1, 1000)(value))
     if 1000 % rate:
         raise ValueError

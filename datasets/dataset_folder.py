@@ -212,7 +212,7 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
             )
         found[name] = text
     if head["format"] == 1:
-        with contextlib.suppress(ValueError, OSError):  # readable without the drive, not trainable
+        with contextlib.suppress(ValueError, OSError):  # training needs the drive, reading does not
             robots = configuration_in(folder).robots
             check_unchanged(arm, robots)
             found = nominal_texts(arm, robots) | found
@@ -239,7 +239,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
         _write_once(folder / "arms" / name, text)
     text = json.dumps(head, indent=1, sort_keys=True) + "\n"
     if not _holds(folder / HEAD, text):
-        (folder / SUMS).unlink(missing_ok=True)  # of another head; write_cards makes new ones
+        (folder / SUMS).unlink(missing_ok=True)  # checksums of the old head; write_cards writes new
         write_atomic(folder / HEAD, text)
 
 
@@ -279,7 +279,7 @@ def _locked(folder: Path) -> Iterator[None]:
     """Allow one writer at a time; the lock ends with the process, however the process ends."""
     try:
         import fcntl
-    except ImportError:  # no such locks on this system
+    except ImportError:  # this system has no flock
         yield
         return
     import os

@@ -26,7 +26,7 @@ class Built:
     made: int = 0  #: shards written
     kept: int = 0  #: shards that were intact already
     episodes: int = 0  #: episodes in all shards
-    seconds: float = 0.0  #: simulated in this run [s]
+    seconds: float = 0.0  #: simulated time of this run [s]
 
 
 def generate_dataset(

@@ -177,7 +177,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def foreign(folder: Path) -> list[str]:
-    """Files among shards and arms that are not the dataset's (a reader of all files reads them)."""
+    """Other files in the folders of shards and arms; a program that reads all files reads them."""
     known = {
         path(split, number)
         for split, number in shards(configuration_in(folder))
@@ -190,7 +190,7 @@ def foreign(folder: Path) -> list[str]:
 
 
 def unchecked(folder: Path) -> list[str]:
-    """Files of a complete dataset without a checksum, because an earlier version made it."""
+    """Files without a checksum, in a complete dataset that an earlier version made."""
     if (folder / SUMS).is_file():
         return []
     return [name for name in (HEAD, CARD, CROISSANT) if (folder / name).is_file()]

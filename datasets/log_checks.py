@@ -14,7 +14,7 @@ from tauguard.datasets.columns import ColumnMap
 from tauguard.detectors.faults.inputs import FASTEST
 from tauguard.traces.trace import Trace
 
-#: A pause longer than this many samples, and this many seconds, is a gap.
+#: A pause is a gap if it is longer than this many sample intervals and than this many seconds.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
 #: Largest joint position, two turns [rad]; larger numbers are probably degrees.
 FURTHEST = 4 * np.pi
@@ -199,7 +199,7 @@ def increasing(
 def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
     """Rows to keep: all but copies of the previous state that a fast recorder wrote.
 
-    At a copy, a difference quotient would be 0, and after it twice the speed. While the state does
+    A difference quotient would be 0 at a copy, and twice the speed after it. While the state does
     not change, rows are kept at the usual interval of new states.
 
     Args:

@@ -27,7 +27,7 @@ from tauguard.datasets.recognition import described, in_units_of, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
-#: Rows at a file's beginning from which units are recognised.
+#: Number of rows at a file's beginning from which units are recognised.
 LOOKED_AT = 5000
 
 
@@ -52,7 +52,7 @@ def read_log(
     Args:
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
             system whose ``JointState`` messages hold the motor currents in ``effort``.
-            If they are joint torques, set ``meta["effort"]`` of the trace to "torque".
+            If ``effort`` holds joint torques, set ``meta["effort"]`` of the trace to "torque".
         columns: for CSV: a map, the name of a preset (see ``PRESETS``), or "auto" to recognise
             columns by names and values. By default the header line must be that of a preset.
         joint_names: names of the joints in the order of the columns (default: the map's names, the
@@ -206,8 +206,8 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     if header and columns.headerless:
         fitting = presets_of(header)
         raise ValueError(
-            f"the first line names columns ({listed(header, 60)}), files of these columns have no "
-            "such line: "
+            f"the first line names columns ({listed(header, 60)}), but files of this column map "
+            "have no header line: "
             + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
         )
     try:
@@ -264,7 +264,7 @@ def header_of(first: Sequence[str]) -> list[str]:
 
 
 def named(names: Sequence[str], joints: int) -> tuple[str, ...]:
-    """Joint names, or ``joint_1``, ... where there are none."""
+    """Joint names, or ``joint_1``, ... if there are none."""
     if names and len(names) != joints:
         raise ValueError(f"{len(names)} joint names for {joints} joints in the log")
     return tuple(names) or tuple(f"joint_{i}" for i in range(1, joints + 1))
@@ -291,7 +291,7 @@ def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
 
 
 def column_text(column: int, header: Sequence[str]) -> str:
-    """A column by its name, or by its number where there are no names."""
+    """A column by its name, or by its number if there are no names."""
     return f"column {header[column]!r}" if header else f"column {column} (counted from 0)"
 
 

@@ -24,7 +24,8 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
     """A trace from the first topic of type JointState; its ``effort`` is taken as current.
 
     Raises:
-        ValueError: no such topic, messages without velocity or effort, joints that change.
+        ValueError: no such topic, messages without velocity or effort, or a message that lacks a
+            joint of the first one.
     """
     from mcap.exceptions import McapError
 

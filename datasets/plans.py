@@ -10,13 +10,13 @@ from tauguard.envs import CollisionPlan, Episode, PayloadPick
 from tauguard.models import Mismatch, load_arm
 from tauguard.traces import STRATA
 
-#: Payloads of the dissertation's 15 training slices [g]: 3 without, 2 of each of six.
+#: Payloads of the dissertation's 15 training slices [g]: none in 3 slices, each other one in 2.
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
-#: Half are strikes, a quarter pulses, a quarter clamps.
+#: Kinds of collisions, cycled: half are strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
 #: No collision begins before this time [s], because a detector starts up first.
 BEGIN = 3.0
-#: Length of a collision's slot, its earliest onset in it, and how much later it may begin [s].
+#: Length of a collision's time slot, earliest onset within the slot, largest delay after this [s].
 SLOT, OFFSET, SPREAD = 3.0, 0.9, 0.2
 #: Shortest and longest clamp [s]; the duration is drawn between them.
 CLAMP_SECONDS = (0.4, 0.8)
@@ -38,8 +38,8 @@ def collision_plans(
         count: number of collisions.
         begin: start of the first slot [s].
         strata: ranges of severity (peak torque), cycled [N m].
-        kinds: cycled.
-        links: cycled, 1-based.
+        kinds: kinds of collisions, cycled.
+        links: links that are struck, cycled, 1-based.
         clamp_seconds: shortest and longest clamp [s].
     """
     kind_of = rng.permutation([kinds[i % len(kinds)] for i in range(count)])

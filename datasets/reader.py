@@ -47,8 +47,8 @@ def read(
             needed.
 
     Raises:
-        ValueError: nothing there to read, a damaged shard (it is named), an unknown split or arm, a
-            dataset of a newer version.
+        ValueError: nothing to read at ``path``, a damaged shard (the message names it), an unknown
+            split or arm, or a dataset of a newer version.
         OSError: no such file or folder.
     """
     path = Path(path)

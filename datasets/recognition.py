@@ -26,7 +26,7 @@ WORDS = {
     "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
 }
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
-#: Smallest usual step of a time column, and its unit [s] then.
+#: Unit of a time column by its usual step: smallest step of each unit, and the unit [s].
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
 #: Words in names of commands, of estimates and of the tool's signals, which are not joint sensors.
 _OTHER = re.compile(
@@ -40,7 +40,7 @@ _NAMED = re.compile(
 #: Name of the torques of KUKA's FRI, which have the opposite sign.
 _FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
-#: The same, followed by the kind of signal: "joint_1_position", "J1 angle (rad)".
+#: A joint's number, followed by the kind of signal: "joint_1_position", "J1 angle (rad)".
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
 #: A unit in brackets: "time [ms]", "angle (rad)".
 _UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
@@ -173,7 +173,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
 
 
 def _refuse_parts(time: str, t: Array, header: Sequence[str]) -> None:
-    """Raise ``ValueError`` if the time is whole seconds, and another column is nanoseconds."""
+    """Raise ``ValueError`` if the time has whole seconds, and another column their fractions."""
     rest = [name for name in header if (_unit(name, _SECONDS) or 1.0) < 1e-3 and name != time]
     known = t[np.isfinite(t)]
     if rest and (known == np.floor(known)).all() and (np.diff(known) == 0).any():

@@ -29,7 +29,7 @@ def simulate_all(
     Args:
         episodes: to simulate.
         workers: number of processes (default: one per processor); 1 computes in this process.
-        label: of the progress bar.
+        label: text of the progress bar.
         checkers: names of contact checkers that fill ``Trace.contacts``. A checker of your own
             must be registered in a module that worker processes import, or ``workers`` must be 1.
     """

@@ -34,7 +34,7 @@ from tauguard.traces import Trace
 
 #: Gain of the momentum observer [1/s].
 OBSERVER_GAIN = 50.0
-#: Nominal Coulomb friction is multiplied by tanh of the velocity over this [rad/s].
+#: Nominal Coulomb friction is multiplied by tanh of the velocity divided by this [rad/s].
 STANDSTILL = 0.05
 #: Rate of the physics [Hz].
 PHYSICS_RATE = 1000
@@ -84,8 +84,8 @@ def make_shard(task: ShardTask) -> Done:
     """Simulate and write a shard, unless it exists and is intact.
 
     Raises:
-        ValueError: this machine or installation computes other bytes than the command's, or an
-            arm's file has changed.
+        ValueError: this installation or machine computes other bytes than the one that started the
+            command, or an arm's file has changed.
         OSError: the shard cannot be written.
     """
     if code() != task.code:

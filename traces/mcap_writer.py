@@ -200,7 +200,7 @@ def encode(record: records.McapRecord) -> bytes:
 
 
 def row_template(channels: Sequence[int], topics: Sequence[Topic]) -> tuple[Bytes, list[int]]:
-    """The message records of one time of a group, with zero times, and each record's offset."""
+    """The message records of a group for one row, with times of 0, and each record's offset."""
     row, starts = b"", []
     for channel, topic in zip(channels, topics, strict=True):
         length = PREFIX.itemsize - 9 + topic.layout.size

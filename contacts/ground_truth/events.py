@@ -6,8 +6,7 @@ from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
 
-#: Longest time without contact within one event [s]. Up to two steps without contact are always
-#: allowed.
+#: Longest time without contact within one event [s]; up to two steps are always allowed.
 GAP = 5e-3
 
 #: Two partners, sorted: ("body", id) or ("flex", id).

@@ -152,7 +152,7 @@ def test_presets(tmp_path):
     ur5 = PRESETS["ur5"]
     named = ",".join(["t", *ur5.q, *ur5.qd, *ur5.current, *(f"x{k}" for k in range(12))])
     headed = write(tmp_path, f"{named}\n{text}", "headed.csv")
-    with pytest.raises(ValueError, match=r"files of these columns have no such line: use ur5$"):
+    with pytest.raises(ValueError, match=r"files of this column map have no header line: use ur5$"):
         read_log(headed, "ur10e")
     preset = PRESETS["ur_rtde"]
     header = ["timestamp", *preset.q, *preset.qd, "other", *preset.current]

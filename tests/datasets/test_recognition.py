@@ -324,7 +324,7 @@ def test_torques_of_the_other_sign_are_turned(tmp_path):
     trace = read_log(path, ColumnMap("t", **signals, torque_scale=(-1.0, 1e-3))).trace
     np.testing.assert_allclose(trace.current, tau * [-1.0, 1e-3], atol=1e-8)
     for bad in (0.0, (1.0,), True):
-        with pytest.raises(ValueError, match=r"torque_scale|as a scale"):
+        with pytest.raises(ValueError, match=r"torque_scale|scale.*other than 0"):
             ColumnMap("t", **signals, torque_scale=bad)
 
 
@@ -429,6 +429,6 @@ def test_a_reduced_log_has_nothing_folded_in_and_says_its_cost(tmp_path):
     late = np.sin(2 * np.pi * 2 * (log.trace.t - 0.005))[:, None]
     assert np.abs(log.trace.current - late)[1:].max() < 0.05
     np.testing.assert_allclose(log.trace.q[1:], np.hstack([late, late])[1:], atol=2e-3)
-    assert "1e+03 Hz reduced to 100 Hz by means: alarms come 4.5 ms later" in log.notes[0]
+    assert "1e+03 Hz averaged down to 100 Hz: alarms come 4.5 ms later" in log.notes[0]
     with pytest.raises(ValueError, match="--resample 2000: hz 2000 for a trace at 1000 Hz"):
         reduced(Log(trace, ()), 2000.0)
