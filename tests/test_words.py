@@ -1,6 +1,7 @@
 """Names use the words of the glossary, and none that a reader would have to guess."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -46,6 +47,7 @@ def test_every_public_name_is_there():
         assert getattr(detectors, name) is not None
 
 
+@functools.cache
 def public_names(path: Path) -> set[str]:
     """Modules, classes, functions, arguments and fields that a user can see."""
     names = {path.stem}

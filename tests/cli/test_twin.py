@@ -1,5 +1,6 @@
 """``tauguard twin`` from logs to a file that simulation and detection take."""
 
+import contextlib
 import json
 from dataclasses import replace
 
@@ -63,8 +64,11 @@ def run(folder, command, *flags):
 
 @pytest.fixture(scope="module")
 def made(folder):
-    run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", folder / "a.toml")
-    return folder / "a.toml"
+    """The twin; beside it what the command printed, its figures and its page."""
+    out, files = folder / "a.toml", ("--json", folder / "a.json", "--figure", folder / "a.png")
+    with open(folder / "a.txt", "w") as said, contextlib.redirect_stdout(said):
+        run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", out, *files)
+    return out
 
 
 def test_every_command_and_environment_takes_the_twin(made, tmp_path):
@@ -88,33 +92,28 @@ def test_every_command_and_environment_takes_the_twin(made, tmp_path):
         env.close()
 
 
-def test_from_logs_to_detection(folder, capsys):
-    free, out, figures = folder / "free", folder / "twin.toml", folder / "twin.json"
-    page = folder / "twin.png"
-    bodies = ("--robot", folder / "arm.xml")
-    run(folder, "twin", free, *bodies, "--out", out, "--json", figures, "--figure", page)
-    said = capsys.readouterr().out
+def test_from_logs_to_detection(folder, made, capsys):
+    said = (folder / "a.txt").read_text()
     assert "judged on log2.csv" in said
     # The arm is quiet in its own log; so is its twin along it.
     assert "in 25 s: 0 on the arm, 0 on the twin along the same motion" in said
-    found = json.loads(figures.read_text())
+    found = json.loads((folder / "a.json").read_text())
     assert found["judged_on"] == ["log2.csv"]
     assert found["rows"][-1]["residual"] == "area under the curve"
-    assert page.stat().st_size > 1000
-    main(["robot", str(out)])
+    assert (folder / "a.png").stat().st_size > 1000
+    main(["robot", str(made)])
     said = capsys.readouterr().out
     assert "identified from log0.csv, log1.csv, log2.csv" in said
-    run(folder, "detect", free / "log0.csv", "--robot", out)
-    assert "the calibration in twin.bodies.xml" in capsys.readouterr().out
-    assert "\n# b: mx " in out.read_text()  # with its interval
+    run(folder, "detect", folder / "free" / "log0.csv", "--robot", made)
+    assert "the calibration in a.bodies.xml" in capsys.readouterr().out
+    assert "\n# b: mx " in made.read_text()  # with its interval
 
 
-def test_contacts_are_learned_on_the_twin(folder, tmp_path, monkeypatch, capsys):
-    out, model = tmp_path / "twin.toml", tmp_path / "model.skops"
-    run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", out)
+def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, capsys):
+    model = tmp_path / "model.skops"
     for name, count in (("STRUCK", 4), ("CONTACTS", 2)):
         monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
-    run(folder, "train", "--twin", out, "--free", folder / "free", "--model", model)
+    run(folder, "train", "--twin", made, "--free", folder / "free", "--model", model)
     said = capsys.readouterr().out
     assert "free-motion and srq-svr, of 3 logs and" in said
     alarm = load_model(model)

@@ -140,13 +140,14 @@ def test_depth_and_normal_of_a_checker_that_looks_at_the_end_of_a_step(order, kn
             return Contacts([1], pair, none, none, [[np.nan] * 3], [normal], [distance])
 
     register("late", Late, replace=True)
-    late = compare(bounce(2.001), ["late"])["late"]
+    report = compare(bounce(2.001), ["late"])
+    late = report["late"]
     assert late.depth_mm == pytest.approx(0, abs=1e-9)
     assert late.normal_deg == (None if angle is None else pytest.approx(angle, abs=1e-6))
     assert late.opposite == (late.normals if angle else 0)
     assert (late.normals > 1) == (angle is not None)
     said = f"late: {late.opposite} of {late.normals} normals are opposite to MuJoCo's"
-    assert (said in str(compare(bounce(2.001), ["late"]))) == bool(angle)
+    assert (said in str(report)) == bool(angle)
 
 
 @pytest.mark.parametrize(

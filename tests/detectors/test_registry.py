@@ -208,9 +208,9 @@ def test_methods_with_one_front_end_share_it_and_say_what_they_say_alone(some, a
     with pytest.MonkeyPatch.context() as patch:
         calls = []
         patch.setattr(front_end, "calibrate", lambda *_, **__: calls.append(1) or identified)
-        alone = [make_detector(n).fit([*some], dataclasses.replace(arm)) for n in names]
+        alone = [small(n).fit([*some], dataclasses.replace(arm)) for n in names]
         assert len(calls) == 3
-        together = [make_detector(n).fit(some, arm) for n in names]
+        together = [small(n).fit(some, arm) for n in names]
         assert len(calls) == 5  # the first has another one: it does not track the payload
     assert together[1].front is together[2].front
     again = pickle.loads(pickle.dumps(together))
