@@ -159,23 +159,17 @@ def test_clipped_currents_and_gaps_are_named(folder, tmp_path, capsys):
 
 def test_a_load_that_was_not_told_is_named_and_left_out(folder, tmp_path, capsys):
     write(tmp_path / "carried.csv", record(5, load=2.0))
+    logs = [*(folder / "free" / f"log{seed}.csv" for seed in range(3)), tmp_path / "carried.csv"]
     flags = ("--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
-    run(folder, "twin", folder / "free", tmp_path / "carried.csv", *flags)
+    run(folder, "twin", *logs, *flags)
     said = capsys.readouterr().out
     assert "carried.csv is left out" in said
     assert "--payload carried.csv=KG" in said
     text = (tmp_path / "t.toml").read_text()
     assert 'source = "identified from log0.csv, log1.csv, log2.csv"' in text
-    run(
-        folder,
-        "twin",
-        folder / "free",
-        tmp_path / "carried.csv",
-        *flags,
-        "--payload",
-        "carried.csv=2,0.3,0,0.05",
-    )
-    assert "left out" not in capsys.readouterr().out
+    # Of two logs without a load none is left out to judge, which takes most of the time.
+    run(folder, "twin", *logs[1:], *flags, "--payload", "carried.csv=2,0.3,0,0.05")
+    assert "carried.csv is left out" not in capsys.readouterr().out
 
 
 def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):
