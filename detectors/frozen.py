@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Frozen:
-    """Base of frozen dataclasses; copies and pickles leave out their cached native parts."""
+    """Base of frozen dataclasses whose cached native parts are neither copied nor pickled."""
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without cached properties."""

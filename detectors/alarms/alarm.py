@@ -206,7 +206,9 @@ class AlarmStream:
         try:
             up = self.native.step(q, qd, current, interval)
         except TypeError:
-            raise ValueError("q, qd, current: expected float64 arrays, one entry a joint") from None
+            raise ValueError(
+                "q, qd, current: expected float64 arrays, one entry per joint"
+            ) from None
         self._first = False
         return up
 

@@ -111,7 +111,7 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
 
 
 def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:
-    """Whether at least :data:`LEAST` of motion is left whichever recording is removed."""
+    """Whether there are several, and without any one of them :data:`LEAST` of motion is left."""
     rests = ([*recordings[:k], *recordings[k + 1 :]] for k in range(len(recordings)))
     return len(recordings) > 1 and all(motion_length(rest) >= LEAST for rest in rests)
 

@@ -35,7 +35,7 @@ class SensorNoise:
         for name in ("position", "velocity"):
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.ndim != 1 or not (np.isfinite(value).all() and (value > 0).all()):
-                raise ValueError(f"SensorNoise.{name}: expected one number above 0 a joint")
+                raise ValueError(f"SensorNoise.{name}: expected one number above 0 per joint")
             object.__setattr__(self, name, value)
         if len(self.position) != len(self.velocity):
             raise ValueError("SensorNoise: position and velocity of different numbers of joints")

@@ -89,7 +89,7 @@ class TorqueCheck:
 
 
 def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:
-    """Extreme ratios of drive torque to torque needed in traces, shape (3, n).
+    """Extreme ratios of drive torque to the model's torque along traces, shape (3, n).
 
     Rows: least over 0.5 s, least over 4 s, largest over 4 s. They are 1 for a joint whose torque
     is always too small to be judged.

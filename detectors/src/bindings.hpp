@@ -38,7 +38,7 @@ inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& 
   const std::pair<const char*, const In1*> signals[] = {{"q", &q}, {"qd", &qd}, {name, &drive}};
   for (const auto& [what, signal] : signals) {
     if (signal->shape(0) != n)
-      throw std::invalid_argument(std::string(what) + ": expected one entry a joint");
+      throw std::invalid_argument(std::string(what) + ": expected one entry per joint");
     if (!finite(signal->data(), n))
       throw std::invalid_argument(std::string(what) + ": every entry must be finite");
   }

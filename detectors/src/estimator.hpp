@@ -1,5 +1,5 @@
 // The estimator: friction compensation, the momentum observer, and a Kalman filter of errors of the
-// model (payload, friction). The residual that they do not explain indicates a collision.
+// model (payload, friction). A residual that these errors do not explain indicates a collision.
 //
 // The residual is linear in the unknowns: r = Phi theta + tau_ext. The columns of Phi have passed
 // the observer's filter. theta consists of the payload at the last link (mass and first moment in
@@ -8,8 +8,8 @@
 //
 // Errors of the model last for many samples, so successive corrections are not independent. The
 // variance of their noise is therefore multiplied by `inflation`. Otherwise the filter would soon
-// ignore new residuals, whatever its errors. The clipping of innovations does not use `inflation`,
-// because with it the filter would explain a long contact by a payload.
+// be too certain to correct a wrong payload or wrong friction. The clipping of innovations does not
+// use `inflation`, because with it the filter would explain a long contact by a payload.
 //
 // The friction of a joint at rest can hold an unknown torque. If `started` is above 0, a joint
 // corrects the unknowns only after it has moved for that time.

@@ -127,7 +127,7 @@ void bind_estimator(nb::module_& m) {
             const std::size_t n = estimator.joints();
             require(residual.shape(0) == n && unexplained.shape(0) == n &&
                         motion.shape(0) == motion_numbers && motion.shape(1) == n,
-                    "outputs: one entry a joint");
+                    "outputs: one entry per joint");
             require(!estimator.started() || (dt > 0 && std::isfinite(dt)), "dt: must be above 0");
             estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(),
                            unexplained.data(), motion.data());

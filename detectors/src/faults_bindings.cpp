@@ -24,7 +24,7 @@ FaultCheck* make_check(double dt, double longest, std::int64_t odd, double speed
   require(dt > 0 && longest > 0 && window > 0 && repeats > 0,
           "dt, longest, window, repeats: expected above 0");
   require(step.shape(0) == n && drift.shape(0) == n && stuck.shape(0) == n,
-          "current, step, drift, stuck: expected one entry a joint");
+          "current, step, drift, stuck: expected one entry per joint");
   return new FaultCheck({dt,
                          longest,
                          odd,
@@ -41,9 +41,9 @@ FaultCheck* make_check(double dt, double longest, std::int64_t odd, double speed
 
 TorqueCheck* make_torques(In1 gain, In1 noise, double rate, In1 opposed, In1 least, In1 most) {
   const std::size_t n = gain.shape(0);
-  require(noise.shape(0) == n, "noise: expected one entry a joint");
+  require(noise.shape(0) == n, "noise: expected one entry per joint");
   require(rate > 0 && opposed.shape(0) == n && least.shape(0) == n && most.shape(0) == n,
-          "opposed, least, most: expected one entry a joint; rate: above 0");
+          "opposed, least, most: expected one entry per joint; rate: above 0");
   TorqueBounds set;
   set.rate = rate;
   set.opposed = values(opposed);
@@ -63,7 +63,7 @@ void bind_faults(nb::module_& m) {
           [](FaultCheck& check, double t, In1 q, In1 qd, In1 current) {
             const std::size_t n = check.joints();
             require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
-                    "q, qd, current: expected one entry a joint");
+                    "q, qd, current: expected one entry per joint");
             return numbers(check.step(t, q.data(), qd.data(), current.data()));
           },
           "t"_a, "q"_a, "qd"_a, "current"_a)
@@ -75,7 +75,7 @@ void bind_faults(nb::module_& m) {
           [](TorqueCheck& check, In1 residual, In1 current, double dt) {
             const std::size_t n = check.joints();
             require(residual.shape(0) == n && current.shape(0) == n && dt > 0,
-                    "residual, current, dt: expected one entry a joint, dt above 0");
+                    "residual, current, dt: expected one entry per joint, dt above 0");
             return numbers(check.step(residual.data(), current.data(), dt));
           },
           "residual"_a, "current"_a, "dt"_a)

@@ -34,7 +34,7 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
   for (const auto& a : {ratio, bound, residual, qdd, rest})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
-  require(dt.shape(0) == rows, "run: one interval a row");
+  require(dt.shape(0) == rows, "run: one interval per row");
   nb::gil_scoped_release release;
   stream.reset();
   for (std::size_t t = 0; t < rows; ++t) {

@@ -43,7 +43,7 @@ void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out)
 }
 
 KernelSum* make_kernel(In2 vectors, In1 coef, double intercept, double sigma) {
-  require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
+  require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient per vector");
   require(sigma > 0, "KernelSum: sigma must be above 0");
   return new KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept,
                        sigma);
@@ -54,7 +54,7 @@ void scale(const Scaling& scaling, In2 left, In2 qd, In3 motion, Out2 out) {
   require(qd.shape(0) == left.shape(0) && motion.shape(0) == left.shape(0) &&
               out.shape(0) == left.shape(0) && out.shape(1) == m && qd.shape(1) == n &&
               motion.shape(1) == motion_rows && motion.shape(2) == n && scaling.fits(n),
-          "Scaling: expected one number a joint");
+          "Scaling: expected one number per joint");
   nb::gil_scoped_release release;
   for (std::size_t t = 0; t < left.shape(0); ++t)
     scaling.row(left.data() + t * n, qd.data() + t * n, motion.data() + t * motion_rows * n, n,

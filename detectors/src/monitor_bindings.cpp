@@ -41,7 +41,7 @@ ScaledResidual residual_of(const Estimator& estimator, const std::vector<std::in
                            const Numbers& weights, double units, double factor, bool compress) {
   Scaling scaling(joints, weights, units, factor, compress);
   require(!joints.empty() && scaling.fits(estimator.joints()),
-          "scaling: expected joints of the arm, and a weight a joint and term or none");
+          "scaling: expected joints of the arm, and either no weights or one per joint and term");
   return {estimator, std::move(scaling)};
 }
 
@@ -100,7 +100,7 @@ nb::typed<nb::tuple, int, bool, double, int, int, double, bool> step(Monitor& mo
                                                                      In1 q, In1 qd, In1 current) {
   const std::size_t n = monitor.joints();
   require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
-          "q, qd, current: expected one entry a joint");
+          "q, qd, current: expected one entry per joint");
   const Thought& said = monitor.step(t, q.data(), qd.data(), current.data());
   return nb::make_tuple(static_cast<int>(said.state), said.alarm, said.score,
                         static_cast<int>(said.why.fault), said.why.joint, said.why.value,

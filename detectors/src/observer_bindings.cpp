@@ -234,7 +234,7 @@ void bind_observer(nb::module_& m) {
       .def(
           "__init__",
           [](Observer* self, const Chain& chain, In1 gain) {
-            require(gain.shape(0) == chain.joints.size(), "gain: one entry a joint");
+            require(gain.shape(0) == chain.joints.size(), "gain: one entry per joint");
             new (self)
                 Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
           },
@@ -260,7 +260,7 @@ void bind_observer(nb::module_& m) {
             check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
             require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
             require(observer.started(), "step before reset");
-            require(out.shape(0) == q.shape(0), "out: one entry a joint");
+            require(out.shape(0) == q.shape(0), "out: one entry per joint");
             const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
             std::copy(r, r + q.shape(0), out.data());
           },

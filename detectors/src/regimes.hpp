@@ -38,17 +38,17 @@
 namespace tauguard::detectors {
 
 struct RegimeBounds {
-  static constexpr std::size_t terms = 5;  // of the bound in motion
+  static constexpr std::size_t terms = 5;  // number of terms of the bound in motion
   std::vector<double> rest;        // bound of a joint that has been at rest for long [N m], n
-  std::vector<double> stop;        // added by motion of any joint, also recent [N m], n
+  std::vector<double> stop;        // added by present or recent motion of any joint [N m], n
   std::vector<double> least;       // least bound in motion [N m], n
   std::vector<double> moving;      // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
   std::vector<double> start;       // added at a start [N m], n
   std::vector<double> turned;      // added after a contact has turned the joint [N m], n
-  std::vector<double> fast, hard;  // speed and acceleration that logs show [rad/s, rad/s^2], n
-  std::vector<double> beyond;      // added by each multiple of `fast` above it [N m], n
-  std::vector<double> low, high;   // positions of joints whose motion is not known [rad], n
-  static constexpr double anywhere = 1e6;  // `high` of all others [rad]
+  std::vector<double> fast, hard;  // largest speed, acceleration in logs [rad/s, rad/s^2], n
+  std::vector<double> beyond;      // added at 2 `fast`, in proportion to the excess [N m], n
+  std::vector<double> low, high;   // positions in logs of joints that move in no log [rad], n
+  static constexpr double anywhere = 1e6;  // `high` of joints that move in some log [rad]
 };
 
 class Regimes {
@@ -62,15 +62,14 @@ class Regimes {
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double after = 1.0;       // only change away counts, after a contact [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
-  static constexpr double harder = 0.5;      // of `beyond`, by each multiple of `hard` above it
-  static constexpr double farthest = 3.0;    // times `beyond` are added at most
-  static constexpr double released = 0.5;    // of a contact's peak
-  static constexpr double kept = 1.0;  // unchanged for this time: static friction keeps it [s] ...
-  static constexpr double remembers =
-      10.0;  // ... and a release within this time after it is no contact [s]
-  static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s] ...
-  static constexpr double forget = 1.05;  // rate at which the shortest interval is forgotten
-  static constexpr int samples = 3;       // ... and in samples at least
+  static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`
+  static constexpr double farthest = 3.0;    // largest addition, in units of `beyond`
+  static constexpr double released = 0.5;    // a contact ends below this fraction of its peak
+  static constexpr double kept = 1.0;        // time without a change that can end a contact [s]
+  static constexpr double remembers = 10.0;  // after such an end, a release is no contact [s]
+  static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation times [s]
+  static constexpr double forget = 1.05;  // factor per sample on the stored shortest interval
+  static constexpr int samples = 3;       // least number of samples of the confirmation
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), joints_(of_.rest.size()) {
     reset();
@@ -115,9 +114,9 @@ class Regimes {
     age_ += dt;
   }
 
-  // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
-  // is the observer's, `left` it less slow errors, `spread` the deviation that they leave, all
-  // [N m], n.
+  // Writes ratios of signals to bounds, at most 1 until confirmed, and the bounds [N m]. Inputs, n
+  // each [N m]: `residual` of the observer, `left` without the estimated errors of the model,
+  // `spread` the standard deviation due to their uncertainty.
   void judge(const double* residual, const double* left, const double* spread, const double* qd,
              const double* qdd, double dt, double* ratio, double* bound) {
     double hardest = 0.0;
@@ -154,14 +153,14 @@ class Regimes {
  private:
   struct Joint {
     double slow_for = 10.0, quick_for = 0.0, moved = 0.0;  // [s]
-    double base = 0.0, before = 0.0;  // what the residual is compared with, and earlier [N m]
+    double base = 0.0, before = 0.0;  // baseline of the residual, and a slower baseline [N m]
     double home = 0.0;                // `before` at the beginning of a contact [N m]
-    double most = 0.0;                // the contact's largest change from there [N m]
-    double bound = 1.0;               // at the contact's beginning [N m]
-    double since = after;             // a contact's end [s]
-    double own = 0.0;                 // of `stop`, after a contact
-    double above = 0.0;               // for so long above the bound [s] ...
-    int count = 0;                    // ... in so many samples
+    double most = 0.0;                // largest change from `home` in the contact [N m]
+    double bound = 1.0;               // bound at the beginning of the contact [N m]
+    double since = after;             // time since the end of a contact [s]
+    double own = 0.0;                 // fraction of `turned` that is added to the bound
+    double above = 0.0;               // weighted time above the bound [s]
+    int count = 0;                    // number of successive samples above the bound
     bool rest = false, held = false;  // held: takes part in a contact
   };
 
@@ -255,9 +254,9 @@ class Regimes {
 
   RegimeBounds of_;
   std::vector<Joint> joints_;
-  bool touched_ = false;                // a contact with joints at rest lasts
-  std::size_t lead_ = 0;                // the joint of its largest ratio ...
-  double peak_ = 0.0, still_ = 0.0;     // ... and that ratio; unchanged for so long [s]
+  bool touched_ = false;                // whether there is a contact with joints at rest
+  std::size_t lead_ = 0;                // joint with the largest ratio in the contact
+  double peak_ = 0.0, still_ = 0.0;     // that ratio; time without a change [s]
   double stirred_ = 1.0, usual_ = 1.0;  // recent motion in [0, 1]; sample interval without gaps [s]
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]

@@ -94,7 +94,7 @@ class Tails:
     def of(
         cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array, fraction: float
     ) -> Tails:
-        """Tails of the highest ``fraction`` of blocks in each draw, which lasts ``hours``."""
+        """Tails of the highest ``fraction`` of each draw's blocks; ``hours``: lengths of draws."""
         together = np.concatenate(blocks)
         order = np.argsort(together)
         together = together[order]
@@ -110,7 +110,7 @@ class Tails:
     def above(self, threshold: float) -> Array:
         """Rate of peaks above a threshold in each draw [1/h], shape (D,).
 
-        Valid from the base of a draw's tail on.
+        Valid for thresholds at or above the base of the draw's tail.
         """
         far = np.maximum(threshold - self.base, 0.0) / np.where(self.scale > 0, self.scale, np.inf)
         steep = np.where(np.abs(self.shape) < 1e-9, 1e-9, self.shape)

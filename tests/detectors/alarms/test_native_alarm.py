@@ -73,7 +73,7 @@ def test_sample_by_sample_it_has_the_bits_of_the_batch_form(
 def test_what_does_not_fit_is_refused():
     one = np.zeros(2)
     alarm = native(Told([1.0, np.nan]), 2, 0.0, 0.5, 1, 1, None)
-    with pytest.raises(ValueError, match="q: expected one entry a joint"):
+    with pytest.raises(ValueError, match="q: expected one entry per joint"):
         alarm.step(np.zeros(3), one, one, DT)
     with pytest.raises(ValueError, match="qd: every entry must be finite"):
         alarm.step(one, np.array([0.0, np.inf]), one, DT)

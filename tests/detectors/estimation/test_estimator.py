@@ -170,7 +170,7 @@ def test_bad_samples_leave_the_state_alone(training, alarm):
         good.step(*sample, a)
         with pytest.raises(ValueError, match="current: every entry must be finite"):
             bad.step(sample[0], sample[1], np.full(6, np.nan), b)
-        with pytest.raises(ValueError, match="q: expected one entry a joint"):
+        with pytest.raises(ValueError, match="q: expected one entry per joint"):
             bad.step(sample[0][:5], sample[1], sample[2], b)
         bad.step(*sample, b)
         assert a.tobytes() == b.tobytes()

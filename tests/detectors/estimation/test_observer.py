@@ -101,7 +101,7 @@ def test_standing_still_with_gravity_held_stays_at_zero():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda o, z: o.step(z[:5], z, z), "one entry a joint"),
+        (lambda o, z: o.step(z[:5], z, z), "one entry per joint"),
         (lambda o, z: o.step(z[None], z, z), r"float64 arrays of shape \(6,\)"),
         (lambda o, z: o.step(z + np.nan, z, z), "q: every entry must be finite"),
         (lambda o, z: o.step(z, z, z, -1.0), "dt: must be above 0"),

@@ -177,7 +177,7 @@ def test_nothing_to_learn_from_is_said():
 
 
 def test_other_joints_are_refused(usual):
-    with pytest.raises(ValueError, match="one entry a joint"):
+    with pytest.raises(ValueError, match="one entry per joint"):
         FaultCheck(usual).step(0.0, np.zeros(2), np.zeros(3), np.zeros(3))
 
 

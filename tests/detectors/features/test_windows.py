@@ -60,9 +60,9 @@ def test_scaling_is_its_formula_row_by_row(seed, joints, envelope):
 def test_scaling_refuses_joints_that_are_not_there():
     for joints, size in (((0, 5), 4), ((0, -1), 4)):
         scaling = Scaling(joints, None)
-        with pytest.raises(ValueError, match="one number a joint"):
+        with pytest.raises(ValueError, match="one number per joint"):
             scaling.rows(*np.zeros((2, 1, size)), np.zeros((1, 4, size)))
-    with pytest.raises(ValueError, match="one number a joint"):
+    with pytest.raises(ValueError, match="one number per joint"):
         Scaling((0,)).rows(np.zeros((1, 6)), np.zeros((1, 5)), np.zeros((1, 4, 6)))
     with pytest.raises(ValueError, match="expected some joints"):
         Scaling(())
