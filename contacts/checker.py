@@ -111,7 +111,7 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
     """Check that the poses of ``state`` are finite and of the model's size, and return it.
 
     Raises:
-        ValueError: another shape, or an entry that is not finite; the message names the field and
+        ValueError: a wrong shape, or an entry that is not finite; the message names the field and
             the first bad row.
     """
     xpos, xmat, x = state.xpos, state.xmat, state.flexvert_xpos

@@ -39,7 +39,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Score:
-    """The score of one checker. A field is ``None`` if it has nothing to count or no ground truth.
+    """The score of one checker; ``None`` in a field: nothing to count, or no ground truth.
 
     Attributes:
         checker: Name of the checker.
@@ -53,7 +53,7 @@ class Score:
         delay_ms: Median time from the onset of an event to its first report [ms].
         first: Time of the first report of any pair [s].
         first_error_ms: ``first`` minus the time of the first contact in a run of MuJoCo with fine
-            steps [ms]; ``None`` without such a run, or if the checker does not cover this pair.
+            steps [ms]; ``None`` without such a run, or if the checker does not cover its pair.
         lead_ms: Median time by which a pair's first report is earlier than MuJoCo's [ms].
         depth_mm: Median difference from MuJoCo's depth at the same state [mm].
         normal_deg: Median angle to MuJoCo's normal [deg].

@@ -23,9 +23,9 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 
     Recall counts events. An event is a contact of two partners from the first touch to separation;
     events that stay within the tolerance are not counted. Precision counts reports. A report is a
-    step and two partners whose surfaces touch in it; contacts within a margin are not counted. For
-    precision and recall, only kinds of pairs that both the checker and the ground truth cover are
-    counted, for all other metrics the kinds that the checker covers.
+    step and two partners whose surfaces touch in it; contacts within a margin are not counted.
+    Precision and recall count only kinds of pairs that both the checker and the ground truth cover.
+    All other metrics count every kind that the checker covers.
     """
     kinds = geom_kinds(model)
     given = run.contacts[name]

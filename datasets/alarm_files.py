@@ -48,7 +48,7 @@ def judged_alarms(
 ) -> Iterator[tuple[str, list[Matching]]]:
     """Match the alarms of a file with the true collisions of each split's episodes.
 
-    The first 3 s of an episode are not judged: detectors start up, and no collision is planned.
+    The first 3 s of an episode are not judged: detectors start up then, and nothing collides.
 
     Args:
         folder: a dataset.

@@ -184,10 +184,10 @@ def moving(traces: dict[str, Trace]) -> tuple[dict[str, Trace], list[str]]:
 
 
 def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
-    """The log that a flag names by its file name, with or without extension.
+    """The log whose file name, with or without extension, is ``name``; errors name ``flag``.
 
     Raises:
-        ValueError: no such log, or two.
+        ValueError: no log or several logs have this name.
     """
     found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
     if len(found) != 1:
@@ -200,7 +200,7 @@ def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recordi
     """Give each trace its load.
 
     Args:
-        traces: by file name.
+        traces: traces by file name.
         payload: one of LOG=KG, LOG=KG,X,Y,Z and LOG=unknown per log; other logs have no load.
 
     Raises:
@@ -219,7 +219,7 @@ def parse_load(text: str) -> Load:
     """The load in ``--payload KG`` or ``--payload KG,X,Y,Z``.
 
     Raises:
-        ValueError: another form.
+        ValueError: the text has another form.
     """
     if text == "unknown":
         raise ValueError("--payload unknown: leave it out instead")

@@ -77,7 +77,7 @@ def computed_bits() -> str:
 
 @functools.cache
 def code() -> str:
-    """SHA-256 of versions, sources and bits together."""
+    """SHA-256 of :func:`versions`, :func:`sources` and :func:`computed_bits` together."""
     text = "\n".join([*(f"{k} {v}" for k, v in versions().items()), sources(), computed_bits()])
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -26,7 +26,7 @@ CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 class ColumnMap:
     """Columns by name (of the header line) or by 0-based index; one column per joint, in order.
 
-    A map without names reads files with and without a header line.
+    A map of indices alone reads files with and without a header line.
     """
 
     t: Column | None  #: time; None: there is none, see ``clock``
@@ -118,7 +118,7 @@ class ColumnMap:
                 "clock=HZ".
 
         Raises:
-            ValueError: another word.
+            ValueError: an unknown word.
         """
         changed: dict[str, Any] = {"repair": self.repair | (set(words) & set(REPAIRS))}
         for word in words:

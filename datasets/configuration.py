@@ -39,7 +39,7 @@ class Split:
     quick_episodes: int  #: number of episodes (the first ones) that ``--quick`` generates
     seconds: float  #: length of an episode [s]
     arms: tuple[str, ...]  #: names of arm models; this list and each list below is cycled
-    individuals: tuple[int, ...]  #: seeds of the model mismatch; -1: none
+    individuals: tuple[int, ...]  #: seeds of the model mismatch; -1: no mismatch
     speeds: tuple[float, ...]  #: percent of the largest joint speeds
     payloads_g: tuple[float, ...]  #: carried masses, unknown to the observer [g]
     struck: float  #: fraction of the episodes that have collisions
@@ -47,11 +47,11 @@ class Split:
     kinds: tuple[str, ...]  #: kinds of collisions; a kind listed twice occurs twice as often
     links: tuple[int, ...]  #: links that collisions act on, 1-based
     severities: tuple[tuple[float, float], ...]  #: ranges of peak ``|tau_ext|``, joints 1-4 [N m]
-    temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
+    temperature: tuple[float, float]  #: range of the gears' temperature [degC]
     picks: float  #: fraction of collision-free episodes in which the arm picks up a payload
     unseen: tuple[str, ...]  #: properties ("arm", ...) whose values the first split does not have
     clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: range of a clamp's duration [s]
-    paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
+    paired: bool = False  #: episodes 2k (free) and 2k + 1 (with collisions) have the same motion
 
 
 @dataclass(frozen=True)

@@ -127,13 +127,13 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 
 @contextlib.contextmanager
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
-    """Context in which ``folder`` holds this dataset and this process is its only writer.
+    """Context in which ``folder`` holds the described dataset and only this process writes to it.
 
     Missing subfolders, arm files and the head file are written on entry.
 
     Raises:
         ValueError: the folder holds something else.
-        OSError: another process is writing into it, or it cannot be made.
+        OSError: another process is writing into the folder, or it cannot be made.
     """
     made = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array, runs
 
-#: Names of columns that label contact, in upper or lower case; every cell must be in LABEL.
+#: Names, in lower case, of columns that label contact if all their cells are in LABEL.
 LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
 LABEL = {"0": False, "false": False, "1": True, "true": True}
 

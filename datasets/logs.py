@@ -200,7 +200,7 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     """The header (empty if the first line has numbers) and the column indices of each signal.
 
     Raises:
-        ValueError: columns that this file does not have; the presets that fit it are named.
+        ValueError: columns that this file does not have; the message names presets that fit it.
     """
     header = header_of(first)
     if header and columns.headerless:

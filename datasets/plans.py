@@ -10,7 +10,7 @@ from tauguard.envs import CollisionPlan, Episode, PayloadPick
 from tauguard.models import Mismatch, load_arm
 from tauguard.traces import STRATA
 
-#: Payloads of the dissertation's 15 training slices [g]: none in 3 slices, each other one in 2.
+#: Payloads of the dissertation's 15 training slices [g]: 0 in 3 slices, each other payload in 2.
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
 #: Kinds of collisions, cycled: half are strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
@@ -174,7 +174,7 @@ class DemoPlan:
     train: list[Episode]
     judge_struck: list[Episode]  #: test episodes with collisions
     judge_free: list[Episode]  #: test episodes without collisions
-    showcase: Episode  #: for the replay
+    showcase: Episode  #: episode for the replay
 
     @property
     def seconds(self) -> float:

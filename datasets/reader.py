@@ -36,8 +36,8 @@ def read(
     """The traces of a dataset, of a folder of recordings or of one recording, one at a time.
 
     Args:
-        path: a folder that ``tauguard generate`` made, a folder of MCAP or CSV files, or one such
-            file.
+        path: a folder that ``tauguard generate`` made, a folder of MCAP or CSV files, or one MCAP
+            or CSV file.
         splits: names of a dataset's splits (default: all).
         arm: read only this arm's episodes of a dataset.
 

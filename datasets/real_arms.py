@@ -133,7 +133,7 @@ def initial_arm(
     """The initial arm of a calibration, and what fixes the scale of its torques.
 
     Args:
-        numbers: of the robot file.
+        numbers: the robot file's geometry and inertia.
         recordings: logs with their loads.
         columns: the given preset or column map.
         gains: the given drive gains [N m/A], one per joint; empty: none.
@@ -216,7 +216,7 @@ def calibration_notes(
     """Notes on torque that a calibration does not explain, and on a log that may have had a load.
 
     Args:
-        joints: names.
+        joints: names of the joints.
         left: unexplained torque of each log in which some joint moves, by file name.
         logs: by file name, with their loads.
         held: held-out residual of each log in ``logs`` [N m], (n,) each; empty: not known.

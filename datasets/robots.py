@@ -27,7 +27,7 @@ class RobotSource:
     """A name that :func:`tauguard.models.load_arm` accepts, or the absolute path of a file. In
     ``dataset.json`` it is the file's name without folder."""
     joints: tuple[str, ...]
-    sha256: str  #: hash of everything that its simulation depends on
+    sha256: str  #: hash of everything that the arm's simulation depends on
 
     def anywhere(self) -> RobotSource:
         """A copy with the file's name instead of its path on this machine."""

@@ -46,8 +46,8 @@ ZSTD_LEVEL = 3
 class ShardTask:
     """The work of one worker process."""
 
-    folder: str  #: of the dataset
-    configuration: str  #: as JSON
+    folder: str  #: the dataset's folder
+    configuration: str  #: the dataset's configuration as JSON
     split: str
     number: int  #: number of the shard within the split
     code: str  #: hash of the code that must compute the shard

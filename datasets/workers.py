@@ -106,7 +106,7 @@ def in_processes(
 
 
 def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Connection:
-    """Start a worker and put it into ``crew``; a stop signal is handled only after both."""
+    """Start a worker and put it into ``crew``; stop signals are deferred until both are done."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
@@ -158,7 +158,7 @@ def _ctrl_c_blocked() -> Iterator[None]:
 def _without_opengl() -> Iterator[None]:
     """Context in which started processes do not load OpenGL, because workers draw nothing.
 
-    GLFW finds its version by a further process, which would print an error if it is stopped.
+    GLFW starts another process to find its version; if that is stopped, it prints an error.
     """
     before = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = "disable"

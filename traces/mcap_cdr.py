@@ -39,7 +39,7 @@ class Layout:
         self.size += len(data)
 
     def number(self, name: str, kind: str, count: int | None = None) -> Layout:
-        """A field ``name`` of NumPy type ``kind``, or a fixed array of ``count`` of them."""
+        """A field ``name``: a number of NumPy type ``kind``, or an array of ``count`` numbers."""
         scalar = np.dtype(kind).newbyteorder("<")
         self._align(scalar.itemsize)
         dtype = scalar if count is None else np.dtype((scalar, (count,)))

@@ -19,9 +19,9 @@ class Event:
 
     pair: Pair
     onset: float  #: first touch [s]
-    end: float  #: end of the last step in which they touch [s]
+    end: float  #: end of the last step in which the partners touch [s]
     depth: float  #: largest penetration depth [m]
-    counts: bool  #: whether it is scored: the depth exceeds the tolerance
+    counts: bool  #: whether the event is scored, as its depth exceeds the tolerance
 
     def seen(self, times: Sequence[float], timestep: float) -> bool:
         """Whether one of ``times`` [s] is in the event, or at most one timestep outside it."""

@@ -36,7 +36,7 @@ def search(
     Args:
         distance: Distances of pairs at given times.
         bound: Bound L of each pair [m], shape (N,).
-        tolerance: Depth above which a pair is not searched any further [m].
+        tolerance: Depth above which no greater depth of a pair is searched for [m].
         resolution: Distance below which a pair may be reported as touching [m].
     """
     n = len(bound)

@@ -122,7 +122,7 @@ def names(covers: Sequence[str]) -> tuple[bool, bool]:
     """Whether ``rigid`` is in ``covers``, and whether ``cloth`` is.
 
     Raises:
-        ValueError: another name.
+        ValueError: an unknown name.
     """
     for one in covers:
         if one not in ("rigid", "cloth"):

@@ -33,7 +33,7 @@ class MocapVelocityField:
             self._step.append((data.mocap_pos[number] - data.xpos[body], turn))
 
     def velocity(self, body: int, point: Array) -> Array:
-        """Linear velocity of a point of a body, and angular velocity, due to mocap. Shape (6,)."""
+        """Linear velocity at a point of a body, then angular velocity, due to mocap. Shape (6,)."""
         carrier = int(self._carrier[body])
         out = np.zeros(6)
         for (number, start), (shift, turn) in zip(self._start, self._step, strict=True):

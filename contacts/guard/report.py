@@ -30,7 +30,7 @@ class Cut:
     """One sub-step that was rolled back."""
 
     time: float  #: time at which the next attempt ends [s]
-    pair: Pair  #: the cause: passed through, too deep, or touched without a listed contact
+    pair: Pair  #: pair that passed through, got too deep, or touched without a listed contact
     stiffened: bool  #: whether the pair's contact parameters are changed until it separates
 
 
@@ -44,7 +44,7 @@ class StepReport:
     restored: tuple[Pair, ...] = ()  #: pairs whose original contact parameters were restored
     passed: tuple[Pair, ...] = ()  #: pairs that may have passed through
     impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
-    energy_added: float = 0.0  #: by constraint forces, summed over the sub-steps with a gain [J]
+    energy_added: float = 0.0  #: by constraint forces, summed over sub-steps that gained energy [J]
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property

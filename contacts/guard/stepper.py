@@ -69,7 +69,7 @@ class GuardedStepper:
         checkers: The covered pairs: ``rigid`` for geoms with geoms, ``cloth`` for flexes with
             geoms, other flexes and themselves. :attr:`uncovered` lists the other pairs.
         stiff: Whether pairs that cause a rollback are made stiff.
-        most: Largest number of calls of ``mj_step`` in one step; the last resort is stage 3.
+        most: Largest number of calls of ``mj_step`` in one step; at this number stage 3 follows.
 
     Raises:
         ValueError: an unknown checker, ``most`` below 2, or a model that :meth:`step` refuses.

@@ -10,7 +10,7 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import BodyProxy, Cloth, SceneSpec, compose
 from tauguard.models.cloth import add_sheet
 
-#: Young's modulus of the fabrics [Pa]. Times the thickness of 2 mm: 400 N/m, as of a soft knit.
+#: Young's modulus of the fabrics [Pa]; times the thickness of 2 mm it is 400 N/m (a soft knit).
 FABRIC_YOUNG = 2e5
 #: The link of the forearm; the sleeve surrounds its capsule.
 SLEEVED_LINK = "link3"

@@ -11,7 +11,7 @@ from tauguard.models.scene import INTEGRATORS
 BALL_RADIUS = 0.010  #: [m]
 PLATE_HALF_THICKNESS = 0.001  #: [m]
 BALL_MASS = 0.020  #: [kg]
-#: Young's modulus of the cloth [Pa]. Times its thickness of 2 mm: 20 kN/m, as of a woven fabric.
+#: Young's modulus of the cloth [Pa]; times its thickness of 2 mm it is 20 kN/m (a woven fabric).
 CLOTH_YOUNG = 1e7
 #: Initial distance of the surfaces of ball and cloth or plate, without ``offset`` [m].
 BALL_GAP = 0.005

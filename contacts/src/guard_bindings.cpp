@@ -19,7 +19,7 @@
 namespace tauguard::contacts {
 namespace {
 
-// Sets fields of an engine from addresses and numbers by name. Python keeps the objects alive.
+// Sets fields of an Engine from addresses and numbers in a dict; Python keeps the objects alive.
 class Addresses {
  public:
   explicit Addresses(const nb::dict& values) : values_(values) {}

@@ -5,7 +5,7 @@
 namespace tauguard::contacts {
 namespace {
 
-// Time constant of a row with the integrator `discrete`, short enough to act within the step [s].
+// Time constant of a constraint row with the integrator `discrete`; it acts within the step [s].
 constexpr double rigid = 1e-6;
 
 constexpr int least_iterations = 100;
@@ -43,7 +43,7 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
-  // With a solver other than Newton, stiff rows do not converge in time, and pairs pass through.
+  // Solvers other than Newton do not converge on stiff rows, so pairs would pass through.
   *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {

@@ -14,7 +14,7 @@ NOT_GIVEN = r"`(code_permalink|author|author_email|eval_env)` is set to None|env
 
 
 def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
-    """Write traces with truth as a Minari dataset into Minari's own folder of datasets.
+    """Write traces with truth as a dataset into Minari's folder; returns the number of episodes.
 
     The observation is (q, qd, current), the action is the references (q_des, qd_des), the reward
     is 0. ``infos`` has the truth: ``tau_ext``, ``contact_force`` (x, y, z) and ``contact_link``.
@@ -25,12 +25,9 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
         name: Minari's id, ``namespace/name-v0``.
         rate: sample rate of the traces [Hz], for the description.
 
-    Returns:
-        Number of episodes.
-
     Raises:
-        ValueError: Minari is not installed, there is such a dataset already, no traces, or traces
-            without truth.
+        ValueError: Minari is not installed or has a dataset of this name, there are no traces, or
+            traces have no truth.
     """
     try:
         import minari

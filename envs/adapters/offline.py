@@ -22,7 +22,7 @@ def record_policy(
     seed: int = 0,
     **keywords: Any,
 ) -> int:
-    """Play a policy and write its episodes into Minari's folder of datasets.
+    """Play a policy and write its episodes into Minari's folder; returns the number of episodes.
 
     Args:
         name: name of the environment, such as "tauguard/Reach-v0".
@@ -31,9 +31,6 @@ def record_policy(
         episodes: number of episodes; episode i has the seed ``seed + i``.
         seed: seed of the first episode.
         **keywords: keywords of the environment, and ``max_episode_steps``.
-
-    Returns:
-        The number of episodes.
 
     Raises:
         ValueError: Minari is not installed or has a dataset of that name, or ``episodes`` is

@@ -17,7 +17,7 @@ REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
 TRIGGERS = ("alarm", "contact")
 #: Assumed delay from power-off until the brakes hold [s]. Data sheets state 10 to 50 ms.
 BRAKE_DELAY = 0.02
-#: A retraction goes back along the path at this fraction of the arm's former speed.
+#: A retraction goes back along the path at this fraction of the speed at which the arm came.
 RETRACT_SPEED = 0.5
 #: A retraction ends this time after it has passed the point where the reaction began [s].
 RETRACT_TIME = 0.3
@@ -33,7 +33,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     * ``stop0``: stop category 0 of IEC 60204-1: power off at once, brakes after
       :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
-      The drives decelerate at the arm's acceleration limit, more gently than the brakes. So the
+      By default the drives decelerate at the arm's limit, more gently than the brakes. So the
       peak force, within 50 ms of the contact, is higher than with ``stop0``.
       ``stop2`` and ``retract`` begin with the same stop and have the same peak.
     * ``stop2``: category 2: the drives stop the arm and hold it.

@@ -32,7 +32,7 @@ class _Rows:
     region: list[NDArray[np.void]] = field(default_factory=list)
     residual: list[Array] = field(default_factory=list)
     alarm: list[NDArray[np.bool_]] = field(default_factory=list)
-    targets: list[tuple[float, Any]] = field(default_factory=list)  #: start time [s], places [m]
+    targets: list[tuple[float, Any]] = field(default_factory=list)  #: start times [s], places [m]
 
 
 class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):

@@ -114,7 +114,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         return {"separation": nearest, "protective_distance": needed, "stopped": inside}
 
     def _pair(self, geom: int, target: int) -> tuple[float, float]:
-        """Distance of an arm's geom from a region [m], and the arm's speed at that point [m/s]."""
+        """Distance of an arm's geom from a region [m], and speed of its nearest point [m/s]."""
         model, data = self._arm.batch.model(0), self._arm.batch.datas[0]
         ends = np.zeros(6)
         distance = mujoco.mj_geomDistance(model, data, geom, target, FAR, ends)

@@ -59,7 +59,7 @@ assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
 
 
 class Override(IntEnum):
-    """What the motors do in place of an action; the numbers are the native code's."""
+    """What the motors do in place of an action; native code uses the same numbers."""
 
     FREE = 0  #: the action is not replaced
     VELOCITY = 1  #: the servo follows joint velocities
@@ -162,7 +162,7 @@ class Batch:
         )
 
     def attach(self, detector: object) -> None:
-        """Put a detector into every copy's loop; ``None`` takes it out."""
+        """Put a detector into every copy's loop; ``None`` removes it."""
         make = listening(self.compiled, detector)
         needed = make is not None or self.compiled.settings.noise
         self.sensing = [Sensing(self.compiled, make) for _ in range(self.rows)] if needed else None

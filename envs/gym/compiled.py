@@ -34,7 +34,7 @@ from tauguard.models import (
 
 #: Least height of a target and its least distance from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
-#: The same two as fractions of the arm's reach. The smaller value holds: it is this for short arms.
+#: Both as fractions of the arm's reach; for a short arm these are smaller and replace the lengths.
 SHORT = (0.25, 0.4)
 #: Least reach of an arm [m].
 LEAST_REACH = 0.02
@@ -73,7 +73,7 @@ class CompiledScene:
     gains: Gains
     nominal_mass: Array  #: of the links [kg], shape (n,)
     nominal_com: Array  #: in the links' frames [m], shape (n, 3)
-    joint_range: Array  #: [rad], infinite where free, shape (n, 2)
+    joint_range: Array  #: [rad], infinite without a limit, shape (n, 2)
     torque_limit: Array  #: [N m], shape (n,)
     max_speed: Array  #: [rad/s], shape (n,)
     tools: tuple[tuple[int, int, int], ...]  #: for each arm: site or -1, body, first joint

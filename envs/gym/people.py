@@ -94,7 +94,7 @@ def draw_script(
     away = np.arange(WALKS) % 2 == 1
 
     def spots(count: int) -> Array:
-        """Places at work (row 0) and away from it (row 1) [m], shape (count, 2, 2)."""
+        """Draw places at work (row 0) and away from work (row 1) [m], shape (count, 2, 2)."""
         aside = rng.uniform(*ASIDE, count) * rng.choice([-1.0, 1.0], count)
         shift = np.outer(aside, left) - np.outer(rng.uniform(*BEHIND, count), forward)
         near = rng.normal(0.0, 0.03, (count, 2))

@@ -61,8 +61,8 @@ class StartsInContact(ValueError):
 class Layout:
     """Places of body regions, people, tables, cloths and second arms around an arm."""
 
-    reach: float  #: of the arm [m]
-    own: bool = True  #: it is the package's arm, for which places are stated in metres
+    reach: float  #: the arm's reach [m]
+    own: bool = True  #: whether the arm is the package's, for which places are stated in metres
     moved: Mapping[str, float] = field(default_factory=dict)
     """How far each kind is moved to be clear of the arm [m]: "table" down, "person", "cloth",
     "second arm" and body regions away from the base."""

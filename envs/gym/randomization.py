@@ -73,25 +73,24 @@ Distribution = Normal | Uniform | Choice
 
 @dataclass(frozen=True)
 class Parameter:
-    """A quantity that ``randomize`` can draw: its meaning and its range."""
+    """The range of a quantity that ``randomize`` can draw."""
 
-    meaning: str
     low: float
     high: float
     each: bool = False  #: one draw for each joint or link
 
 
 PARAMETERS = {
-    "mass": Parameter("of each link over its nominal mass, inertia with it", 0.1, 10.0, True),
-    "gain": Parameter("of each drive over what the controller believes", 0.1, 10.0, True),
-    "friction": Parameter("of each joint over its nominal friction", 0.0, 10.0, True),
-    "temperature": Parameter("of the joints [degC]", -20.0, 100.0),
-    "noise": Parameter("of the sensors over their nominal noise", 0.0, 100.0),
-    "payload_g": Parameter("carried [g]", 0.0, 1e6),
-    "stature": Parameter("of the person [m]", 1.0, 2.3),
-    "hand_speed": Parameter("of the person's reaches [m/s]", 0.01, 5.0),
-    "walk_speed": Parameter("of the person's walks [m/s]", 0.01, 5.0),
-    "reaction_time": Parameter("of the person [s]", 0.0, 10.0),
+    "mass": Parameter(0.1, 10.0, True),  # of each link (and its inertia) divided by the nominal one
+    "gain": Parameter(0.1, 10.0, True),  # of each drive, divided by what the controller assumes
+    "friction": Parameter(0.0, 10.0, True),  # of each joint, divided by its nominal friction
+    "temperature": Parameter(-20.0, 100.0),  # of the joints [degC]
+    "noise": Parameter(0.0, 100.0),  # of the sensors, divided by their nominal noise
+    "payload_g": Parameter(0.0, 1e6),  # carried mass [g]
+    "stature": Parameter(1.0, 2.3),  # of the person [m]
+    "hand_speed": Parameter(0.01, 5.0),  # of the person's reaches [m/s]
+    "walk_speed": Parameter(0.01, 5.0),  # of the person's walks [m/s]
+    "reaction_time": Parameter(0.0, 10.0),  # of the person [s]
 }
 _OF_PERSON = ("stature", "hand_speed", "walk_speed", "reaction_time")
 

@@ -130,7 +130,7 @@ class Reach(Task):
             batch.plants[i].aim(place, HAND_STAYS)
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """Progress and bonus; the task never ends. The memory is the last distance [m]."""
+        """Progress and bonus; the task never ends. ``memory`` is the last distance [m]."""
         reached = step.distance < self.tolerance
         rewards = {"progress": memory - step.distance, "target": BONUS * reached}
         return Outcome(rewards, reached, step.distance)

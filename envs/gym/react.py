@@ -106,7 +106,7 @@ class React(Task):
         return np.array(data.qpos[adr])
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
-        """The reward's terms. The memory is the last distance [m]."""
+        """The reward's terms; ``memory`` is the last distance [m]."""
         period = 1 / self.batch.compiled.settings.control_rate
         hurt = step.limit_ratio > 1
         done = (step.distance < DONE) & (step.limit_ratio <= 1)

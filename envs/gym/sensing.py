@@ -99,7 +99,7 @@ class ObserverListener:
         Args:
             robot: nominal rigid body.
             drive: nominal drive.
-            dt: sample interval of the samples [s].
+            dt: sample interval [s].
             gain: gain of the observer [1/s].
             ranges: joint ranges [rad], (n, 2); default: no joint has a stop.
         """
@@ -116,7 +116,7 @@ class ObserverListener:
             [drive.gain, coulomb, viscous, low + MARGIN, high - MARGIN, self.bounds]
         )
         self._hold = round(FORGOTTEN / (gain * dt))
-        #: Samples that each joint's residual still counts as zero, shape (n,).
+        #: Number of samples for which each joint's residual still counts as zero, shape (n,).
         self._left = np.zeros(robot.joints, dtype=np.int64)
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:

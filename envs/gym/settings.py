@@ -26,7 +26,7 @@ from tauguard.models import (
 )
 from tauguard.models.scene import INTEGRATORS
 
-#: Control modes in the native order; :mod:`tauguard.envs.gym.actions` states their units.
+#: Control modes in native code's order; :mod:`tauguard.envs.gym.actions` states their units.
 CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian")
 #: Types of the keywords that are not strings, and the text of their errors.
 _SEVERAL = "one, or a tuple of them"
@@ -41,7 +41,7 @@ _KINDS: dict[str, tuple[Any, str]] = {
 }
 #: Detectors that need no file.
 DETECTORS = ("observer",)
-#: The obstacle that is a whole person.
+#: Name of the obstacle that is a whole person.
 PERSON = "person"
 
 

@@ -81,7 +81,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode of every copy, or of those that ``options["reset_mask"]`` chooses.
+        """Begin an episode of every copy, or of the copies in ``options["reset_mask"]``.
 
         Args:
             seed: copy i gets ``seed + i``, or entry i of a list.
@@ -172,7 +172,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return batch.observation.copy(), rewards, terminated, truncated, infos
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """Restart finished copies (SAME_STEP); the ``final_`` keys get their last values."""
+        """Restart finished copies (SAME_STEP); keys ``final_...`` keep their last values."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
