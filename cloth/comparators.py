@@ -1,7 +1,7 @@
 """For comparison only: narrow phases of earlier work, with missed and false collisions.
 
-They have the candidates, data layout, compiler flags and threads of ab2pf, so a comparison
-measures only the narrow phase. ``comparators.hpp`` names the publications and what was inferred.
+They use the candidates, data layout, compiler flags and threads of ab2pf, the product's narrow
+phase. So a comparison measures the narrow phase alone. ``comparators.hpp`` cites the publications.
 """
 
 import numpy as np
@@ -54,7 +54,7 @@ def solve(
     Args:
         vertex: True for vertex-face queries, False for edge-edge queries.
         x_t0: Positions at the start of the step. Shape (V, 3).
-        x_t1: Positions at its end. Shape (V, 3).
+        x_t1: Positions at the end of the step. Shape (V, 3).
         rows: Four vertices per query. Shape (N, 4).
         method: One of :data:`METHODS`.
         hit: Output. Shape (N,).

@@ -23,7 +23,7 @@ class Groups(Rebuilt):
             has no row in the table.
 
     Example:
-        A cloth (group 0) that meets itself and a rigid body (group 1) that meets the cloth only::
+        A cloth (group 0) tested against itself and against a rigid body (group 1)::
 
             Groups(ids, [[True, True], [True, False]])
     """
@@ -41,11 +41,11 @@ class Groups(Rebuilt):
         object.__setattr__(self, "meets", table)
 
     def check(self, name: str, rows: NDArray[np.int32]) -> None:
-        """Raise a ``ValueError`` for the first row outside ``ids`` or of more than one group."""
+        """Raise a ``ValueError`` for a row with a vertex outside ``ids`` or with several groups."""
         if rows.size and int(rows.max()) >= len(self.ids):
             row = int(np.argmax((rows >= len(self.ids)).any(axis=1)))
             raise ValueError(
-                f"{name}: row {row} is {rows[row].tolist()}, groups has {len(self.ids)} ids"
+                f"{name}: row {row} is {rows[row].tolist()}, but groups has {len(self.ids)} ids"
             )
         of_row = self.ids[rows]
         mixed = (of_row != of_row[:, :1]).any(axis=1)
@@ -62,5 +62,5 @@ def _table(meets: ArrayLike) -> NDArray[np.bool_]:
     if array.ndim != 2 or array.shape[0] != array.shape[1]:
         raise ValueError(f"meets: shape {array.shape}, expected (G, G)")
     if array.dtype.kind not in "biuf" or not ((array == 0) | (array == 1)).all():
-        raise ValueError(f"meets: dtype {array.dtype}, expected bools, or 0 and 1 alone")
+        raise ValueError(f"meets: dtype {array.dtype}, expected bools, or only 0 and 1")
     return np.ascontiguousarray(array, dtype=bool)

@@ -2,7 +2,7 @@
 
 Queries of a point with an edge or with a point are vertex-face queries with a degenerate face.
 
-The method ``ab2pf`` takes the given doubles as exact. A query is a hit if and only if the features
+The method ``ab2pf`` treats the given doubles as exact. A query is a hit if and only if the features
 touch, in exact arithmetic, at some time of the step. ``toi`` is at most 1e-9 of the step before the
 first such time. The cost of a query is bounded:
 
@@ -10,8 +10,8 @@ first such time. The cost of a query is bounded:
    A root takes at most 40 Newton steps.
 2. Undecided queries are divided into at most 124 intervals of time, each with 20 tests of a
    separating direction.
-3. The rest is decided by a fixed number of signs of polynomials of degree 3, in integers of fixed
-   width and, if these are too short, of any length.
+3. Queries that are still undecided are decided by a fixed number of signs of polynomials of degree
+   3, in integers of fixed width or, if these are too short, of any length.
 
 Most queries take some 20 ns; those that need integers of fixed width take 3 us. The slowest take
 200 us for positions of similar magnitude, and 0.2 s if magnitudes within one query span 10^600,
@@ -134,14 +134,14 @@ def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
     """The number of a method; an unknown name raises a ``ValueError`` with the known ones."""
     if not isinstance(method, str) or method not in methods:
         raise ValueError(
-            f"method {method!r}: expected one of {', '.join(methods)}; for comparison only, there "
-            "are more in tauguard.cloth.comparators"
+            f"method {method!r}: expected one of {', '.join(methods)}; more methods, for "
+            "comparison only, are in tauguard.cloth.comparators"
         )
     return methods[method]
 
 
 def checked_distance(min_distance: float, method: str) -> float:
-    """Return the distance; ``ValueError`` if it is not finite, negative, or not for the method."""
+    """Return the distance; ``ValueError`` if it is negative, not finite or not supported."""
     distance = np.nan
     try:
         array = np.asarray(min_distance)

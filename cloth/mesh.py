@@ -27,8 +27,8 @@ from tauguard.cloth.topology import Isolated, Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether the volume is moving (two intervals per axis, one at
-#: each end of the step) or covers the whole step. ``None``: moving in steps in which vertices move
-#: by more than about a quarter of an edge on average.
+#: each end of the step) or covers the whole step. ``None``: moving in those steps in which
+#: vertices move, on average, by more than about a quarter of an edge.
 VOLUMES: dict[str, tuple[int, bool | None]] = {
     "auto": (14, None),
     **{f"k_dop{k}": (k, False) for k in (6, 14, 16, 18, 26)},
@@ -54,7 +54,7 @@ class MeshCCD:
         groups: Groups of vertices, and the pairs of groups to test. ``None``: test everything.
         volume: One of :data:`VOLUMES`. All find the same collisions; they differ in cost.
         edges: Edges without a face (rods, wires), shape (L, 2); edges of faces are ignored.
-        points: Vertices without face or edge to test (particles), shape (P,).
+        points: Vertices without face or edge that are also tested (particles), shape (P,).
 
     Attributes:
         method, threads, volume: As given; ``threads`` 0 is replaced by the number of processors.
@@ -64,8 +64,8 @@ class MeshCCD:
     first call and kept. Arguments are copied.
 
     Calls from several Python threads on one object wait for each other. Ctrl-C ends a call, and the
-    object can be used again. So can its copy in a forked process, unless another thread was in a
-    call at the fork; then the copy raises a ``RuntimeError``. Attributes cannot be assigned;
+    object can be used again. A forked process can use its copy of the object; the copy raises a
+    ``RuntimeError`` if another thread was in a call at the fork. Attributes cannot be assigned;
     :meth:`update_topology` changes faces and groups.
 
     Raises:
@@ -149,7 +149,7 @@ class MeshCCD:
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
-            x_t1: Positions at its end. Shape (V, 3).
+            x_t1: Positions at the end of the step. Shape (V, 3).
             min_distance: Distance that counts as contact, in the unit of the positions. Results are
                 exact for 0 and conservative otherwise.
             fresh: Start the traversal at the root instead of the last frame's front. The result is
@@ -234,7 +234,7 @@ class MeshCCD:
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
-            x_t1: Positions at its end. Shape (V, 3).
+            x_t1: Positions at the end of the step. Shape (V, 3).
             min_distance: Smallest distance allowed, in the unit of the positions.
             fraction: Part of the time until the first contact that is used, above 0 and below 1.
             limit: As in :meth:`find`.
@@ -269,9 +269,10 @@ class MeshCCD:
     ) -> dict[str, Any]:
         """Replace the faces, for example by a cut or tear that removes, adds or splits some.
 
-        The hierarchy is updated and the front is reused. Only the first change that adds features
-        rebuilds the hierarchy, with free room for more. Later results, and the numbers of edges and
-        faces, are those of a new ``MeshCCD`` of ``faces``. The number of vertices may change.
+        The hierarchy is updated and the front is reused. The first change that adds features
+        rebuilds a tree with free slots; a later change rebuilds it if the slots are used up.
+        Results, and the numbering of edges and faces, are from then on those of a new ``MeshCCD``
+        of ``faces``. The number of vertices may change.
 
         Args:
             faces: Shape (F', 3), the complete new list. Rows that were present before count as
@@ -282,8 +283,8 @@ class MeshCCD:
 
         Returns:
             ``"vertices"``, ``"edges"``, ``"faces"``: numbers (removed, added); isolated edges and
-            vertices also count as faces. ``"rebuilt"``: how many of the three trees had no room
-            left, so that they are rebuilt in the next frame.
+            vertices also count as faces. ``"rebuilt"``: how many of the three trees are rebuilt in
+            the next frame because they had no free slots left.
 
         Raises:
             ValueError: as the constructor.

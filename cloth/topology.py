@@ -34,8 +34,8 @@ class Isolated:
         """Check both lists; remove edges of faces, and vertices of faces or edges.
 
         Raises:
-            ValueError: not (L, 2) or (P,) integers from 0, an edge between equal vertices, an edge
-                of two groups, a vertex without a group.
+            ValueError: arrays that are not (L, 2) or (P,) integers >= 0, an edge between equal
+                vertices or between two groups, a vertex without a group.
         """
         rows = _rows("edges", edges, (None, 2))
         spots = _rows("points", points, (None,))
@@ -79,7 +79,7 @@ class Topology:
         self._row_of_isolated = np.searchsorted(keys, wanted).astype(np.int32)
 
     def check(self, start: int, end: int) -> None:
-        """Raise a ``ValueError`` if the numbers of vertices do not fit."""
+        """Raise a ``ValueError`` if the numbers of vertices of a step do not fit the mesh."""
         if start != end:
             raise ValueError(f"x_t1: {end} vertices, but x_t0 has {start}")
         if self._vertices is not None and start != self._vertices:

@@ -1,4 +1,4 @@
-"""Exact orientation signs (Shewchuk 1997, with dyadic big numbers behind the filter)."""
+"""Exact signs of orientation: a floating-point filter (Shewchuk 1997), then dyadic numbers."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
 
     Args:
         points: Shape (N, 4, 3), any unit. Every finite double is legal.
-        threads: 0 means all processors; the answer does not depend on it.
+        threads: 0 means all processors; the result does not depend on it.
 
     Returns:
         Exact signs -1, 0 or 1. Shape (N,).

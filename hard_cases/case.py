@@ -34,10 +34,10 @@ class Case:
     """One question with a known answer.
 
     Attributes:
-        name: unique.
-        kind: the adapter's method that answers it.
+        name: unique name.
+        kind: name of the adapter's method that answers the question.
         origin: where the case was first found; ``of this project`` if it was made for this list.
-        why: what makes it hard.
+        why: what makes the case hard.
         given: arguments of the method by name.
         explained: the reason, if tauguard's own answer is wrong.
         expected: ``{"toi": "1/2"}`` (a fraction of the step; ``None``: no contact),

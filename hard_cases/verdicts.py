@@ -47,7 +47,7 @@ def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """Count by kind and library: cases, right answers, and wrong answers by kind of error.
 
     ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is conservative.
-    ``other`` is out of bounds, no number, or an error.
+    ``other`` means out of bounds, not a number, or an exception.
     """
     found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
@@ -72,7 +72,7 @@ def _counts(wrong: list[str]) -> dict[str, int]:
 
 
 def by_library(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A row for each kind, a column for each library: ``11 of 13`` right, or None if not asked."""
+    """A row for each kind, a column for each library: ``11 of 13`` right, or None for no case."""
     found: dict[tuple[str, str], list[bool]] = {}
     for row in rows:
         found.setdefault((row["kind"], row["library"]), []).append(row["right"])

@@ -62,8 +62,8 @@ class MeshTree:
     * ``obb``, the default: oriented boxes along the principal axes of each child's surface
       (Gottschalk, Lin and Manocha 1996). Their queries are the fastest on all meshes that
       ``tauguard bench rigid`` measures.
-    * ``aabb``: boxes along the axes of the mesh's frame. The tree builds in two thirds of the time,
-      which pays off for at most a few thousand poses.
+    * ``aabb``: boxes along the axes of the mesh's frame. Such a tree is built in two thirds of the
+      time, which pays off if the tree is used for at most a few thousand poses.
 
     Exactness: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
     double precision and rounded. Whether two triangles with these corners share a point is decided
@@ -121,19 +121,19 @@ class MeshTree:
     def _check(self, other: MeshTree) -> None:
         if not isinstance(other, MeshTree):
             raise ValueError(
-                f"other: {type(other).__name__}, expected a MeshTree; for convex bodies there are "
-                "tauguard.rigid.overlap and distance"
+                f"other: {type(other).__name__}, expected a MeshTree; for convex bodies use "
+                "tauguard.rigid.overlap or distance"
             )
         if other.volume != self.volume:
             raise ValueError(
                 f"other: its volume is {other.volume!r}, this tree's {self.volume!r}; "
-                "build both with the same one"
+                "build both with the same volume"
             )
 
     def overlap(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshOverlap:
         """Whether the surfaces intersect, with the other mesh posed in this one's frame.
 
-        The search stops as soon as it finds a pair.
+        The search ends at the first intersecting pair of triangles.
 
         Args:
             other: A mesh whose tree has the same volume.

@@ -1,7 +1,7 @@
 """Overlap and sweeps of convex bodies without radii, row by row.
 
 * ``abfme`` eliminates the unknowns of a separating plane by Fourier-Motzkin elimination. Facet
-  functions are scaled by determinants; redundant combinations are left out.
+  functions are scaled by determinants, so nothing is divided; redundant combinations are left out.
 * ``sat`` tests separating axes (Gottschalk et al. 1996; Ericson 2005, 5.2).
 
 Both run in floating point with derived error bounds. Exact arithmetic decides the remaining rows.
@@ -22,7 +22,7 @@ from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygon
 
 SweepMethod = Literal["abfme", "sat", "auto"]
 
-#: Number of a method in the native module; ``exact`` serves studies and tests.
+#: Number of a method in the native module; ``exact`` is for studies and tests.
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "exact": 4}
 _KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3, Polygons: 4}
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
@@ -61,7 +61,7 @@ def refuse_hulls(a: Bodies, b: Bodies) -> None:
 
 
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
-    """Overlap of batched boxes, written to ``hit``; returns the number of exact rows."""
+    """Overlap of batched boxes, written to ``hit``; returns the number of rows decided exactly."""
     skew = max(a.skew, b.skew)
     return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, threads, hit)
 
@@ -71,7 +71,7 @@ def sweep(
 ) -> Impacts:
     """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 
-    Two meshes: :meth:`MeshTree.sweep`. Bodies that turn: :func:`time_of_impact`.
+    For two meshes use :meth:`MeshTree.sweep`; for bodies that rotate, :func:`time_of_impact`.
 
     Args:
         a: N bodies of one kind at rest, or one.
@@ -132,7 +132,7 @@ def portable() -> Iterator[None]:
 
 
 def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
-    """A common point or a separating plane of each row, to rounding."""
+    """A common point or a separating plane of each row, up to rounding."""
     out = np.empty((rows(a, b), 7))
     _rigid.witnesses(*native(a), *native(b), thread_count(threads), hit.view(np.uint8), out)
     return Witness(out[:, :3], out[:, 3:6], out[:, 6])

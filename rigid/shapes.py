@@ -103,7 +103,7 @@ class Boxes(_Batch):
         skew, row = _rigid.box_skew(rotation.reshape(-1, 9), ORTHONORMAL_TOLERANCE)
         if row < len(center):
             raise ValueError(
-                f"rotation: row {row} is off orthonormal: R^T R differs from the identity by more "
+                f"rotation: row {row} is not orthonormal: R^T R differs from the identity by more "
                 f"than {ORTHONORMAL_TOLERANCE:g}"
             )
         object.__setattr__(self, "skew", skew)
@@ -140,7 +140,7 @@ class Parallelepipeds(_Batch):
 
     Args:
         origin: A corner. Shape (N, 3).
-        edges: ``edges[n, k]`` is the k-th edge vector from it. Shape (N, 3, 3).
+        edges: ``edges[n, k]`` is the k-th edge vector from the corner. Shape (N, 3, 3).
 
     Raises:
         ValueError: wrong shapes or lengths, or an entry that is not finite (named with its row).

@@ -32,7 +32,7 @@ def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
 
 
 def rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
-    """A common point or a separating plane of each row, to rounding."""
+    """A common point or a separating plane of each row, up to rounding."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     cores = solid_distances(core_a, core_b, threads)
     # Cores that overlap have a common point. Otherwise the point is on the segment between them.

@@ -43,7 +43,7 @@ def turning_ball(triangles: int = 20_000, seed: int = 0) -> Scene:
         flute = draped * hang * (0.32 * np.cos(wave) + 0.06 * np.cos(2 * wave + ripple[1]))
         out = r * np.sin(on_ball / r) + 0.15 * hang + flute
         height = r * np.cos(on_ball / r) - hang
-        # From the flat sheet above the ball to the draped one.
+        # Interpolate between the flat sheet above the ball and the draped one.
         out = (1 - draped) * reach + draped * out
         height = (1 - draped) * (r + 0.05 + 0.01 * np.cos(5 * around) * reach) + draped * height
         swing = wound + 2.2 * wound * hang + draped * 0.9 * hang * np.sin(wave + wound)

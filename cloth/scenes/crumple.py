@@ -24,7 +24,7 @@ def crumpling(triangles: int = 20_000, seed: int = 0) -> Scene:
     phase = rng.uniform(0, 2 * np.pi, WAVES)
     drift = rng.uniform(-1.5, 1.5, WAVES)
     push = rng.standard_normal((WAVES, 3))
-    # Mean squared slope of the sum: one.
+    # Scale the sum of the waves to a mean squared slope of one.
     push /= np.linalg.norm(push, axis=1, keepdims=True) * number * np.sqrt(WAVES / 4)
 
     def positions(time: float) -> Points:

@@ -11,7 +11,7 @@ def twisting_mats(triangles: int = 20_000, seed: int = 0) -> Scene:
     """Four stacked mats with gaps between them are twisted by two turns and curled at the waist.
 
     The twist alone keeps the gaps. The curl at the waist presses the mats together, and ripples
-    that differ from mat to mat make them pass through each other. All are tested against all.
+    that differ from mat to mat make them pass through each other. Everything is tested.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi, (MATS, 2))

@@ -15,7 +15,7 @@ from tauguard.cloth.scenes.scene import (
 
 LAYERS = 3
 PLEATS = 22
-BODY_FRACTION = 0.1  # of the triangles
+BODY_FRACTION = 0.1  # fraction of the triangles that form the body
 
 
 def pleats(triangles: int = 20_000, seed: int = 0) -> Scene:

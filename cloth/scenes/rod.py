@@ -11,7 +11,7 @@ COILS = 6.0
 def twisting_rod(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A square rod is twisted about its axis; its middle buckles into a coil whose turns touch.
 
-    It is one surface, open at the ends, that is tested against itself.
+    The rod is one surface, open at both ends, and is tested against itself.
     """
     rng = np.random.default_rng(seed)
     phase = rng.uniform(0, 2 * np.pi)

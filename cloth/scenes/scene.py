@@ -30,7 +30,7 @@ class Scene:
     frames: int
 
     def steps(self, count: int | None = None) -> Iterator[tuple[Points, Points]]:
-        """Positions at both ends of each of ``count`` equal steps (``None``: of ``frames``)."""
+        """Positions at both ends of each of ``count`` equal steps (``None``: ``frames`` steps)."""
         count = self.frames if count is None else count
         end = self.positions(0.0)
         for i in range(count):

@@ -76,7 +76,7 @@ TAUGUARD_INLINE Sides sides(Float8 a, Float8 b, Float8 c, Float8 d) {
   return {above(min(a, b), max(c, d)), above(min(c, d), max(a, b))};
 }
 
-// The same with projections onto `seven_axes`.
+// As not_apart, but compares projections onto `seven_axes`.
 template <bool vf>
 TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* rows, int n,
                                        std::int32_t* left) {

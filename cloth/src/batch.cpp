@@ -19,7 +19,7 @@ TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
 // product of the largest |p|, |q| and |r|. The errors are at most
 //   u           of a difference (relative),
 //   48 u M      of a triple product: 6 terms, each with 3 u of its factors and 5 u of arithmetic,
-//   108 u M     of a mixed product, whose cross product is twice as large,
+//   108 u M     of a mixed product p . (q0 x r1 + q1 x r0), which has 12 terms,
 //   64 u M      of a coefficient (a mixed product, a triple product and sums, divided by three),
 //   162 u M     from three cuts (54 u M each; a coefficient is at most 6 M),
 //   60 u M      from evaluating the polynomial,
@@ -99,11 +99,12 @@ TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Grou
   }
 }
 
-// Decides contacts at the start of queries whose four vertices are equal on one axis, by the sides
-// of the hull's edges on which the origin is, and of those in which two vertices coincide. With u =
-// 2^-53 the relative error of a product of two differences is 3 u, and of the difference of two
-// products 4 u = 2^-51. Faces on top of each other often share lines along the axes, where
-// differences are exactly zero.
+// Decides whether features touch at the start if their four vertices have one equal coordinate, or
+// if vertices of both coincide. In the first case they touch if the origin is on one side of an
+// edge of the hull and on the other side of no edge. With u = 2^-53, the relative error is 3 u for
+// a product of two differences and 4 u = 2^-51 for the difference of two products. A side is
+// exactly 0 if both products have a zero factor, which is frequent for faces with edges along the
+// axes.
 template <bool vf, bool packed>
 TAUGUARD_INLINE void at_start(const Ends& x, const std::int32_t* rows, const std::int32_t* queries,
                               int n, AtStart* found) {
@@ -235,10 +236,10 @@ TAUGUARD_INLINE Double4 at(const Double4* b, Double4 x) {
   return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
 }
 
-// Finds the roots in (0, 1) of many cubics by Newton's method, kept within a bracket, until a step
-// is below 2^-24. The error of a root is then about 2^-40; larger errors are detected in at_roots.
-// Each lane stops by itself, so that a root does not depend on other lanes. Several groups are
-// processed together to hide the latency of divisions.
+// Finds the roots in (0, 1) of many cubics by Newton's method in a bracket. The iteration ends at a
+// step below 2^-24. The error of a root is then about 2^-40; at_roots detects larger errors. Each
+// lane ends its iteration by itself, so that a root does not depend on other lanes. Several groups
+// are processed together to hide the latency of divisions.
 constexpr int together = 4;
 TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   alignas(64) double value[5][together * width];
@@ -285,7 +286,7 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
 // * Let d = 2^-33 be the error of the time, B the largest |p|, |q|, |r|, and G the largest |g_i|
 //   near the root. Then |q|, |r| <= 2 G and |n| <= 8 G^2.
 // * Per unit of time g changes by at most 6 B, and q and r by 2 B. So a side changes by at most
-//   (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit of time, which is 2^-23.6 B G^3 in d.
+//   (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit of time, which is 2^-23.6 B G^3 for d.
 // * Rounding adds less than 2^-38 B G^3. The bound is 2^-23 B G^3.
 template <bool vf>
 TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome,

@@ -14,8 +14,8 @@ using namespace geometry;  // lanes.hpp; argument-dependent lookup does not find
 
 inline constexpr int width = 4;
 
-// `width` queries. Their differences (query.hpp) are stored query by query: most queries have no
-// root, and the others are tested piece by piece.
+// `width` queries. Their differences (query.hpp) are stored query by query, because they are read
+// only for the few queries with a root, one piece at a time.
 struct Group {
   enum Field { cubic = 0, error = 4, big = 5, scale = 6, fields = 7 };
   enum Difference { p, q, r, differences };
@@ -35,8 +35,8 @@ struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-// edge: because of rounding it is unknown whether the contact point is in the feature. unknown:
-// because of rounding the root is not certain.
+// edge: rounding leaves open whether the contact point is in the feature. unknown: rounding leaves
+// open whether there is a root.
 enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
 
 // The result of cutting the cubics of some queries once.

@@ -27,7 +27,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t*
       pair[0] = swap ? id_b : id_a;
       pair[1] = swap ? id_a : id_b;
       bool meet = true;
-      if (some) {  // the pair is written already; it stays only if the two may meet
+      if (some) {  // the pair is written already; keep it only if the features may meet
         meet = !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
         out.kept_apart += !meet;
         if (arity_a == 1) meet = meet && isolated.meet(a[0], id_b, vb[lane], vb[lanes + lane]);

@@ -1,7 +1,7 @@
-// Polynomials with dyadic coefficients, and the sign of one at a root of another, by Sturm's
-// theorem and its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic
-// Geometry", chapter 2). Nothing is rounded. A sign of zero is found algebraically, without
-// bisection down to the distance between two roots.
+// Polynomials with dyadic coefficients, and the sign of one polynomial at a root of another, by
+// Sturm's theorem and its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real
+// Algebraic Geometry", chapter 2). Nothing is rounded. A sign of zero is found algebraically,
+// without bisection down to the distance between two roots.
 #pragma once
 
 #include <vector>

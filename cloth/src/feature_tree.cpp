@@ -16,8 +16,8 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Most features that a leaf gets at a build: as many as it has slots, until update() adds features.
-// From then on a build leaves slots for features that come later.
+// Largest number of features per leaf in a build: `full` until update() first adds features, and
+// `with_room` from then on, which leaves free slots for later additions.
 constexpr std::size_t full = lanes, with_room = 13;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -291,7 +291,7 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
     if (id >= 0) placed[id] = 1;
   for (std::size_t i = 0; i < placed.size(); ++i)
     if (!placed[i]) missing.push_back(static_cast<std::int32_t>(i));
-  // Full leaves have no room: the first new features rebuild the tree with some.
+  // Full leaves have no free slots, so the first added features rebuild the tree with free slots.
   if (!missing.empty() && !std::exchange(added_, true)) return false;
 
   for (std::int32_t leaf = 0; leaf < leaves_; ++leaf)

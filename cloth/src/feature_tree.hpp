@@ -92,7 +92,8 @@ class FeatureTree {
       free_;  // free_: number of empty slots below every node
   std::vector<Mask> occupied_;
   std::vector<std::uint64_t> members_,
-      partners_;  // bits of the groups below a node and of those they may meet, modulo 64
+      partners_;  // bits (modulo 64) of the groups below a node, and of the groups that they may
+                  // meet
 };
 
 }  // namespace tauguard::cloth

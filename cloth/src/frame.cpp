@@ -140,7 +140,7 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& 
   std::atomic<std::size_t> found{0};
   const auto start = std::chrono::steady_clock::now();
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
-    const geometry::RoundToNearest guard;  // of this thread
+    const geometry::RoundToNearest guard;  // rounding mode of this thread
     geometry::Scratch<Answers> scratch;
     Answers& answers = *scratch;
     Part& part = parts[chunk];

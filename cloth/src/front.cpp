@@ -25,7 +25,7 @@ struct Total {
   }
 };
 
-// Processes one chunk: reads its part of the old cut, and writes that of the new cut if it differs.
+// Processes one chunk of the old cut, and writes a new one if the cut changes there.
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
@@ -128,7 +128,7 @@ class Walk {
   // The number of next entries that are all children of one pair, if all of them are apart; else 0.
   int apart_siblings(const NodePair* entry, const bool* meet, int n) {
     const NodePair up = parent(*entry);
-    // First children have even numbers.
+    // First children have even numbers, so an odd one cannot start a run of siblings.
     if (up.a == 0 || up.b == 0 || (2 * up.a == entry->a - 1) || (2 * up.b == entry->b - 1))
       return 0;
     NodePair child[4];

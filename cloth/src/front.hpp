@@ -1,7 +1,7 @@
 // The bounding-volume traversal tree of two feature trees (or one with itself) and its front.
 //
-// The nodes of this tree are pairs of nodes of the feature trees. To get the children of a pair,
-// both nodes are split if they have the same depth, and otherwise the node that is not a leaf. The
+// The nodes of this tree are pairs of nodes of the feature trees. Two nodes of the same depth are
+// both split to get the children of the pair; otherwise only the node that is not a leaf is. The
 // front is a cut: every pair of leaves is below exactly one entry. In coherent motion the entries
 // hardly change from step to step, so the descent starts from the last front and not from the root
 // (Li & Chen 1998; Tang et al. 2010). The overlapping pairs of leaves do not depend on the cut,

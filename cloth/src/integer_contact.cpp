@@ -128,7 +128,7 @@ class Hull {
     return first_of(times.data(), count, complete);
   }
 
-  // The first coordinate of corner i that is not always zero, with degree 2; null if there is none.
+  // The first coordinate of corner i that is not always zero, raised to degree 2; null if none is.
   const Bernstein<2>* raised(int i) {
     i %= corners_;
     for (const Bernstein<1>& x : corner_[i]) {

@@ -15,9 +15,9 @@
 namespace tauguard::cloth {
 namespace {
 
-// Whether the direction m separates the features by more than the distance at times a and b: all
-// gaps are on the same side. Rounding errors in units of |m|_1 big: u of a difference, 3 u of a dot
-// product, 6 u of the interpolation. Together they are 10 u; the bound is 16 u.
+// Whether the direction m separates the features by more than the minimum distance at times a and
+// b: all gaps are on the same side. Rounding errors in units of |m|_1 big: u of a difference, 3 u
+// of a dot product, 6 u of the interpolation. Together they are 10 u; the bound is 16 u.
 bool separated(const Query& k, Vec3 m, double a, double b) {
   const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
   const double margin = 16 * unit_roundoff * m1 * k.big +
@@ -32,13 +32,14 @@ bool separated(const Query& k, Vec3 m, double a, double b) {
   return above || below;
 }
 
-// The normal of the plane and directions in it, which separate nearly all features that are apart.
+// Whether the normal of the plane or a direction in it separates the features; it nearly always
+// does if they are apart.
 bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
   return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
          (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
 }
-// The other directions: between two vertices, and between a vertex and an edge.
+// Whether the direction between two vertices, or between a vertex and an edge, separates them.
 bool edge_direction(const Query& k, double t, double a, double b) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
   for (int i = 0; i < k.gaps; ++i) {

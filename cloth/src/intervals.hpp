@@ -1,4 +1,5 @@
-// Decides single queries by intervals of time: those left by the batch, and those with a distance.
+// Decides single queries by intervals of time, if batch.hpp does not decide them or if they have a
+// minimum distance.
 #pragma once
 
 #include <limits>

@@ -26,7 +26,7 @@ struct VolumeKind {
 };
 
 // The k / 2 axes, with components -1, 0 or 1; x, y and z are first. Throws std::invalid_argument
-// otherwise.
+// for another k.
 const std::int8_t (*axes_of(int k))[3];
 
 // Projections of the positions at both ends of the step on every axis, in float32.
@@ -34,12 +34,12 @@ const std::int8_t (*axes_of(int k))[3];
 // Coordinates are scaled into [-1, 1] by z = (x 2^a - c) 2^b, and sums of m coordinates are divided
 // by 2^(m - 1), so that all magnitudes are at most 1. The absolute error is below 2^-24:
 // * Scaling by powers of two is exact except for underflow. The error of x 2^a is at most 2^-1075,
-//   and b is at most 1000: 2^-75.
-// * The subtraction is rounded by 2^-53. With m coordinates and their sum this is 2^-52.
-// * The conversion to float32 is rounded by 2^-25.
-// Adding `pad` to the end of an interval is rounded by at most 2^-24 (1 + pad). Let m be the margin
-// on the axis for half of the minimum distance. pad = m (1 + 2^-20) + 2^-22 covers m and all
-// errors:
+//   and b is at most 1000, so the error is at most 2^-75.
+// * The rounding error of the subtraction is 2^-53. For m coordinates and their sum it is 2^-52.
+// * The rounding error of the conversion to float32 is 2^-25.
+// Adding `pad` to the end of an interval has a rounding error of at most 2^-24 (1 + pad). Let m be
+// the margin on the axis for half of the minimum distance. pad = m (1 + 2^-20) + 2^-22 covers m and
+// all errors:
 //   2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
 class Projection {
  public:

@@ -220,8 +220,8 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
     const std::size_t n = rows.shape(0);
     Projection points;
     AxisFilter axes;
-    // Projecting a vertex costs 18 ns and saves 6 ns per query. So it pays from 4 queries per
-    // vertex on.
+    // Projecting a vertex costs 18 ns and saves 6 ns per query. So projection pays from 4 queries
+    // per vertex on.
     constexpr std::size_t pays = 4;
     if (Method(method) == Method::ab2pf && min_distance == 0 && n >= pays * x_t0.shape(0)) {
       points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
@@ -287,7 +287,7 @@ NB_MODULE(_mesh, m) {
       "force_batch_kernels",
       [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,
       "For tests: narrow-phase kernels to use from now on (\"portable\", \"avx2\"); any other name "
-      "selects the fastest ones. True if they exist here.");
+      "selects the fastest ones. True if this machine can run the named ones.");
   // For tests: the overlaps of two leaves by the named variant of the kernels. The result has, for
   // each row of one leaf, the lanes of the other leaf that it overlaps, and then the number of
   // pairs that share a vertex. It is empty if the processor cannot run the variant.

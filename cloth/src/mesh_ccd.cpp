@@ -15,11 +15,11 @@ namespace {
 constexpr std::size_t chunk_pairs = 512;  // number of leaf pairs in a chunk
 // A tree is rebuilt if the sum of its leaves' extents has grown by this factor since the build.
 constexpr double worn = 2;
-// Vertices that move by more than this fraction of an edge in a step get moving volumes, on
-// average. Below it the candidates that these save cost less than their second interval (measured
+// Volumes are moving in steps in which vertices move, on average, by more than this fraction of an
+// edge. In slower steps the second interval costs more than the candidates that it saves (measured
 // on meshes of 20,000 to 90,000 triangles: equal between 0.28 and 0.34).
 constexpr double fast = 0.28;
-constexpr std::size_t sampled = 1024;  // number of edges that the average is taken over
+constexpr std::size_t sampled = 1024;  // number of edges over which the average is taken
 // Largest number of leaf pairs of a step, per collision that the limit allows.
 constexpr std::size_t leaf_pairs = 8;
 

@@ -1,5 +1,5 @@
 // Continuous collision detection of a deforming mesh with itself. Trees and fronts of the broad
-// phase are kept between steps. The narrow phase (frame.hpp) tests its candidates.
+// phase are kept between steps. The narrow phase (frame.hpp) tests the candidates.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct BroadStats {
 
 struct TopologyChange {
   std::array<std::uint64_t, 3> removed{}, added{};  // vertices, edges, faces
-  std::uint64_t rebuilt = 0;                        // trees without room for the new features
+  std::uint64_t rebuilt = 0;                        // trees without slots for the new features
 };
 
 class MeshCcd {

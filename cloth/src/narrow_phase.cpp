@@ -1,8 +1,8 @@
 // Queries are solved in batches. For most queries the coplanarity cubic has no root. For the others
 // the step is split into pieces with one root each, by Descartes' rule in Bernstein form (Vincent's
 // theorem). At each root, earliest first, a test decides whether the features touch. It takes
-// rounding and the error of the root into account. Queries that it leaves undecided go to
-// intervals.hpp. The rest is decided in exact arithmetic: integer_contact.hpp, then exact.hpp.
+// rounding and the error of the root into account. Queries that this test leaves undecided go to
+// intervals.hpp, and if they remain undecided, to integer_contact.hpp and then to exact.hpp.
 #include "narrow_phase.hpp"
 
 #include <algorithm>

@@ -23,7 +23,7 @@ TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
   return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
 }
 
-// Rows that have lanes that x, y and z do not separate.
+// Rows that overlap some lane on x, y and z, and are not compared on the other axes yet.
 struct Remaining {
   int rows[lanes], count = 0;
   TAUGUARD_INLINE void add(int row, Mask near, Mask shared, Overlaps& out) {

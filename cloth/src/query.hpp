@@ -29,7 +29,7 @@ struct Query {
   //   144 u M, and their sum adds 40 u M.
   // * A cut has 3 interpolations with 3 roundings of values up to 6 M: 54 u M. There are at most 70
   //   cuts in a row.
-  // The total is (184 + 70 * 54) u M < 2^12 u M. The scale of make() keeps underflow far below it.
+  // The total is (184 + 70 * 54) u M < 2^12 u M. make() prevents underflow by scaling.
   double cubic_error() const { return 0x1p-41 * big * big * big; }
 };
 

@@ -34,7 +34,7 @@ double largest(Flat a) { return std::max(std::fabs(a.x), std::fabs(a.y)); }
 //   8 eps M     of a cross or dot product of two differences,
 //   12 eps M    of the middle coefficient,
 //   32 eps M    of a value of the quadratic, a sum of three products with positive weights.
-// `error` is eight times the last one, 2^-45 M.
+// `error` is eight times the last error, 2^-45 M.
 double reach(const Flat (&u)[2], const Flat (&v)[2]) {
   const auto apart = [](double a, double b, double c, double d) {
     return (a > 0 && b > 0 && c > 0 && d > 0) || (a < 0 && b < 0 && c < 0 && d < 0);

@@ -1,5 +1,5 @@
-// Reuses the memory of arrays that were returned to the caller and freed: fresh pages cost more
-// time than writing the arrays.
+// Reuses the memory of arrays that were returned to the caller and freed, because fresh memory
+// pages cost more time than writing the arrays.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class SpareMemory {
         return block;
       }
     }
-    const std::size_t some = bytes + bytes / 8 + 64;  // the next frame may have a few more
+    const std::size_t some = bytes + bytes / 8 + 64;  // the next frame may need slightly more
     if (void* at = std::malloc(some)) return {at, some};
     throw std::bad_alloc();
   }
@@ -61,7 +61,7 @@ class SpareMemory {
   }
 
  private:
-  static constexpr std::size_t most = 12;  // five arrays of two kinds of collisions, two to sort
+  static constexpr std::size_t most = 12;  // 2 kinds of collisions with 5 arrays, and 2 to sort
   mutable std::mutex mutex_;
   std::vector<Block> blocks_;
 };

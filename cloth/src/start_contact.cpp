@@ -1,6 +1,6 @@
 // The features touch at a given time if the hull of their differences contains the origin
-// (exact.cpp). Pairs with the same coordinate in all four vertices are decided in two dimensions,
-// others in integers. Most pairs that touch do not come here: batch.cpp decides them.
+// (exact.cpp). Queries whose four vertices have one equal coordinate are decided in two dimensions,
+// others in integers. batch.cpp decides most features that touch, so few queries come here.
 #include "start_contact.hpp"
 
 #include <array>
@@ -20,8 +20,8 @@ constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
 
-// Decides a query whose vertices differ only in the coordinates i and j, by the sides of the hull's
-// edges on which the origin is.
+// Decides a query whose vertices differ only in the coordinates i and j. The features are apart if
+// the origin is to the left of one edge of the hull and to the right of another.
 template <bool vf>
 AtStart in_plane(const double* const* p, int i, int j) {
   constexpr int corners = vf ? 3 : 4;

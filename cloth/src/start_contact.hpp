@@ -9,9 +9,9 @@ namespace tauguard::cloth {
 
 enum class AtStart { apart, touching, unknown };
 
-// Sides of the hull of the differences in a plane (start_contact.cpp). A side joins two corners
-// with a common vertex, the first of a row; the cross product of the corners is that of the two
-// other vertices relative to the common one.
+// Sides of the hull of the differences in a plane, as rows (o, a, b) of vertices. Both corners of a
+// side are differences with the vertex o: of o and a, and of o and b. The cross product of the
+// corners is (a - o) x (b - o).
 template <bool vf>
 inline constexpr int sides_of[3][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 template <>

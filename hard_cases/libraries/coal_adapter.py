@@ -7,7 +7,7 @@ import numpy as np
 
 
 class Coal:
-    """The defaults of ``coal.collide``; faces come from SciPy's Qhull, whose errors are raised."""
+    """``coal.collide`` with its defaults. SciPy's Qhull makes the faces; its errors are raised."""
 
     name = "coal"
 
@@ -24,7 +24,7 @@ def _hull(points: Any) -> Any:
     cloud, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for point in points:
         cloud.append(np.array(point, dtype=np.float64))
-    # coal's own hull builder ends the process if Qhull fails, and Qhull fails on flat bodies.
+    # If Qhull fails (as it does on flat bodies), coal's own hull builder ends the process.
     for face in ConvexHull(points, qhull_options="Qt Pp").simplices:
         triangles.append(coal.Triangle(*map(int, face)))
     return coal.Convex(cloud, triangles)

@@ -1,4 +1,4 @@
-"""ipctk's tight-inclusion queries (Wang et al. 2021); times are not rescaled."""
+"""ipctk's tight-inclusion queries (Wang et al. 2021)."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""MuJoCo: distances of convex meshes, and its own steps, plain and speculative."""
+"""MuJoCo: distances of convex meshes, and steps with and without speculative contacts."""
 
 import contextlib
 import os
@@ -39,7 +39,7 @@ def _quiet_library() -> Iterator[None]:
 
 
 class MuJoCo:
-    """The defaults of ``mj_step`` and of ``mj_geomDistance``."""
+    """``mj_step`` and ``mj_geomDistance`` with their defaults."""
 
     name = "mujoco"
     flags = 0

@@ -48,7 +48,7 @@ class VertexTangents {
   std::vector<std::array<double, 2>> lines_;
 };
 
-// The same for a shape, by one call of its support function.
+// As VertexTangents, for a shape: one call of its support function.
 class SupportTangent {
  public:
   SupportTangent(const SupportShape& shape, const Vec3& n, const Vec3& rate, const Vec3& centre,
@@ -73,7 +73,7 @@ inline SupportTangent tangents(const SupportShape& shape, const Vec3& n, const V
 }
 
 // G and its slope at h. `offset` is what G subtracts from the separation: the radii R, the rounding
-// bound, and for shapes the required distance. `radius` is the R that is added to K.
+// bound, and for shapes the required distance. `radius` is R, which also increases K.
 template <class Body>
 class SeparationBound {
  public:

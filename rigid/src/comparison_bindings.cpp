@@ -122,7 +122,7 @@ class Volumes {
     for (std::size_t i = 0; i < pairs.shape(0); ++i)
       out.data()[i] = Volume::meet(placed_[pairs.data()[2 * i]], placed_[pairs.data()[2 * i + 1]]);
   }
-  // The numbers that describe every volume in the world.
+  // Writes the numbers that describe every volume, in the world frame.
   void write(Bounds out) const {
     for (std::size_t i = 0; i < placed_.size(); ++i)
       placed_[i].write(out.data() + Volume::numbers * i);

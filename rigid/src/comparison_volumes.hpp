@@ -40,7 +40,7 @@ struct Ball {
 };
 
 struct Obb {
-  double axis[3][3];  // rows, orthonormal to rounding
+  double axis[3][3];  // rows, orthonormal up to rounding
   double centre[3], extent[3];
   static Obb fit(const Cluster& c);
   using Relation = Frame;

@@ -4,7 +4,7 @@
 // F_i, where F_i are the facet functions of A, scaled by determinants so that nothing is divided.
 // The unknowns are the weights p_i >= 0. Each vertex b_j of B gives one row of a table:
 //   sum_i p_i F_i(b_j) < 0.
-// For a zonotope B all rows are bounded at once: a generator enters by its absolute value.
+// For a zonotope B all rows are bounded at once, by the absolute values of the generators' terms.
 // * A column that is all negative: F_i alone separates the bodies (a facet of A).
 // * A row that is all positive: the vertex b_j is in A, and no plane separates the bodies.
 // * Two columns i and k: eliminating p_k combines the rows of opposite sign and leaves an interval
@@ -19,8 +19,8 @@
 // terms is rounded up to a power of two, which also covers the rounding of E. Larger entries can
 // only prevent a separation. So a separation that is found with all entries raised by E is certain,
 // and overlap is certain if none is found with all entries lowered by E. Any other result is
-// `undecided`. So are bodies with sizes outside [1e-30, 1e30]: inside this range, products of up to
-// nine lengths neither overflow nor lose relative accuracy.
+// `undecided`. Bodies with sizes outside [1e-30, 1e30] are undecided, too: inside this range,
+// products of up to nine lengths neither overflow nor lose relative accuracy.
 #pragma once
 
 #include <algorithm>
@@ -77,8 +77,8 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
 }
 
 // The facet functions F = n . p - c of a tetrahedron, for points p relative to vertex 0. Lane i is
-// zero on the facet opposite vertex i and positive at vertex i. For this it is negated if the
-// determinant is negative; the sign is applied last, so that no entry waits for the determinant.
+// zero on the facet opposite vertex i and positive at vertex i. F is negated if the determinant is
+// negative; the sign is applied last, so that no other operation waits for the determinant.
 struct TetrahedronFacets {
   Double4 n[3], c, determinant;
   Mask4 turned;  // the sign bit, in lanes whose normal points outwards
@@ -186,7 +186,7 @@ struct Slabs {
 // generators adds 20 u b^2 a, with b the size of B; adding 6 a to the reach covers this.
 TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
   const Slabs sa(a);
-  Double4 p[3];  // one vertex of B a lane
+  Double4 p[3];  // one vertex of B per lane
   load_points(b, a.origin, p);
   const Double4 reach = abs(p[0]) + abs(p[1]) + abs(p[2]) + 3 * sa.size;
   for (int k = 0; k < 3; ++k) p[k] -= a.shift[k];

@@ -21,7 +21,7 @@
 // 3. Each edge is in at most one parallel pair, so there are at most three pairs, and tilting moves
 //    points by less than 2 tau min(sum h_A, sum h_B) in all.
 // 4. If the gaps on all other axes are below minus this length, a ball of this radius around d is
-//    in the tilted zonotope, and d is in the given one.
+//    in the tilted zonotope, and d is in the given zonotope.
 #pragma once
 
 #include "convex_abfme.hpp"

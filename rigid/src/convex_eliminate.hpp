@@ -8,8 +8,8 @@
 // Eliminating p_k, with p_k >= 0, removes entry k from all rows. Each row with a positive entry k
 // is kept, and is also combined with each row that has a negative entry k. Every row is the
 // difference of a point of B and a point of A. After s eliminations a row is redundant if it is
-// made of more than s + 1 inequalities (Chernikov 1960), or if they include those of another row
-// (Kohler 1967).
+// made of more than s + 1 inequalities (Chernikov 1960), or if these include all inequalities of
+// another row (Kohler 1967).
 //   * If a row has only positive entries, no plane exists, and the bodies share a point.
 //   * Otherwise back-substitution gives a plane, which is then checked against all vertices.
 // Let E bound the error of every entry. Combinations leave 2 E instead of 0 in the eliminated
@@ -135,7 +135,7 @@ class HullElimination {
       if (!(p.entry[k] > 4 * error_)) continue;
       Row kept = p;
       add(kept.support, k);
-      kept.entry[k] = 2 * error_;  // any value up to its own is a valid combination
+      kept.entry[k] = 2 * error_;  // valid, because it is not above the entry itself
       out.push_back(kept);
       for (const Row& q : rows) {
         if (!(q.entry[k] < 0)) continue;

@@ -34,7 +34,7 @@ TAUGUARD_INLINE bool all(Mask4 m) {
 TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) == -1; }
 #endif
-// It does not overload `all`, because Clang treats vectors of equal size as one type.
+// `all_eight` does not overload `all`, because Clang treats vectors of equal size as one type.
 TAUGUARD_INLINE bool all_eight(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)); }
 TAUGUARD_INLINE double largest(Double4 x) {
   return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));

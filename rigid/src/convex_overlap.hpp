@@ -16,8 +16,8 @@ enum class Method : int { abfme = 0, sat = 1, automatic = 2, textbook_sat = 3, e
 std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method method, int threads,
                     std::uint8_t* hit);
 
-// The same for boxes, given both as rows and as blocks of eight (BoxBlock; the last block is
-// padded). `skew` bounds |R^T R - I| over both batches.
+// As `overlap`, for boxes that are given both as rows and as blocks of eight (BoxBlock; the last
+// block is padded). `skew` bounds |R^T R - I| over both batches.
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b,
                           const void* blocks_b, double skew, std::size_t n, int threads,
                           std::uint8_t* hit);

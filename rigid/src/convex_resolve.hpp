@@ -28,8 +28,8 @@ Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d,
 double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
                        double* normal);
 
-// Writes point (3 numbers), normal (3) and offset (1), to rounding: a common point of row `row`, or
-// the unit normal (from a to b) and the offset of a separating plane. The other numbers are NaN.
+// Writes point (3 numbers), normal (3) and offset (1), up to rounding. The row has either a common
+// point or a separating plane (unit normal from a to b, offset). The other numbers are NaN.
 // `known` is the verdict on this row.
 void find_witness(const Bodies& a, const Bodies& b, std::size_t row, Verdict known, double* out);
 

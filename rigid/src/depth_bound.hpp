@@ -34,7 +34,7 @@
 
 namespace tauguard::rigid {
 
-// The bound L, with an error of at most 39 u times the size. L <= 0 says nothing.
+// The bound L, with an error of at most 39 u times the size. L <= 0 is no bound.
 template <class Polytope>
 double least_depth(const Polytope& polytope) {
   double least = INFINITY;

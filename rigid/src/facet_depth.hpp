@@ -115,7 +115,7 @@ class FacetDepth {
     return true;
   }
 
-  // How far below the top the lowest of the vertices within `slack` of the top is.
+  // The largest distance below the top, among the vertices within `slack` of the top.
   static double spread(const Points<double>& points, const Vec3& n, double slack) {
     const double top = range(points, n).high;
     double most = 0;

@@ -15,9 +15,9 @@
 namespace tauguard::rigid {
 namespace {
 
-// Limits of the number of steps; at the limit the time is still never late. The first one is for a
-// small gap that stays constant. The second one is added per radian of both rotations, because
-// bodies that pass close to each other take a few steps per radian.
+// The number of steps is limited to `most_steps`, which a small constant gap can reach, plus
+// `steps_a_radian` per radian of both rotations, because bodies that pass close to each other take
+// a few steps per radian. At the limit the time is still never late.
 constexpr int most_steps = 20000, steps_a_radian = 64;
 // spun_step is tried if the bodies rotate by more than this angle [rad] in all.
 constexpr double little_turn = 4;

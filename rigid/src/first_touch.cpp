@@ -8,8 +8,8 @@
 namespace tauguard::rigid {
 namespace {
 
-// If the radii are below this fraction of the size, the normal is not taken from the segment
-// between the cores: contacts are accurate to 1e-9 of the size, directions to 1e-3.
+// If the radii are below this fraction of the size, the normal does not give the touching features.
+// It is along the segment between the cores, whose ends are accurate to 1e-9 of the size.
 constexpr double small_radii = 1e-6;
 
 // A common point of overlapping grown bodies, on the segment between their cores.

@@ -32,8 +32,8 @@ struct ObbTree {
 };
 
 // The axes of a box are the principal axes of the second moments of its surface, which are summed
-// from the leaves up. For a leaf they come from its normal and longest edge. All corners are
-// inside.
+// from the leaves up. For a leaf they come from its normal and longest edge. A box contains
+// all corners.
 ObbTree fit_obbs(const Tree& tree);
 
 // Sets bit s if child s of `node` may meet `box`, which is in the node's frame.

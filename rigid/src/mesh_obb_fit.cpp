@@ -173,7 +173,7 @@ ObbTree fit_obbs(const Tree& tree) {
   out.nodes.resize(tree.nodes.size());
   std::vector<Moments> moments(tree.nodes.size());
   std::vector<Run> run(tree.nodes.size());
-  // Children come after their parents, so a backward pass knows every child.
+  // Children come after their parents, so a backward pass visits the children of a node first.
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     const Node& node = tree.nodes[n];
     run[n] = {std::numeric_limits<std::int32_t>::max(), 0};

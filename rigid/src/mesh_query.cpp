@@ -72,7 +72,8 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
     for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
     return;
   }
-  // No edge pierces (coplanar triangles, touching edges): the middle of the overlap of the boxes.
+  // If no edge pierces (coplanar triangles, touching edges), take the middle of both boxes'
+  // overlap.
   for (int k = 0; k < 3; ++k) {
     lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
                      std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));

@@ -16,7 +16,7 @@
 namespace tauguard::rigid {
 
 inline constexpr int width = 8;       // children of a node: one AVX register of floats
-inline constexpr int leaf_size = 4;   // most triangles in a leaf
+inline constexpr int leaf_size = 4;   // largest number of triangles in a leaf
 inline constexpr int small_leaf = 2;  // a range of at most this many triangles is not split
 
 // A child: an inner node (>= 0), or ~(8 first + count) for a leaf with the triangles

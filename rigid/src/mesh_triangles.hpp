@@ -107,7 +107,7 @@ inline bool triangles_meet(const Triangle& a, const Triangle& b) {
 
 }  // namespace exact
 
-// Signs of q's corners against p's plane. The filter is orient3d's, with the normal shared.
+// Signs of q's corners against p's plane, as orient3d, but with p's normal computed once.
 inline void plane_signs(const Triangle& p, const Triangle& q, int* sign) {
   using geometry::unit_roundoff;
   const double ux = p.v[1][0] - p.v[0][0], uy = p.v[1][1] - p.v[0][1], uz = p.v[1][2] - p.v[0][2];
@@ -127,8 +127,8 @@ inline void plane_signs(const Triangle& p, const Triangle& q, int* sign) {
   }
 }
 
-// The corner that is alone on its side of the other triangle's plane. No sign is 0, not all are
-// equal.
+// The corner that is alone on its side of the other triangle's plane. Requires that no sign is 0
+// and that two signs differ.
 inline int lonely(const int* s) { return s[0] == s[1] ? 2 : (s[0] == s[2] ? 1 : 0); }
 
 // Whether the closed triangles a and b share a point, exactly. Needs RoundToNearest.
@@ -139,7 +139,8 @@ inline bool triangles_overlap(const Triangle& a, const Triangle& b) {
   plane_signs(b, a, sa);
   if (sa[0] == sa[1] && sa[1] == sa[2] && sa[0] != 0) return false;
   if (!(sa[0] && sa[1] && sa[2] && sb[0] && sb[1] && sb[2])) return exact::triangles_meet(a, b);
-  // p is the lonely corner, q and r are the others, ordered as if both p were on the positive side.
+  // p is the lonely corner; q and r are in the order for a p on the positive side of the other
+  // plane.
   const int i = lonely(sa), j = lonely(sb);
   const double *p1 = a.v[i], *q1 = a.v[(i + 1) % 3], *r1 = a.v[(i + 2) % 3];
   const double *p2 = b.v[j], *q2 = b.v[(j + 1) % 3], *r2 = b.v[(j + 2) % 3];

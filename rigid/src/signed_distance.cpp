@@ -150,7 +150,7 @@ double power(double x, std::int64_t e) {
 
 struct ExactDistance {
   SignedDistance at;
-  int sign;  // of the distance less both radii
+  int sign;  // of the distance minus both radii
 };
 
 ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,

@@ -249,7 +249,7 @@ class TestGroups:
             ([0, 1], [[1, 1], [1]], r"meets: rows of different lengths"),
             ([0, 1], [["True", ""], ["", "True"]], r"meets: dtype <U4, expected bools"),
             ([0], [[1j]], r"meets: dtype complex128, expected bools"),
-            ([0, 1], [[1, 2], [2, 1]], r"meets: dtype int64, expected bools, or 0 and 1 alone"),
+            ([0, 1], [[1, 2], [2, 1]], r"meets: dtype int64, expected bools, or only 0 and 1"),
             ([0], [[np.nan]], r"meets: dtype float64"),
         ],
     )

@@ -42,7 +42,7 @@ def test_rotation_that_is_none(entry):
     given = boxes()
     given["rotation"][1, 0, 1] = entry
     given["rotation"][3] = 2 * np.eye(3)
-    with pytest.raises(ValueError, match=r"rotation: row 1 is off orthonormal"):
+    with pytest.raises(ValueError, match=r"rotation: row 1 is not orthonormal"):
         Boxes(**given)
 
 

@@ -14,7 +14,7 @@ struct Interrupted {};
 
 class InterruptScope {
  public:
-  // Whether a signal is pending. Set by the binding; called without the interpreter's lock.
+  // Returns whether a signal is pending; set by the binding. The caller need not hold the GIL.
   static inline bool (*ask)() = nullptr;
 
   InterruptScope() : outer_(current_) { current_ = this; }

@@ -73,8 +73,8 @@ TAUGUARD_INLINE unsigned bits(Mask4 c) {
   return unsigned(x[0] | x[1] | x[2] | x[3]);
 }
 
-// One bit for each of eight lanes. It does not overload `bits`, because Clang treats vectors of
-// equal size as one type.
+// One bit for each of eight lanes. `bits8` does not overload `bits`, because Clang treats vectors
+// of equal size as one type.
 TAUGUARD_INLINE unsigned bits8(Mask8 c) {
   const Mask8 x = c & Mask8{1, 2, 4, 8, 16, 32, 64, 128};
   std::uint64_t word[4];

@@ -27,7 +27,7 @@ namespace tauguard::geometry {
 class ThreadPool {
  public:
   // One pool per native module and process, with the largest number of threads requested so far. It
-  // is never destroyed: at exit its threads may be in a call or, after a fork, the parent's.
+  // is never destroyed: at exit its threads may be in a call or, after a fork, not exist.
   static ThreadPool& shared() {
     static std::atomic<ThreadPool*> kept{nullptr};
     ThreadPool* pool = kept.load();

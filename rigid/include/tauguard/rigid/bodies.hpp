@@ -16,7 +16,7 @@ using geometry::Vector3;
 
 enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3, polygons = 4 };
 
-// Whether bodies of this kind have any number of vertices each.
+// Whether bodies of this kind may differ in the number of vertices.
 inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
 // A tetrahedron is a row of 12 doubles (vertices), a box of 15 (centre, half extents, rotation by
@@ -84,8 +84,8 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
 }
 
 // A box or parallelepiped: all points origin + shift + sum_k u_k g_k with |u_k| <= 1. The centre is
-// kept as origin + shift, so that a large origin costs no accuracy. Errors of g and of each entry
-// of shift: at most 3 u times the edges that they are computed from.
+// kept as origin + shift, so that a large origin costs no accuracy. The errors of g and of each
+// entry of shift are at most 3 u times the edges that they are computed from.
 struct Zonotope {
   double origin[3], shift[3], g[3][3];
 };

@@ -31,7 +31,7 @@ struct Distance {
   double upper = INFINITY;   // length of the segment from on_a to on_b
   Vec3 n{};                  // unit, from a to b
   Vec3 on_a{}, on_b{};       // points of the cores
-  bool overlap = false;      // the cores share a point, to rounding
+  bool overlap = false;      // the cores share a point, up to rounding
 };
 
 // Distance of the cores at the present time of both shapes. `guess` is the first direction. The

@@ -14,14 +14,14 @@ using geometry::unit_roundoff;
 
 enum class Core : std::uint8_t { half_space, point, segment, ellipsoid, disc_prism, box, hull };
 
-// A convex core grown by `radius`, in the frame of a MuJoCo geom: axes of symmetry along z, sizes
-// are half lengths. A plane is the half-space z <= 0.
+// A convex core grown by `radius`, in the frame of a MuJoCo geom: the axis of symmetry is z, and
+// sizes are half lengths. A plane is the half-space z <= 0.
 struct Shape {
   Core core;
   double size[3];
   double radius;
   std::vector<double> x, y, z;       // the vertices of a hull, by coordinate
-  std::vector<Vec3> normals, edges;  // of a polytope that has few of them
+  std::vector<Vec3> normals, edges;  // of a polytope with few of them, else empty
 
   Vec3 support(const Vec3& d) const;  // the point of the core that is furthest along d
   double extent() const;              // bound on the distance of the core's points from the origin
