@@ -29,23 +29,23 @@ ENTRIES = [
     *((method, "k_dop18") for method in ("iccd", "dnf", "scd", "vcd", "naive", "ab2pf")),
     *((method, "auto") for method in ("iccd", "vcd")),
 ]
-#: Target of each comparator's mean frame time over ab2pf's, on the comparator's own volume.
+#: Targets of the mean ratio of frame times, comparator / ab2pf, with the comparator's own volume.
 MEANS = {"iccd": 2.3, "vcd": 1.34}
-#: The peer, and the target of its time on a frame of cloth-ball over ab2pf's.
+#: The peer, and the target of the ratio of times, peer / ab2pf, on a frame of cloth-ball.
 PEER = ("ipctk LBVH + AdditiveCCD", 10)
-#: A time is late if it exceeds ab2pf's by this, because ab2pf's may be early by this [step].
+#: A time of impact is late if it is this much [step] after that of ab2pf, which may be early by it.
 LATE = 1e-9
 RECORDED = "cloth-ball"  #: the recorded scene with a target
 
 NOTES = {
-    "frame": "all collisions of one step. volume: of the broad phase; (moving_)k_dopK has K/2 axes "
-    "and bounds the whole step (moves with it); auto takes either by the motion of the step. First "
+    "frame": "all collisions of one step. volume: bounding volume; k_dopK has K/2 axes and bounds "
+    "the whole step, moving_k_dopK has bounds at each end, and auto chooses by the motion. First "
     "each method with its published volume, then iccd and vcd with that of ab2pf. times_ab2pf: "
-    "time / time of ab2pf. missed, added: hits of ab2pf that the method lacks, and the reverse. "
-    "late: common hits whose time is more than 1e-9 after ab2pf's; late_most: by which fraction of "
-    "the step.",
-    "frame mean": "mean of times_ab2pf over the cloths of the table above, with cloth-ball.",
-    "frame peer": "the same step by ipctk: broad phase, then vf_ns, ee_ns for each candidate. "
+    "time / time of ab2pf. missed: hits of ab2pf that the method lacks; added: hits that ab2pf "
+    "lacks. late: common hits whose time is more than 1e-9 after ab2pf's; late_most: largest such "
+    "difference, as a fraction of the step.",
+    "frame mean": "mean of times_ab2pf over the cloths of the table above, including cloth-ball.",
+    "frame peer": "the same step by ipctk: broad phase, then a time per candidate (vf_ns, ee_ns). "
     "speedup: time of both phases / time of ab2pf's whole frame.",
     "listed": "hits compared with the collisions that the authors of the frames list; late as "
     "above.",
@@ -119,7 +119,7 @@ def _methods(frame: Frame, repeats: int) -> list[Row]:
 
 
 def _means(rows: Sequence[Row]) -> list[Row]:
-    """Mean ratios of each method over the cloths."""
+    """Mean ratio of times of each method over the scenes with cloth."""
     cloths = [row for row in table_rows(rows, "frame") if row["scene"] in (*CLOTHS, RECORDED)]
     means: list[Row] = []
     for method, volume in ENTRIES:
@@ -145,8 +145,8 @@ def _peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row
     """ipctk's LBVH and narrow phases on the same frame.
 
     The narrow phase is timed in its own C++ loop over up to ``limit`` candidates without contact,
-    because a hit would shorten the step for the candidates after it. That time for each candidate
-    is multiplied by their number; hits cost ipctk more. Neither side uses groups.
+    because a hit would shorten the step for the candidates after it. The time per candidate is
+    multiplied by the number of all candidates, although hits take longer. Neither side uses groups.
     """
     ipctk = shared.load_ipctk()
     if ipctk is None:
@@ -204,7 +204,7 @@ def _clear(kind: str, candidates: list[Any], found: FrameAnswer, most: int) -> l
 
 
 def _listed(data: Path) -> list[Row]:
-    """Compare every method with the listed collisions; "exact" only if it takes seconds."""
+    """Compare every method with the listed collisions; "exact" only on small meshes."""
     rows: list[Row] = []
     for name in FRAMES:
         frame = load_frame(data, name)

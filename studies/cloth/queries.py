@@ -1,9 +1,9 @@
 """Single queries: time, misses, false hits and errors in time, also for ipctk.
 
-Times are processor times of one thread and one call for the whole list, with the gathering
-of positions. ipctk is timed on candidates without contact, by ``compute_collision_free_stepsize``;
-a hit would shorten the step for the candidates after it. Its answers, and its time of a hit, are
-those of single calls from Python.
+Times are processor times of one thread. One call answers the whole list and gathers its positions.
+ipctk is timed on candidates without contact, by ``compute_collision_free_stepsize``, because a hit
+would shorten the step for the candidates after it. The results of ipctk, and its time of a hit, are
+from one call in Python per query.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from tauguard.report import Row, rate
 
 #: Number of neighbouring candidates that a peer answers in a row.
 RUN = 100
-#: Targets of a peer's time over ab2pf's for a query without contact.
+#: Targets of the ratio of times, peer / ab2pf, for a query without contact.
 ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
 EARLY = 1e-9  #: target of the largest error of a time [step]
 
 NOTES = {
     "query": "candidates of ipctk's broad phase on one frame (n of them). ns: time of a query. "
     "misses, false_hits: differences from ab2pf, whose hits on recorded frames equal the listed "
-    "ones. late: times of impact after the exact one; toi_error_most: largest error, as a "
-    "fraction of the step.",
+    "ones. late: number of times of impact after the exact one; toi_error_most: largest error of "
+    "the time, as a fraction of the step.",
     "query peer": "ns, ab2pf_ns: time of a query without contact; all_ns: time in the mix with "
     "hits. misses, false_hits and errors are of the queries asked one by one from Python; "
     "us_a_hit: time of a hit.",
@@ -66,7 +66,7 @@ class Queries(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Hits, times of impact and what the narrow phase counted."""
+    """Hits, times of impact, and counts of the narrow phase."""
 
     hit: NDArray[np.bool_]
     toi: NDArray[np.float64]
@@ -183,7 +183,7 @@ def _peers(
         setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", clear)
         call = partial(part.compute_collision_free_stepsize, mesh, *step, 0.0, method)
         ns = 1e9 * time_in_turn({"": call}, 3, process_time)[""]["median"] / len(clear)
-        # Overhead of a call from Python: time of a query without contact less its time in the loop.
+        # Overhead of a Python call: time of a query without contact minus its time in the C++ loop.
         hit_us = np.maximum(call_us[hit] - max(0.0, float(np.median(call_us[~hit])) - ns / 1e3), 0)
         all_ns = float((~hit).mean() * ns + 1e3 * hit_us.sum() / len(asked))
         real = reference.hit[asked]
@@ -208,7 +208,7 @@ def _peers(
 
 
 def _both_kinds(rows: list[Row], counts: dict[str, int]) -> list[Row]:
-    """Times per query in the broad phase's mix of kinds."""
+    """Mean times per query over both kinds, weighted by their numbers of candidates."""
     found: list[Row] = []
     for peer, own in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():
         mean = {

@@ -1,8 +1,8 @@
 """Contact checkers and MuJoCo's own contacts: recall, lead time and cost.
 
-Table ``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
-``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its start
-varies over the distance that it travels in one step. ``cost`` has a large cloth.
+Table ``scenes`` has each checker in each contact scene (:func:`tauguard.contacts.compare`). In
+table ``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. The
+ball's start varies over its travel in one step. Table ``cost`` is of a scene with a large cloth.
 """
 
 from collections.abc import Sequence
@@ -80,7 +80,7 @@ def _times(score: Score, report: Report) -> Row:
 
 
 def _crossing(speed: float, timestep: float, offsets: int) -> Row:
-    """A row on balls that fly to each impact point from evenly spaced starts."""
+    """One row: balls fly to each impact point from evenly spaced starts."""
     starts = np.arange(offsets) / offsets * speed * timestep
     flights = [
         _fly(speed, timestep, impact, float(start))

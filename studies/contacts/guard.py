@@ -1,8 +1,8 @@
 """Guarded steps on random scenes, beside plain steps, MuJoCo's own modes and fine fixed steps.
 
 The tunnelling oracle checks every scene, at one time step of 0.5 to 10 ms. Only the seed
-determines the scenes. Table ``overhead`` holds scenes in which nothing has to be
-guarded.
+determines the scenes. Table ``overhead`` has scenes without fast
+contacts.
 """
 
 import time
@@ -39,18 +39,18 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
 }
 #: Fixed steps with stiff contacts [s]; only every fourth scene tries them, because they are slow.
 FIXED, FIXED_EVERY = (5e-4, 2e-4, 1e-4, 5e-5), 4
-#: Energy is added if it exceeds the initial energy by this factor.
+#: A scene gains energy if its largest energy exceeds this factor times its initial energy.
 ADDED = 1.02
 METHODS = ("plain", "speculative", "ipc", "guarded")
 
 NOTES = {
-    "thrown": "held: nothing tunnelled; silent: tunnelling that the guard did not report; "
-    "exhausted: reported tunnelling; impact_zones: scenes with rigidly moved pairs. energy: "
-    "largest / initial energy (mocap: / that of all bodies at twice its speed); energy_above: "
-    f"scenes above {ADDED:g}; rolled_back_above: those of them with a rollback and more energy "
-    "than plain steps; rolled_back_added: largest energy added by rollbacks. Medians: over_plain: "
-    "time / time of plain steps; over_fixed: time / time of the fixed step fixed_ms, the largest "
-    "(with stiff contacts) at which nothing tunnels there and below, for one scene in four.",
+    "thrown": "numbers of scenes. held: nothing tunnelled; silent: tunnelling without a report; "
+    "exhausted: the guard reported that it may tunnel; impact_zones: pairs were moved rigidly. "
+    "energy: largest / initial energy (with a mocap body: / energy of all bodies at twice its "
+    f"speed); energy_above: energy above {ADDED:g}; rolled_back_above: the same, with a rollback "
+    "and more than in plain steps; rolled_back_added: most energy from rollbacks. Medians: "
+    "over_plain: time / time of plain steps; over_fixed: time / time of the fixed step fixed_ms, "
+    "the largest with stiff contacts such that nothing tunnels there and below (one scene in 4).",
     "overhead": "a step of a scene without fast contacts, plain and guarded.",
 }
 
@@ -79,7 +79,7 @@ class Played:
 
     @property
     def first(self) -> float | None:
-        """The largest fixed step [s] at which nothing tunnels, neither there nor at finer ones."""
+        """The largest fixed step [s] such that nothing tunnels with it or with a finer step."""
         return max((step for step, run in self.fixed.items() if run.held), default=None)
 
 
@@ -269,5 +269,5 @@ def judge(rows: Sequence[Row]) -> list[Row]:
 
 
 def table(rows: Sequence[Row]) -> list[Row]:
-    """The rows of all time steps together, and the guard's at each."""
+    """The rows over all time steps, and the guard's rows at each time step."""
     return [r for r in rows if r.get("timestep_ms", "all") == "all" or r["method"] == "guarded"]

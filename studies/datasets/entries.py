@@ -62,7 +62,7 @@ def measure(
         quick: one detector on a few episodes of one arm.
         seed: of the dataset; 0 is the dataset that is published.
         keep: folder of the dataset; it is made, or completed, there (default: a temporary one).
-        detector: a method of one's own as module:Class, beside those of the registry.
+        detector: the user's own detector as module:Class, besides those of the registry.
     """
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "dataset" if keep is None else Path(keep)
@@ -76,13 +76,13 @@ def measure(
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Found from 16 N m up, by split and detector."""
+    """Fraction of the collisions from 16 N m up that is found, by split and detector."""
     splits = groups(rows, lambda row: f"split {row['split']}")
     draw_found({k: {r["detector"]: r["from_16"] for r in own} for k, own in splits.items()}, figure)
 
 
 def configuration(quick: bool, seed: int) -> Configuration:
-    """Two hours of the dataset; other seeds draw other datasets of the same kind."""
+    """The quick configuration of the dataset (two hours), with another seed unless it is 0."""
     whole = load(NAME).quick()
     whole = replace(whole, seed=seed) if seed else whole
     if not quick:

@@ -25,11 +25,11 @@ from tauguard.models import pin_model
 from tauguard.report import Row
 
 NAME = "tauguard-collisions-v1"
-#: Parts of the work in their order; the row rates [Hz] at which the size is measured.
+#: Parts of the work, in order; rates of rows [Hz] at which a dataset's size is measured.
 PARTS, RATES = ("prepare", "targets", "steps", "labels", "observer", "writing"), (1000, 500, 100)
 NOTES = {
     "rate": "Episodes of tauguard-collisions-v1 under another seed; processor time of one core, 1 "
-    "kHz, observer and writing included. us: a sample of each part; steps include the attempts at "
+    "kHz, observer and writing included. us: each part, per sample; steps include the attempts at "
     "a collision until its severity is the one asked for. rollout: mujoco.rollout on the same "
     "scene from the same states, without drives, controller, contacts or labels; its joints differ "
     "from the motion by `rollout away` after 0.1 s.",
@@ -44,7 +44,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Where the time of a sample goes, and that of mujoco.rollout alone."""
+    """Time of each part for one sample, and of mujoco.rollout alone."""
     own = [row for row in table_rows(rows, "rate") if "steps [us]" in row]
     axes, left = figure.subplots(), np.zeros(len(own))
     names = [row["episodes"] for row in own]
@@ -89,7 +89,7 @@ def rate_rows(quick: bool, seed: int) -> list[Row]:
 
 
 def timed_parts(one: Planned) -> dict[str, float]:
-    """Processor seconds of each part and of the rollout, and samples, of one episode."""
+    """Processor time of each part and of the rollout [s], and the samples, of one episode."""
     spent = dict.fromkeys(PARTS, 0.0)
     with clock(spent, "prepare"):
         simulation = Simulation(one.episode)

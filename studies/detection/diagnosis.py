@@ -3,8 +3,8 @@
 Four methods are compared on the same alarms. ``surface``: every point of the arm's surface is a
 hypothesis. ``exposed``: the same, where nothing can reach link 1. ``usual``, the peer: the link of
 the last joint with a significant residual, and the damped least-squares force at the middle of that
-link. ``exact``: ``surface`` with the true external torque; what is wrong then is ambiguous, since
-other contacts explain the same torques.
+link. ``exact``: ``surface`` with the true external torque; the errors that remain are due to other
+contacts that explain the same torques.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ NOTES = {
     "kind": "counts: one row for each true kind, one column for each diagnosed kind. All "
     "events are simulated, also the pushes.",
     "payload": "loads that are picked up and put down, unknown to the detector. mass_error_g: "
-    "median error of those not diagnosed as a collision.",
+    "median error of the loads not diagnosed as a collision.",
     "severity": "of the collisions that raised an alarm. held: fraction whose 90 % interval "
     "contains the true value; width: median of upper / lower end; identifiable: fraction with a "
     "width of 6 or less. Impulse [N s] and peak force [N] of the window.",
@@ -86,9 +86,9 @@ Answer = tuple[int, Array, Array]
 
 @dataclass(frozen=True)
 class Judged:
-    """One event and the answers of all methods; there are none without an alarm.
+    """One event, and the answers of all methods if it raised an alarm.
 
-    Its trace is not kept: many would fill the memory.
+    The trace is not kept, because many traces would fill the memory.
     """
 
     kind: str
@@ -104,7 +104,7 @@ class Judged:
 def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of the studies that :data:`NOTES` names."""
     size = QUICK if quick else FULL
-    # Arms and streams of seeds that nothing was tuned on.
+    # No setting was tuned on these arms and seeds.
     arms = [31_000 + 100 * seed + k for k in range(size.arms)]
     trained = {arm: trained_for(seed, arm, size) for arm in arms}
     surface = link_surface(cura6.arm_xml())
@@ -128,7 +128,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def trained_for(seed: int, arm: int, size: Size) -> CollisionAlarm:
-    """The detector of one arm, trained and thresholded on motion of its own."""
+    """The detector of one arm; training and threshold use motion of this arm."""
     detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal_design())
     hours = size.calibration_hours / len(size.speeds)
     pools = (free_pool(stream(seed, CALIBRATE, 5), s, (arm,), hours) for s in size.speeds)
@@ -161,7 +161,7 @@ def answered(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Jud
 
 
 def usual(diagnoser: Diagnoser, after: PostAlarmWindow, found: Diagnosis) -> Answer:
-    """Last significant joint; damped least-squares force at the middle of its link."""
+    """The last joint with a residual; damped least-squares force at the middle of its link."""
     robot, link = diagnoser.arm.robot, max(found.last_joint, 1) - 1
     row = int(after.level.argmax())
     poses = link_poses(robot, after.q[row])
@@ -176,7 +176,7 @@ def usual(diagnoser: Diagnoser, after: PostAlarmWindow, found: Diagnosis) -> Ans
 
 
 def by_group(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
-    """All, by speed and by severity; only events that raised an alarm."""
+    """Groups of the events that raised an alarm: all, by speed, and by severity."""
     known = [j for j in contacts if j.diagnosis is not None and j.kind != "push"]
     speeds = sorted({j.speed for j in known})
     named = [("all", known)]
@@ -200,7 +200,7 @@ def _link(judged: Judged) -> int:
 
 
 def link_rows(contacts: Sequence[Judged]) -> list[Row]:
-    """How often the link is right, and how often it or a neighbour is."""
+    """How often the link is right, and how often it is right or off by one."""
     rows: list[Row] = []
     for group, some in by_group(contacts):
         for method in METHODS:
@@ -259,7 +259,7 @@ def kind_rows(judged: Sequence[Judged]) -> list[Row]:
 
 
 def payload_rows(judged: Sequence[Judged]) -> list[Row]:
-    """Payload changes that raised an alarm, those then called a collision, and the mass found."""
+    """Payload changes with an alarm, how many were called a collision, and the mass found."""
     rows = []
     changes = [j for j in judged if j.kind == "payload"]
     for mass in (None, *sorted({abs(j.mass) for j in changes})):

@@ -13,13 +13,13 @@ from tauguard.detectors.events import detection_window
 from tauguard.envs import Episode, PayloadPick, simulate
 from tauguard.traces import STRATA, Alarm, Collision, Trace
 
-#: End of the window in which a lasting contact must touch without a break [s].
+#: A clamp must touch without a break in this last part of the diagnosis's window [s].
 END = 0.03
 #: Duration of a hand's push, half a sine of force [s].
 PUSH_SECONDS = (0.6, 1.4)
 #: Severity of pushes [N m]; payloads that are picked up and put down [g], unknown to detectors.
 PUSH_STRATA, PICKED = STRATA[:4], (500.0, 1000.0, 2000.0, 3500.0)
-#: Times of one payload episode at which the load comes and goes [s].
+#: Times at which the load of a payload episode is picked up and put down; its length [s].
 UP, DOWN, LONG = 4.0, 8.0, 10.0
 
 

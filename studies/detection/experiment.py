@@ -1,8 +1,8 @@
 """The dissertation's experiment on simulated arms: detectors, speeds, operating points.
 
-Every arm differs from the nominal one within the measured magnitudes. Its detectors are trained on
+Every arm differs from the nominal arm by errors of measured magnitude. Its detectors are trained on
 its own 15 slices with the dissertation's payloads, and their thresholds come from other motion of
-that arm. They are tested on motions with other payloads, which no detector is given.
+that arm. They are tested on motions with other payloads, of which no detector is told.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +53,7 @@ SIZE = (11.0, 8.5)
 #: What the columns of each table mean.
 NOTES = {
     "speed": _JUDGED + "and specificity, of collision-free cases of 2 s; by percent of the largest "
-    "speed. threshold_a: the operating point [A]; threshold: of each arm's own, median [least, "
+    "speed. threshold_a: the operating point [A]; threshold: median over the arms [least, "
     "most]. All arms and collisions are simulated.",
     "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms per hour; "
     "alarms_per_hour: measured rate, and its hours. Delays from the touch [ms]. Columns of "
@@ -93,9 +93,9 @@ ALL = (
     "residual-thresholds",
     "current-network",
 )
-#: Rates of false alarms are the question of the part ``false_alarms``, on more arms.
+#: The part ``false_alarms`` measures rates of false alarms, on more arms.
 FULL = Size(3, ALL, Training(), 0.75, 2.0, 13, 5, conditions=True)
-#: Collision-free motion of a quick run for calibration, and the same for the test [h].
+#: Collision-free motion of a quick run for calibration; the test has as much [h].
 SIX_MINUTES = 0.095
 QUICK = Size(
     1,
@@ -120,7 +120,7 @@ CONDITIONS: dict[str, tuple[float, Conditions]] = {
 }
 #: Payloads that are picked up half-way [g]; an alarm that they raise is false.
 TAKEN_UP = (1500.0, 2500.0, 3500.0)
-#: Collisions of a stratum and hours of free motion for each condition.
+#: Collisions per stratum, and hours of free motion, for each condition.
 PER_CONDITION, HOURS = 5, 0.1
 
 
@@ -152,7 +152,7 @@ def measure(
 
 
 def _rest(found: list[Row], names: Sequence[str], more: Iterator[list[Row]]) -> list[Row]:
-    """The rows of the conditions; an error in one leaves the others."""
+    """The rows of the conditions; an error in one condition keeps the rows of the others."""
     rest: list[Row] = []
     failed: dict[str, BaseException] = {}
     for name in names:
@@ -169,7 +169,7 @@ def _fleets(
     size: Size, seed: int, arms: Sequence[int], cache: JobCache, each: Each
 ) -> dict[int, Fleet]:
     """Every arm's detectors with their alarms, from that arm's own motion."""
-    # Halves, since neighbours of the registry share their front end.
+    # Two jobs per arm: neighbours in the list share their front end, so they stay together.
     half = -(-len(size.detectors) // 2)
     halves = [own for own in (size.detectors[:half], size.detectors[half:]) if own]
     training = [(seed, arm, own, size.training) for arm in arms for own in halves]

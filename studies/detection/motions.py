@@ -33,9 +33,9 @@ SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
 #: Contact force of a tested collision [N].
 FORCES = (20.0, 200.0)
-#: Torques below the evaluated strata, for the smallest detected torque [N m], and forces [N].
+#: Strata below the evaluated ones [N m], to find the smallest detected torque; forces [N].
 FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
-#: Collisions of one test episode, and rounds of drawing again.
+#: Collisions per test episode, and largest number of rounds in which plans are drawn.
 GROUP, ROUNDS = 5, 8
 
 #: Streams of seeds: training, thresholds, test motions.
@@ -49,7 +49,7 @@ _NONE = (0.0, 0.0)
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of a pool; the defaults are those of the study's first table."""
+    """Conditions of simulated motions; the defaults are those of the study's first table."""
 
     payloads: tuple[float, ...] = PAYLOADS  #: gone through in turn [g]
     temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
@@ -88,7 +88,7 @@ class Conditions:
         return self.share * stratum[0], self.share * stratum[1]
 
     def forces(self, span: tuple[float, float]) -> tuple[float, float]:
-        """Lowest and highest peak contact force of its collisions [N]."""
+        """Lowest and highest peak contact force of this robot's collisions [N]."""
         return self.share * span[0], span[1]
 
     def simulated(self, episode: Episode) -> Trace:
@@ -187,7 +187,7 @@ def struck_pool(
 def _plans(
     rng: np.random.Generator, group: Sequence[Wish], forces: tuple[float, float]
 ) -> tuple[CollisionPlan, ...]:
-    """The usual plans with these kinds and severities instead."""
+    """The usual collision plans, but with the kinds and severities of ``group``."""
     changed = []
     for plan, (kind, stratum) in zip(collision_plans(rng, len(group)), group, strict=True):
         long = float(rng.uniform(0.4, 0.8) if kind == "clamp" else rng.uniform(0.03, 0.2))
@@ -204,7 +204,7 @@ def _stratum(collision: Collision, strata: Sequence[Stratum]) -> Stratum:
 
 
 def _counts(collision: Collision, trace: Trace, forces: tuple[float, float]) -> bool:
-    """Whether its force is in range and its detection window lies in the settled part."""
+    """Whether the force is in range, and detectors have settled before the collision's window."""
     force = float(np.linalg.norm(collision.force))
     low, high = detection_window(collision)
     return forces[0] <= force <= forces[1] and low >= BEGIN and high <= trace.t[-1]

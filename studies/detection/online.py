@@ -1,8 +1,7 @@
 """What one sample costs: simulated and detected in batch, then online, method by method.
 
 scikit-learn's ``SVR.predict`` gets the same windows as the kernel sum, one row per call. Its time
-includes only the kernel row of the support vectors, in NumPy, which is less than its own callable
-kernels compute.
+includes a kernel row that NumPy computes, which is faster than scikit-learn's callable kernels.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: Shares of the support vectors that are kept.
+#: Fractions of the support vectors that reduced sets keep.
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
-#: A controller's period at 1 kHz, and what a sample may take of it at the median [us].
+#: Period of a controller at 1 kHz, and largest wanted median time of a sample [us].
 PERIOD, GOAL = 1000.0, 100.0
 #: Methods of a quick run.
 QUICK = ("moving-thresholds", "residual-thresholds", "srq-svr")
@@ -114,7 +113,7 @@ def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
 
 
 def difference_online(alarm: CollisionAlarm, trace: Trace, score: Array) -> float:
-    """Largest difference of ``score``, (N,), from what the stream gives of the first N samples."""
+    """Largest difference between ``score``, (N,), and the online scores of N samples."""
     stream, online = alarm.stream(), np.empty_like(score)
     steps = (None, *np.diff(trace.t[: len(score)]))
     for k, dt in enumerate(steps):

@@ -36,7 +36,7 @@ NETWORK = "current-network"
 AMPERES = (1.6, 2.0)
 #: The third operating point: a rate of false alarms.
 HOURLY = "hourly"
-#: Fraction of the cases that are the tail, which is extrapolated to rarer ones.
+#: Fraction of the cases whose scores are the tail, which is extrapolated to rarer cases.
 CASE_TAIL = 0.1
 
 #: Collision-free scores by detector, one entry per episode.
@@ -52,7 +52,7 @@ class Operated:
 
     @property
     def thresholds(self) -> dict[str, float]:
-        """Alarms by operating point."""
+        """The alarm's threshold at each operating point."""
         return {point: alarm.threshold for point, alarm in self.alarms.items()}
 
     def sustained(self, trace: Trace) -> dict[str, Array]:
@@ -103,7 +103,7 @@ def expected(scores: Sequence[FreeScores], threshold: float) -> float:
 
 
 def at_fraction(scores: Sequence[FreeScores], fraction: float) -> float:
-    """The threshold that a ``fraction`` of the cases is expected to exceed, along their tail."""
+    """The threshold that a ``fraction`` of the cases is expected to exceed, by a tail model."""
     ordered = np.sort(np.concatenate([one.cases() for one in scores]))[::-1]
     return tail_level(ordered, fraction * len(ordered), max(2, round(CASE_TAIL * len(ordered))))
 
@@ -118,9 +118,9 @@ def operated(
 
     There are three points. At the first two, the network's threshold is its residual current. Every
     other detector gets the lowest threshold at which it is expected to be as specific as the
-    network at every speed, so that rows compare speed by speed. The third point has a rate of false
-    alarms over all speeds, which the normalised score spreads evenly. The first two get no higher
-    threshold than it, so at one speed a detector may be less specific than the network.
+    network at every speed, so that rows compare speed by speed. The third point is a rate of false
+    alarms over all speeds, which the normalised score spreads evenly. Its threshold bounds those of
+    the first two, so at one speed a detector may be less specific than the network.
     ``free`` is by speed [%], then by detector. Without a ``network`` there is the third point only.
     """
     found = {}
@@ -184,7 +184,7 @@ def on_free(fleet: Fleet, trace: Trace) -> Tallies:
 
 
 def on_struck(fleet: Fleet, struck: Struck) -> Tallies:
-    """Delays of the collisions that count; alarms elsewhere are judged on free motion alone."""
+    """Delays of the collisions that count; false alarms are counted on free motion only."""
     assert struck.trace.truth is not None
     true = struck.trace.truth.collisions
     counted = {one.onset: kept for one, kept in zip(true, struck.kept, strict=True)}

@@ -1,8 +1,8 @@
 """Requested and counted false alarms on fresh arms, and the collisions found.
 
 Every arm has its own detectors and thresholds from its own collision-free motion with the training
-payloads. What is counted is other motion of that arm, with payloads that were in no recording. One
-arm says little of a rate, since a bad moment returns in all of its motion.
+payloads. Alarms are counted on other motion of that arm, with payloads that were in no recording.
+One arm says little about a rate, because a bad moment returns in all of its motion.
 """
 
 from collections.abc import Iterator, Sequence
@@ -75,7 +75,7 @@ QUICK = Size(1, NAMES, (5.0, 30.0), LITTLE, 0.05, 0.03, 0)
 
 
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """Rows ``false alarms``: of every detector, rate asked for and way to choose a threshold."""
+    """Rows ``false alarms``: one per detector, wanted rate and way to choose the threshold."""
     size = QUICK if quick else FULL
     jobs = [(size, seed, 51_000 + 100 * seed + k) for k in range(size.arms)]
     with Workers() as each:
@@ -166,7 +166,7 @@ def _alarms(
         try:
             held = guaranteed_threshold(scores, per_hour).threshold
         except ValueError:
-            continue  # too little motion: the row counts it
+            continue  # too little motion for a guarantee; the row counts such arms
         yield point(GUARANTEED, per_hour), CollisionAlarm(detector, held)
 
 

@@ -21,7 +21,7 @@ from tauguard.models import cura6_drive, load_arm
 from tauguard.models.arm import NAMED
 from tauguard.report import Row
 
-#: The shipped detector, and others of which the first two read the same residual.
+#: The shipped detector, thresholds on the same residual, and thresholds on another residual.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds")
 #: False alarms per hour that the thresholds aim at.
 ASKED = 1.0
@@ -30,7 +30,7 @@ NOTES = {
     "robot": "one individual of each robot, with thresholds from its own motion for one false "
     "alarm per hour. share: largest torque limit / that of the CURA6-like arm, at most "
     "1; payloads and torques are multiplied by it. sensitivity: of collisions from 16 N m "
-    "times share up; all: from 4 N m times share up. Delays of those of `sensitivity` [ms].",
+    "times share up; all: from 4 N m times share up. Delays: collisions of `sensitivity` [ms].",
 }
 
 FULL = Size(1, NAMES, (ASKED,), Training(free=10), 0.3, 0.4, 1)
@@ -64,7 +64,7 @@ def measure(quick: bool, seed: int, robot: str | None = None, keep: str | None =
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Found of the harder collisions, by robot and detector."""
+    """Fraction of the harder collisions that is found, by robot and detector."""
     known = groups([row for row in rows if row["sensitivity"]["n"]], lambda row: row["robot"])
     panels = {k: {row["detector"]: row["sensitivity"] for row in own} for k, own in known.items()}
     draw_found(panels, figure)
@@ -94,7 +94,7 @@ def conditions(name: str, folder: Path) -> Conditions:
         described = folder / f"{Path(name).stem}.toml"
         described.write_text(f'file = {json.dumps(own)}\n[drive]\nlike = "cura6"\n')
         source = str(described)
-        load_arm(source)  # its torque limits are known
+        load_arm(source)  # raises if the torque limits are not known
     largest = float(facts.drive.torque_limit[:4].max())
     share = min(1.0, largest / float(cura6_drive().torque_limit.max()))
     return Conditions(robot=source, joints=len(facts.joints), share=share)

@@ -21,7 +21,7 @@ DISSERTATION = {
     50.0: ((59, 6, 90, 180), (59, 6, 89, 181), (56, 9, 16, 178), (58, 7, 15, 181)),
     60.0: ((59, 6, 87, 167), (59, 6, 87, 167), (59, 6, 12, 166), (59, 6, 12, 166)),
 }
-#: Detectors beside the dissertation's SVR (0) and network (1).
+#: Which method of the dissertation each detector stands beside: its SVR (0) or network (1).
 BESIDE = {"srq-svr": 0, "srq-svr-plain": 0, "current-network": 1}
 #: The lowest torque of the 65 tested collisions [N m].
 LOWEST = 4.0
@@ -64,7 +64,7 @@ def _thresholds(fleets: Sequence[Fleet], name: str, point: str) -> Row:
 
 
 def countable(tally: Tally) -> list[Outcome]:
-    """The outcomes of the 65, without the faint ones."""
+    """The outcomes of collisions from ``LOWEST`` up, without the faint ones."""
     return [outcome for outcome in tally.outcomes if outcome.collision.peak_tau >= LOWEST]
 
 
@@ -82,7 +82,7 @@ def tau98(outcomes: Sequence[Outcome]) -> float | None:
 
 
 def _figures(tally: Tally) -> Row:
-    """The headline strata, then all 65."""
+    """Counts and rates of the collisions from ``LOWEST`` up, then those from 16 N m up."""
     own = countable(tally)
     hits = sum(outcome.delay is not None for outcome in own)
     true_cases = tally.cases - tally.false_cases
@@ -123,7 +123,7 @@ def _strata(name: str, point: str, speed: float, outcomes: Sequence[Outcome]) ->
 
 
 def _dissertation(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
-    """Its confusion matrices beside ours, all 65 collisions of each cell."""
+    """The dissertation's confusion matrices beside ours, all 65 collisions of each cell."""
     found: list[Row] = []
     for k, amperes in enumerate(AMPERES):
         for name in (name for name in BESIDE if name in names):
@@ -150,9 +150,9 @@ def _dissertation(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
 def headline(found: Sequence[Row]) -> list[Row]:
     """A row per operating point and speed, from 16 N m up.
 
-    The best detector is one for all cells: the one whose smallest rate over them is largest (then
-    the largest sum). ``met`` says whether both of its rates reach 0.98 and both of SVR-SRQ's reach
-    the dissertation's SVR in that cell.
+    One detector is the best for all cells: its smallest rate over the cells is the largest (then
+    the sum of its rates). ``met`` says whether both of its rates reach 0.98 and both of SVR-SRQ's
+    reach those of the dissertation's SVR in that cell.
     """
     by_name = groups(table_rows(found, "speed"), lambda row: str(row["detector"]))
 
@@ -189,7 +189,7 @@ def _values(row: Row) -> tuple[float, float]:
 
 
 def printed(found: Sequence[Row]) -> list[Row]:
-    """What is printed, in this order: speeds are columns, the headline comes last."""
+    """The tables to print: speeds are columns, and the headline comes last."""
     compact = {"speed": _cells, "hourly": _hourly, "strata": _torques}
     shown: list[Row] = []
     for name, make in compact.items():
@@ -239,7 +239,7 @@ def _torques(own: list[Row]) -> Row:
 
 
 def _together(own: Sequence[Row]) -> str:
-    """``found/all`` of some rates."""
+    """The sum of some rates, as ``found/all``."""
     rates = [row["sensitivity"] for row in own]
     hits = sum(round((one["value"] or 0.0) * one["n"]) for one in rates)
     return f"{hits}/{sum(one['n'] for one in rates)}"

@@ -1,7 +1,7 @@
 """Slow logs: what detectors find, how soon, and their false alarms, at each sample rate.
 
 Every row is of the same arms and the same simulated motion: at the lower rates a detector is
-trained and judged on what a slower controller would have logged of it.
+trained and judged on what a slower controller would have logged.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
-    """Found and false alarms over the sample rate, with their intervals."""
+    """Fraction found and rate of false alarms over the sample rate, with intervals."""
     left, right = figure.subplots(1, 2)
     for k, name in enumerate(dict.fromkeys(row["detector"] for row in rows)):
         own = [row for row in rows if row["detector"] == name]

@@ -10,7 +10,7 @@ answer stays "free".
 
 The results of the real arms are optimistic: two settings were chosen on these logs, the
 allowances of the position check (a velocity or time stamp one sample late) and the bounds on
-torque ratios. On simulated arms only one thing was chosen: a load of training is no fault.
+torque ratios. On simulated arms only one rule was chosen: that a training load is no fault.
 """
 
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ LASTS, AFTER = 1.0, 2.5
 #: Faults that a sample and its neighbours show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {
-    "clean": "unchanged logs: seconds in the state fault, all of them false, and alarms beside "
+    "clean": "unchanged logs: seconds in the state fault, all of them wrong, and alarms beside "
     "those of `detect`.",
     "faults": "a fault of 1 s at random moments and at collisions; delays [ms] from its first "
     "sample. silent_s: time in the state free. missed: collisions within a fault during which "
@@ -47,7 +47,7 @@ NOTES = {
 
 @dataclass
 class Heard:
-    """The answers to a stretch of packets."""
+    """The monitor's answers to a sequence of packets."""
 
     spans: Spans = field(default_factory=Spans)
     reasons: list[float] = field(default_factory=list)  #: when a reason was given [s of due]
@@ -122,7 +122,7 @@ class Tally:
         self.missed += sum(not any(t <= u <= t + MISSED for u in b.other) for t in within)
 
     def row(self, arm: str, name: str) -> Row:
-        """For the table."""
+        """The fault's row of the table."""
         return {
             "study": "faults",
             "arm": arm,

@@ -40,15 +40,15 @@ def command(
 ) -> None:
     """Run a study of speed against error, or one part of it, and print what it found.
 
-    Printed are time and error of each method and what was asked; `--tables` prints every table.
+    It prints time and error of each method, and the targets; `--tables` prints every table.
 
     `tauguard bench all` runs every part of every study and writes figures and tables into a folder.
     Parts that the folder holds are not run again. `tauguard report` makes one page of the folder.
 
     Args:
         name: a study, or one part as STUDY-PART: `tauguard bench list` names them; or `all`.
-        quick: a shorter run, 60 s or less a part on 2 cores (the full one takes up to 30 minutes).
-        seed: of every random input.
+        quick: a shorter run, 60 s or less per part on 2 cores (a full run takes up to 30 minutes).
+        seed: seed of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms by name or file, separated by commas, for the parts that take any arm.
         keep: folder of the job cache. Jobs whose results it holds are not run again, unless
@@ -57,7 +57,7 @@ def command(
         tables: print every table.
         json: write the rows here as JSON.
         figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
-        out: the folder of all studies.
+        out: the folder that `all` writes into.
     """
     if name == "list":
         _print_list()
@@ -140,7 +140,7 @@ def run_part(
             raise ValueError(f"{path}: no folder {path.parent}; make it first")
     module, before = part.load(), load()
     rows, broken = _measured(module, quick, seed, options)
-    if json_path is not None:  # first: a table that fails takes no hours of work along
+    if json_path is not None:  # first, so that an error in a table loses no measurements
         incomplete = {"incomplete": str(broken)} if broken else {}
         write_json(json_path, measured(name, rows, quick, seed) | incomplete)
     every, short = printed(module, rows), brief(module, rows)

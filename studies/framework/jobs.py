@@ -74,7 +74,7 @@ class JobCache:
         """Use one folder for each seed, size and build.
 
         After a change of native code or of the study itself, use another folder: such a change is
-        not noticed.
+        not detected.
         """
         if keep is None:
             return cls(None)

@@ -41,7 +41,7 @@ DETECTIONS = (
     "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on arms.</p>"
 )
 FIGURES = (
-    "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
+    "<p>Left is fast, low is accurate. The grey line joins points that no other beats in both. "
     "Circles are tauguard's, squares are peers of the same run.</p>"
 )
 RUNS = (
@@ -76,7 +76,7 @@ def command(
         out: the folder of the page and of each part's rows (JSON) and figure.
         quick: shorter runs, all of them together five to six minutes on 2 idle cores (full ones
             take up to 30 minutes each).
-        seed: of every random input.
+        seed: seed of every random input.
         study: these studies or parts only (default: all that `tauguard bench list` names).
         bound: write the page from what the folder holds; run no study and no hard case.
         mistakes: train the detector of `tauguard demo` and record its mistakes, unless the

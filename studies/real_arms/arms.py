@@ -17,9 +17,9 @@ from tauguard.models.known_robots import PUBLISHED
 from tauguard.traces import Trace
 from tauguard.traces.resample import resampled
 
-#: Shortest beginning of a log that counts as free [s].
+#: Shortest untouched beginning of a log that is used as a collision-free log [s].
 SHORTEST = 1.2
-#: A push begins above and ends below these forces of a sensor [N]; time to the next one [s].
+#: A push begins above and ends below these forces of a sensor [N]; least time to the next [s].
 BEGINS, ENDS, APART = 4.0, 2.0, 0.3
 
 
@@ -27,8 +27,8 @@ BEGINS, ENDS, APART = 4.0, 2.0, 0.3
 class Push:
     """A hand's push."""
 
-    start: float  #: the sensor passes 4 N, or the torque leaves its course [s from the beginning]
-    peak: float  #: of the force, or of the torque; of a touch the end [s]
+    start: float  #: the sensor passes 4 N, or a torque begins to deviate [s from the log's start]
+    peak: float  #: peak of the force or torque, or end of a labelled touch [s]
     moving: bool  #: whether the pushed joints moved
     labelled: bool = False  #: by a switch on the hand, as all contacts of the log are
 
@@ -71,7 +71,7 @@ ARMS = (
     ),
     ArmData("ur5", ("free",), "ur5/contact"),
     ArmData("ur3", ("free",)),
-    # The Med 7's own file is not there.
+    # The data folder has no file of the Med 7, so the iiwa 14 stands in.
     ArmData("kuka_med7", ("",), robot="iiwa14.xml", columns="lbr", parts=3),
     ArmData("panda_touch", (), "panda_touch", robot="panda.xml", columns="franka"),
 )
@@ -171,7 +171,7 @@ def sensor_spans(t: Array, force: Array) -> list[tuple[int, int]]:
 
 
 def _by_sensor(table: np.ndarray) -> tuple[Push, ...]:
-    """The pushes above 5 N that a force sensor shows; none without one."""
+    """The pushes above 5 N that a force sensor shows; empty without a sensor."""
     if "Fx" not in (table.dtype.names or ()):
         return ()
     force = np.sqrt(sum(table[f"F{axis}"] ** 2 for axis in "xyz"))

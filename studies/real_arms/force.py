@@ -1,16 +1,15 @@
 """Forces of pushes by a detector and by a twin, compared with a force sensor.
 
-A UR5 stands and is pushed at the tool; a sensor there gives the force. Its logs without contact
-make the detector and the twin. There is one row per alarm: peak, impulse, contact time and loudest
-joint as ``detect --at-tool`` gives them, and those of the sensor in the same time: from the
-beginning of the contact, which may be before the alarm, until the alarm ends. And there is one row
-per push: the twin stands as the arm stood and is pushed with the sensor's force; its joint torques
-stand beside those that the currents show.
+A UR5 stands still and is pushed at the tool, where a sensor measures the force. Detector and twin
+come from its logs without contact. A row of table ``force`` compares one alarm with the sensor:
+peak, impulse and contact time as ``detect --at-tool`` gives them, from the beginning of the contact
+(perhaps before the alarm) to the end of the alarm. A row of ``pushed twin`` is one push: the twin
+has the arm's pose and gets the sensor's force, and its joint torques stand beside the arm's.
 
-How the sensor was mounted is not documented. Its rotation against the flange is fitted, to the
-joint torques of every second push; the row says which ones. Its lever is not: all pushes are in one
-pose, where a lever cannot be told from the drives' gains. The sensor's own error is not stated by
-its makers' log: its baseline was removed, below 2 N nothing counts as a push.
+How the sensor was mounted is not documented. Its rotation relative to the flange is fitted to the
+joint torques of every second push; rows say which. Its lever is not fitted, because in the one pose
+of all pushes it cannot be told from the drives' gains. The error of the sensor is not documented;
+its baseline was removed, and forces below 2 N do not count as a push.
 """
 
 from typing import Any
@@ -46,7 +45,7 @@ Array = NDArray[np.float64]
 ARM, LOG = "ur5", "no10_standing_force"
 #: Least force of a strong push in the medians [N].
 STRONG = 20.0
-#: Time before a push with whose currents the push is compared [s].
+#: The currents of a push are compared with those in this time before it [s].
 BEFORE = 0.1
 NOTES = {
     "force": "pushes at the tool, with --at-tool; low, high: 90 % interval; sensor: in the "
@@ -56,12 +55,12 @@ NOTES = {
     "with the largest change [N m]; missed: norm of the difference over the norm of the arm's "
     "change; fitted: the sensor's rotation was fitted to this push, so only the other rows are a "
     "test.",
-    "errors": "median of |found / sensor - 1|, and of what the pushed twin missed.",
+    "errors": "median of |found / sensor - 1|, and of `missed` of the pushed twin.",
 }
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """All rows; one that says so where the data are absent."""
+    """All rows, or one row that says that the data are absent."""
     arm = next((a for a in ARMS if a.name == ARM), None)
     if arm is None or arm not in available():
         return [{"study": "force", "log": "no logs: set TAUGUARD_DATA to their folder"}]
@@ -88,7 +87,7 @@ def sensor() -> Array:
 
 
 def _beside(t: Array, size: Array, cause: Diagnosis) -> Row | None:
-    """What a diagnosis says, beside the sensor; None where that shows no push."""
+    """A diagnosis beside the sensor's values; None if the sensor shows no push."""
     severity = cause.severity
     look = (t >= cause.since) & (t <= cause.until)
     if size[look].max() < BEGINS:
@@ -118,7 +117,7 @@ def pushed(
     force: Array,
     spans: list[tuple[int, int]],
 ) -> list[Row]:
-    """Changes of the drives' torques: of the twin, pushed with the sensor's force, and the arm."""
+    """Changes of the drives' torques in a push: of the arm, and of the twin with its force."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
 
@@ -190,7 +189,7 @@ def _medians(of: str, error: Array, force: Array) -> Row:
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Found over the sensor's peaks, with intervals."""
+    """Peak forces found over the sensor's peaks, with intervals."""
     own = [row for row in rows if row["study"] == "force"]
     truth, value, low, high = (
         np.array([row[f"{what} N"] for row in own]) for what in ("sensor", "found", "low", "high")

@@ -1,9 +1,9 @@
 """Public observers of the external torque after their papers, with one rule for thresholds.
 
 The momentum p of the arm obeys ``dp/dt = u + d``, ``u = tau + C^T qd - g``; tau is the drive torque
-less the friction of the same calibration as ours, d the external torque. Every observer has the
-bandwidth :data:`RATE`. None has thresholds: each joint's is :data:`FACTOR` times the largest value
-in the training logs, for :data:`LASTS`.
+minus friction, as tauguard's calibration gives it, and d the external torque. Every observer has
+the bandwidth :data:`RATE`. The papers give no thresholds: here a joint's is :data:`FACTOR` times
+its largest value in the training logs, and an alarm must exceed it for :data:`LASTS`.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ from tauguard.traces import Trace
 
 #: Bandwidth [1/s], threshold over the largest value in training, confirmation, settling [s].
 RATE, FACTOR, LASTS, SETTLE = 30.0, 1.5, 0.04, 0.5
-#: Sub-steps of the sliding mode, whose torque switches; slope that it may follow [N m/s].
+#: Sub-steps of the sliding mode, whose torque switches; largest slope that it follows [N m/s].
 SUBSTEPS, SLOPE = 8, 30.0
 
 
@@ -105,8 +105,8 @@ def with_thresholds(
 ) -> dict[str, Callable[[ArmModel, Trace], Bools]]:
     """Each peer with thresholds from the training logs; the arm that it judges may carry a load.
 
-    ``baseline``: values count from their mean from :data:`SETTLE` on to twice that, as of an arm
-    that stands and whose weight is not calibrated.
+    ``baseline`` subtracts the mean of each value from :data:`SETTLE` to twice :data:`SETTLE`, for a
+    standing arm whose weight is not calibrated.
     """
     traces = [trace for trace in training if trace.t[-1] - trace.t[0] > 2 * SETTLE]
     torques = [drive_torque(arm, trace) for trace in traces]

@@ -1,18 +1,17 @@
 """Real arms: false alarms and pushes found, beside public observers on the same logs.
 
-Each arm's collision-free logs are dealt into folds. Each log is watched by a detector that was
-trained on the other folds, with its load if that is known. Logs with pushes are watched by a
-detector trained on all collision-free logs. A Panda's touches are watched by a detector that was
-trained on the untouched beginnings of its other logs. An alarm finds a push if it begins between
-0.15 s before the start and the peak of the force; a touch, if it begins before the label ends; a
-push of seconds, within half a second. ``by chance`` counts what the same alarms find when all are
-shifted by a random time.
+Each arm's collision-free logs are divided into folds. A detector judges each log after training on
+the other folds, and gets the log's load if it is known. For logs with pushes a detector is trained
+on all collision-free logs. For a Panda's touches it is trained on the untouched beginnings of the
+other logs. An alarm finds a push if it begins after 0.15 s before the start and before the peak of
+the force (or the end of a labelled touch, or the first half second of a push that lasts seconds).
+``by chance`` is the number of pushes that the same alarms find after a random shift of all.
 
 Beside ours stand the observers of :mod:`studies.real_arms.observers`, with our calibration, and
 Franka's own estimate of the external torque with the thresholds of libfranka's examples.
 
-What is optimistic: the constants of the bound were chosen on the logs of UR10e, UR5, UR3 and the
-Panda. A fresh arm does a little worse.
+The results are optimistic: the constants of the bound were chosen on the logs of UR10e, UR5, UR3
+and the Panda. On a new arm they are a little worse.
 docs/notes/2026-11-24-touches.md lists what was compared.
 """
 
@@ -54,13 +53,13 @@ FRANKA = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])
 NOTES = {
     "pushes": "pushes that are found: an alarm starts between 0.15 s before the push and the "
     "peak of its force.",
-    "false alarms": "per hour of collision-free logs that training has not seen, and of the rest "
-    "of logs with touches; 95 % interval.",
+    "false alarms": "per hour of collision-free logs that training has not seen, and of the "
+    "untouched parts of logs with touches; 95 % interval.",
 }
 
 
 def table(rows: list[Row]) -> list[Row]:
-    """Pushes found with the arm's false alarms, then the rates of these of every arm."""
+    """Pushes found beside the arm's false alarms, then every arm's rate of false alarms."""
     rest = [row for row in rows if row["study"] != "pushes"]
     return [{"study": "pushes", **line} for line in detections(rows)] + rest
 
@@ -81,14 +80,14 @@ class Tally:
     chance: dict[bool, float] = field(default_factory=lambda: {True: 0.0, False: 0.0})
 
 
-#: Parts that free logs are dealt into.
+#: Number of folds of the collision-free logs.
 FOLDS = 6
 #: Arms of a quick run: most pushes, least work.
 QUICK = ("ur5", "panda_touch")
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """All rows; one that says so where the data are absent. A quick run judges no free log."""
+    """All rows, or one that says that the data are absent. A quick run judges no free log."""
     arms, rng = available(), np.random.default_rng(seed)
     found: list[Row] = []
     if not arms:
@@ -141,7 +140,7 @@ def detectors(
 
 
 def franka(one: Touched) -> dict[str, Alarms]:
-    """Franka's own estimate: with the examples' thresholds, and as the peers beside it."""
+    """Franka's own estimate, with the examples' thresholds and with those of the other peers."""
     if one.own is None:
         return {}
     own = one.own - np.median(one.own[: one.quiet], axis=0)

@@ -64,7 +64,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
 
 
 def _distances(rows: Sequence[Row]) -> Iterator[Point]:
-    """Random pairs, and hard cases, in which exact arithmetic decides (50 times as long)."""
+    """Random pairs, and hard cases, which exact arithmetic decides in 50 times the time."""
     for hard, name in ((False, "random pairs"), (True, "hard cases")):
         own = [row for row in rows if (row["outcome"] == "hard case") == hard]
         for method, time, key in (("tauguard", "distance_ns", ""), ("coal", "coal_ns", "coal_")):
@@ -72,7 +72,7 @@ def _distances(rows: Sequence[Row]) -> Iterator[Point]:
             if not known:
                 continue
             cost = 1e-3 * statistics.geometric_mean(number(row[time]) or 0.0 for row in own)
-            error = min(1.0, max(known))  # coal's may be any number
+            error = min(1.0, max(known))  # coal's error is not bounded
             wrong, of = _count([row[f"{key}wrong_sign"] for row in own])
             text = f"within {error:.0e} of the size; {wrong:,} wrong signs of {of:,}"
             axes = "microseconds a pair, geometric mean", "largest error, fraction of the size"
@@ -81,7 +81,7 @@ def _distances(rows: Sequence[Row]) -> Iterator[Point]:
 
 
 def _count(rates: Sequence[Any]) -> tuple[int, int]:
-    """How many of how many, over several rates."""
+    """The numbers of counted cases and of all cases, summed over several rates."""
     known = [rate for rate in rates if isinstance(rate, Mapping) and rate["n"]]
     return round(sum(r["value"] * r["n"] for r in known)), sum(r["n"] for r in known)
 

@@ -1,9 +1,9 @@
 """Table 2.1: elimination (ABFME) against separating axes on random convex bodies, beside coal.
 
 The "cubes" of the published table are random parallelepipeds. *Static* means one pose, *dynamic* a
-constant relative translation over t in [0, 1]. In its two dynamic collision entries, 2.58 and 1.37,
-elimination is that many times *slower* than separating axes; all other entries say how many times
-faster it is.
+constant relative translation over t in [0, 1]. The entries of the published table say how many
+times faster elimination is than separating axes, but in the two entries of dynamic collisions (2.58
+and 1.37), how many times *slower*.
 
 Textbook SAT tests all face normals, then all edge pairs. It projects every vertex, ends at the
 first separating axis, and has no error bounds. Data layout, compiler flags and loop are the same

@@ -27,7 +27,7 @@ from tauguard.report import Row, rate
 from tauguard.rigid import Impacts, MeshTree, Motion, distance, overlap, time_of_impact
 from tauguard.rigid.comparators import ComparedTree
 
-#: Number of pairs of each outcome on which advancement over coal's distance is run.
+#: Number of pairs of each outcome for which advancement with coal's distance is run.
 ADVANCED = 16
 #: Of rounded shapes, coal takes only spheres and capsules beside a mesh.
 BODIES = ("spheres", "capsules", "tetrahedra", "boxes")
@@ -41,14 +41,14 @@ NOTES = {
     "not_touching: pairs apart 1e-7 after it, by the exact query. met_before: pairs that meet "
     "before by coal's distance; distance_at_toi: coal's distance at the time found [m].",
     "mesh and convex": "one mesh and convex bodies, us per body, coal's with its Python call; "
-    "coal_differs_most: largest difference of distances, pairs apart [m].",
+    "coal_differs_most: largest difference of the distances of separate pairs [m].",
     "mesh and convex in motion": "as table 2.2 dynamic; the body moves.",
 }
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh with the name its rows carry."""
+    """A triangle mesh, and its name in the rows."""
 
     name: str
     vertices: Array

@@ -30,7 +30,7 @@ NOTES = {
     "before the time found by coal's distance; distance_at_toi: coal's largest distance at that "
     "time [m]; coal_disagrees: hits that differ (coal's advancement stops at 1e-6 m).",
 }
-#: Pairs of a call whose time is measured.
+#: Least number of pairs in a timed call.
 LEAST = 500
 
 

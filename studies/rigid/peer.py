@@ -47,8 +47,8 @@ def times(
 ) -> dict[str, dict[str, float] | None]:
     """Processor time of a pair that touches and of one that does not [us].
 
-    Fewer pairs than ``least`` are asked several times in one call: otherwise their time would be
-    that of the call.
+    Fewer pairs than ``least`` are repeated within one call, so that the overhead of a call does not
+    dominate their time.
     """
     found = {name: index for name, index in outcomes(toi).items() if len(index)}
     chosen = {name: np.resize(index, max(len(index), least)) for name, index in found.items()}
@@ -72,7 +72,7 @@ def motion_columns(
         distance: coal's distance function of the same pairs.
         lever: sum of both bodies' largest distances from the origins of their frames [m].
         most: advance only this many pairs of each outcome (default: all).
-        least: pairs of a call whose time is measured.
+        least: least number of pairs in a timed call.
     """
     every = np.arange(distance.n)
     found = call(every)

@@ -19,7 +19,7 @@ from tauguard.envs.adapters.reactions import REACTIONS
 from tauguard.models import body_region
 from tauguard.report import Row, rate
 
-#: Copies of the vector environments.
+#: Number of copies in a vector environment.
 COPIES = 16
 #: The peers of one environment: MuJoCo's rollout with given forces, and a bare loop with the
 #: drives.
@@ -32,7 +32,7 @@ NOTES = {
     "Each row below the environment changes one option of it.",
     "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
     "alone: physics without drives, observations or rewards; q_difference_rad: of its copies from "
-    "mj_step of one. Means little on a loaded machine.",
+    "mj_step of one. Times on a loaded machine mean little.",
     "reaction": "swings into the chest, median [least, most]. false_alarms: swings with an alarm "
     "before the contact, which are left out of the rest. delay_s: from the contact to the "
     "reaction; stopping_distance_m, end_m: distance of the tool from the first contact; "
@@ -52,7 +52,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def judge(rows: list[Row]) -> list[Row]:
-    """What an environment must show, beside what was measured."""
+    """The targets of an environment beside the measured values."""
     step = {row["what"]: row for row in table_rows(rows, "step")}
     vector = {row["what"]: row for row in table_rows(rows, "vector")}
     swings = table_rows(rows, "reaction")
@@ -183,7 +183,7 @@ def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """What a step costs, what many cost, and force over speed for each reaction."""
+    """Time of an action, rate of many environments, and force over speed for each reaction."""
     top, vector, plain, detected = figure.subplots(2, 2).ravel()
     for axes, study, key, label in (
         (top, "step", "us_per_action", "microseconds an action"),

@@ -54,7 +54,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Found without each part, in the whole simulation and as believed."""
+    """Fraction found without each part, judged in the whole and in the poorer simulation."""
     judged = {"in the whole simulation": "from_16", "in the poorer one": "believed_from_16"}
     own = {k: {row["left out"]: row[key] for row in rows} for k, key in judged.items()}
     draw_found(own, figure)
@@ -104,7 +104,7 @@ def judged_without(job: tuple[Episodes, Episodes, str]) -> dict[str, Any]:
 
 @functools.lru_cache(1)
 def whole_recordings(judging: Episodes) -> list[Trace]:
-    """Recordings of the whole simulation, made once a process for all the parts."""
+    """Recordings of the whole simulation, made once per process for all the parts."""
     return recordings(judging, "nothing")
 
 

@@ -30,7 +30,7 @@ REFERENCE = 1e-4
 NOTES = {
     "cost": "wall time of a step of 1 ms along one motion, one thread, median [least, most]. The "
     "peer is MuJoCo's own rollout of the bare arm, given the motion's torques; each other row is "
-    "the arm under position control with what it names. Composing the scene is not in it.",
+    "the arm under position control with the named things. Composing the scene is not timed.",
     "timestep": "largest joint error of the whole drive along one motion, every 2 ms, relative "
     "to the same simulation at 0.1 ms. It compares time steps, not the simulation with a real "
     "arm.",
