@@ -1,4 +1,4 @@
-// Thrown if a result exceeds the caller's limit.
+// Exception for a result that exceeds the caller's limit.
 #pragma once
 
 #include <stdexcept>
@@ -8,9 +8,8 @@ namespace tauguard::cloth {
 
 struct TooMany : std::invalid_argument {
   TooMany(const std::string& what, std::size_t limit)
-      : std::invalid_argument(
-            "limit: more than " + std::to_string(limit) + " " + what +
-            " in this step; a larger limit= allows them, at some 300 bytes each") {}
+      : std::invalid_argument("limit: more than " + std::to_string(limit) + " " + what +
+                              " in this step; a larger limit= allows them and takes more memory") {}
 };
 
 }  // namespace tauguard::cloth

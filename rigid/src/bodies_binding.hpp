@@ -20,7 +20,7 @@ using Poses = nanobind::ndarray<const double, nanobind::shape<-1, 4, 4>, nanobin
 using Vectors = nanobind::ndarray<const double, nanobind::shape<-1, 3>, nanobind::c_contig,
                                   nanobind::device::cpu>;
 
-// Rows of time of impact, point, normal.
+// One row per pair: time of impact, point, normal.
 using Touches =
     nanobind::ndarray<double, nanobind::shape<-1, 7>, nanobind::c_contig, nanobind::device::cpu>;
 

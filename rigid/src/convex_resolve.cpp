@@ -11,7 +11,7 @@ namespace tauguard::rigid {
 
 namespace {
 
-// numerator / denominator to about 50 bits, for any exponents.
+// numerator / denominator with a precision of about 50 bits, for any exponents.
 double quotient(const Dyadic& numerator, const Dyadic& denominator) {
   if (numerator.is_zero()) return 0.0;
   const auto n = numerator.floor_log2(), d = denominator.floor_log2();

@@ -21,7 +21,7 @@ struct Chunk {
   const double* d;
   std::size_t begin, end;
   std::uint8_t* hit;
-  double* out;  // rows of time of impact, point, normal
+  double* out;  // one row per pair: time of impact, point, normal
   bool points;  // find contact points
 };
 

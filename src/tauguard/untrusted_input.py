@@ -59,7 +59,7 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
     with open(path, "rb") as stream:
         data = stream.read(most + 1)
     if len(data) > most:
-        raise ValueError(f"{path}: more than {most >> 20} MiB, no such text file is expected")
+        raise ValueError(f"{path}: more than {most >> 20} MiB; expected a smaller text file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -63,7 +63,7 @@ class Outcome:
     exhausted: bool
     impact_zones: bool
     rolled_back: bool  #: the guard rolled back a step
-    energy: float  #: largest energy, as a multiple of the scene's unit
+    energy: float  #: largest energy, as a multiple of the initial energy (see NOTES)
     seconds: float  #: processor time of the steps alone
     calls: float  #: calls of ``mj_step`` per step
     added: float = 0.0  #: largest sum of energies that rollbacks added; 0 with actuators

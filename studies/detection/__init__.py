@@ -17,7 +17,7 @@ STUDY = Study(
         ),
         "false_alarms": Part(
             "detection.rates",
-            "false alarms asked for and counted on six fresh arms, also with a guarantee",
+            "requested and counted false alarms on six fresh arms, also with a guarantee",
             ("keep",),
             alias="false_alarms",
         ),

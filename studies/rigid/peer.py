@@ -35,7 +35,7 @@ def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], 
 
 
 def outcomes(toi: Array) -> dict[str, NDArray[np.intp]]:
-    """The rows that touch during the step, and the rows that stay apart."""
+    """The rows that touch after the start of the step, and the rows that stay apart."""
     return {
         "hit": np.flatnonzero(np.isfinite(toi) & (toi > 0)),
         "miss": np.flatnonzero(np.isinf(toi)),

@@ -87,7 +87,7 @@ def command(
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
-        raise ValueError("--quiet and --gains cannot be combined with --model, which has its own")
+        raise ValueError("--quiet and --gains cannot be combined with --model (trained already)")
     robot = bodies_file(robot)
     read = read_one(log, columns, torque, reading)
     print_notes(read.notes)
@@ -119,8 +119,8 @@ def refuse_touched(log: Path, read: Log, quiet: float) -> None:
     if early:
         raise ValueError(
             f"{log}: a column labels a contact {early[0]:.2f} s after the beginning, within the "
-            f"first {quiet:g} s (--quiet) that are learned from; give a shorter --quiet, or a "
-            "--model"
+            f"first {quiet:g} s (--quiet), on which the detector is trained; give a "
+            "shorter --quiet, or a --model"
         )
 
 
@@ -197,7 +197,7 @@ def explained(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Diagnosis of each alarm, and notes; torques only if the robot file has no chain of links."""
+    """Diagnosis of each alarm and notes; without a chain of links in the file, only torques."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
@@ -217,9 +217,9 @@ def explained(
     notes: tuple[str, ...] = ()
     if sticks:
         notes = (
-            f"{robot.name}: no shape found of {', '.join(sticks)}, taken as thin capsules "
-            "for link and force; with its meshes in or above the file's folder they are "
-            "better",
+            f"{robot.name}: no shape found of {', '.join(sticks)}: thin capsules stand in "
+            "for them to find link and force. Put the meshes into the file's folder or a "
+            "folder above it for better results",
         )
     found_causes = Diagnoser.of(detector.arm, surface, at_tool, load_known).diagnose(trace, alarms)
     return [cause(one) for one in found_causes], notes
@@ -317,7 +317,7 @@ def report(result: dict[str, Any]) -> None:
         print(f"{text}\n{labels_text(labels, since)}")
         return
     most = rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
-    print(f"{text}; where nothing touched the arm, each is a false one{most}")
+    print(f"{text}; if nothing touched the arm, each is a false alarm{most}")
 
 
 def leave(

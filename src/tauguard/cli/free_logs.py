@@ -90,11 +90,11 @@ def free_arm(
 def free_detector(
     arm: ArmModel, recordings: Mapping[str, Recording], accept: Collection[str] | None = None
 ) -> FittedFreeMotion:
-    """The detector of free motion that some logs teach.
+    """Train the detector of free motion on logs.
 
     Args:
-        arm: of :func:`free_arm`.
-        recordings: by file name.
+        arm: arm model of :func:`free_arm`.
+        recordings: the logs, by file name.
         accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
@@ -122,13 +122,13 @@ def explain(
     """Print notes on torque that a calibration does not explain, and return them.
 
     Args:
-        arm: identified.
-        recordings: by file name.
-        held: held-out residual of each [N m], (n,) each; empty: not known.
+        arm: the identified arm model.
+        recordings: the logs, by file name.
+        held: residual of each log in cross-validation [N m], shape (n,); empty if not known.
         accept: names of checks and logs to accept; None: the command has no such flag.
 
     Raises:
-        ValueError: the model explains too little torque, or torque has bursts as of contacts.
+        ValueError: the model explains too little torque, or torque has bursts like a contact's.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.real_arms import calibration_notes

@@ -24,7 +24,7 @@ def command(
             tauguard-collisions-v1, cura6-twin.
         out: folder of the dataset, new, empty or with a part of this dataset.
         workers: processes (default: all processors).
-        ray: address of a Ray cluster to use instead; "local" starts one on this machine.
+        ray: address of a Ray cluster that simulates instead; "local" starts one on this machine.
         quick: simulate only the first episodes of every split; the configuration states how many.
     """
     import time

@@ -33,7 +33,7 @@ def command(
         figure: draw the report here (PNG).
         episode: simulate this episode, SPLIT/NUMBER (from 0), again from its line in the manifest,
             and compare its bytes.
-        mcap: with --episode, write it here as a recording with obstacles, for `tauguard replay`.
+        mcap: with --episode, write the episode here, with obstacles, for `tauguard replay`.
         robot: with --episode, the robot file of an arm that is not in the package. The dataset
             contains only the file's hash and the parameters for training, not the shapes.
     """
@@ -117,7 +117,7 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     for leak in report["leaks"]:
         lines.append(f"LEAK: {leak}")
     if not report["leaks"]:
-        lines.append("splits share no motion, and nothing that they call unseen")
+        lines.append("splits share no motion, and nothing declared unseen is in the first split")
     if damaged is None:
         lines.append("files not checked (--verify reads every byte)")
     elif damaged:

@@ -30,7 +30,7 @@ def command(
             FIRST..LAST.
         download: download a missing model through mujoco-menagerie.
         json: write the description as JSON.
-        try_: run episodes of every environment with the arm. Reported are initial contacts, the
+        try_: run episodes of every environment with the arm, and print initial contacts, the
             largest force and its bound, divergences, and tasks in which an arm at rest succeeds.
             The exit code is 1 if something is wrong.
         episodes: with --try, number of episodes of each environment.

@@ -71,7 +71,7 @@ def command(
     expect("--workers", 1 if workers is None else workers, 1)
     expect("--mismatch-seed", mismatch_seed or 0, 0)
     if not speeds or payloads_g == ():
-        raise ValueError("--speeds and --payloads-g: expected a number or more after each")
+        raise ValueError("--speeds and --payloads-g: expected at least one number after each")
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     if payloads_g is None:
         scale = torque_scale(robot)

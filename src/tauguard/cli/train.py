@@ -41,12 +41,12 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    --traces: it is trained on labelled recordings, some of them with collisions. The threshold
+    With --traces, it is trained on labelled recordings, some of them with collisions. The threshold
     comes from the collision-free recordings, each scored by a detector that was trained without it.
-    With --calibration the threshold guarantees a rate of false alarms on motion like that in the
-    folder. --free and --robot: it is trained on logs in which nothing touched a real arm, with at
-    least 10 s of motion, better two minutes. A printed card then states the torques and forces that
-    the detector can find, and the kinds of motion that the logs lack.
+    With --calibration, the threshold guarantees a rate of false alarms on motion like that in the
+    folder. With --free and --robot, the detector is trained on logs in which nothing touched a real
+    arm, with at least 10 s of motion, better two minutes. A printed card then states the torques
+    and forces that it can find, and the kinds of motion that the logs lack.
 
     Args:
         traces: folder of MCAP recordings with truth, as from `tauguard simulate`, or a dataset
@@ -73,7 +73,7 @@ def command(
         card: with --free, draw the card here (PNG).
         accept: with --free, names of logs to keep even if they stand out, and of checks that may
             fail. alarms: more alarms in cross-validation than --false-alarms-per-hour, or bursts
-            of torque as of contacts. error: the residual exceeds its bounds half of the time.
+            of torque like a contact's. error: the residual exceeds its bounds half of the time.
             gravity: the gravity torques differ from those of the robot file. order: two joints'
             columns seem exchanged.
         arm: for a dataset with several arms, the arm of the detector.
@@ -90,7 +90,7 @@ def command(
     if twin is not None:
         given = [robot, calibration, confidence, card, gains, payload, accept, arm]
         if not free or any(given):
-            raise ValueError("--twin goes with --free, --columns, --detector, --torque alone")
+            raise ValueError("--twin goes with --free, --columns, --detector, --torque only")
         from tauguard.cli.train_twin import twin_contacts
 
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour

@@ -86,7 +86,7 @@ def twin_contacts(
 
 
 def contacts(twin: Path) -> list[Trace]:
-    """Simulated runs of individuals of the twin, with contacts of all kinds."""
+    """Simulated episodes with all kinds of contacts, each with other model errors of the twin."""
     import numpy as np
 
     from tauguard.datasets import struck_episodes

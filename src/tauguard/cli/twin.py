@@ -161,7 +161,7 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
 def _made_of_each(
     given: FreeLogs, groups: list[list[Recording]], limit: Array
 ) -> tuple[list[Twin], list[str]]:
-    """As :func:`made` from each group of logs, and why some groups make none, each reason once."""
+    """A twin from each group of logs, and the different reasons why some groups give none."""
     found, reasons = [], list[str]()
     for used in groups:
         try:
@@ -178,7 +178,7 @@ def _unloaded(recording: Recording) -> bool:
 def report(
     joints: tuple[str, ...], likeness: Likeness | None, logs: list[str], reasons: list[str]
 ) -> list[dict[str, Any]]:
-    """Print how like the twin is, or the reasons why that is not known; rows, ready for JSON."""
+    """Print how similar twin and arm are, or why that is not known; return rows for JSON."""
     from tauguard.report import table
 
     if likeness is None:

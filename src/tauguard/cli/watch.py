@@ -27,9 +27,9 @@ def command(
     """Run an environment and show scene, forces, limits and detector live.
 
     Args:
-        environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
-        policy: target (straight to the target, Cartesian control), random, still, or a file of
-            examples/learn.py, which contains the keywords of its training.
+        environment: an environment, such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
+        policy: target (straight to the target, Cartesian control), random, still, or a file that
+            examples/learn.py wrote; the file contains the keywords of its training.
         seconds: simulated time, over one or more episodes.
         seed: seed of the first episode.
         set: keywords of the environment, NAME=VALUE each, as in --set detector=observer.

@@ -23,7 +23,7 @@ Nearest nearest(const PointList& a, const PointList& b);
 Vec3 middle_point(const PointList& a, const PointList& b);
 
 // Writes the unit direction from a to b along which the hulls are furthest apart, and the
-// separation along it. False if they meet.
+// separation along it. Returns false if the hulls meet.
 bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation);
 
 struct Distance {
