@@ -1,4 +1,4 @@
-"""Pleated ruffles around a body that sways and turns, as a dancer's dress."""
+"""Pleated ruffles around a body that sways and turns, like a dancer's dress."""
 
 import numpy as np
 

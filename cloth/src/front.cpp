@@ -9,8 +9,8 @@
 namespace tauguard::cloth {
 namespace {
 
-// Numbers of front entries in a chunk. An entry of the last front takes about one test; an entry of
-// the first cut takes a whole descent.
+// Numbers of entries in a chunk: of the last front, with about one test per entry, and of the first
+// cut, with a whole descent per entry.
 constexpr std::size_t kept_grain = 1024, root_grain = 16;
 constexpr int first_depth = 5;  // the first cut has all pairs of this depth
 

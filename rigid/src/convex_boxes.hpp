@@ -10,7 +10,7 @@
 //   5 u |d|                    of t,
 //   24 u |d| + 24 u sum h      of the gap of an edge pair,
 //   36 u |d| + 12 u sum h      of the gap of a facet of B.
-// 64 u w covers the last two. The boxes are those of the given rotations R. The formulas assume
+// 64 u w covers the last two. The boxes have exactly the given rotations R. The formulas assume
 // R^T R = I; entries that differ from I by at most `skew` change a gap by at most 16 skew w.
 //
 // The boxes overlap if the offset d is on the inner side of every facet of the zonotope A - B. The

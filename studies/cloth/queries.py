@@ -31,7 +31,7 @@ from tauguard.report import Row, rate
 RUN = 100
 #: Targets of the ratio of times, peer / ab2pf, for a query without contact.
 ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
-EARLY = 1e-9  #: target of the largest error of a time [step]
+EARLY = 1e-9  #: target of the largest error of a time of impact [step]
 
 NOTES = {
     "query": "candidates of ipctk's broad phase on one frame (n of them). ns: time of a query. "

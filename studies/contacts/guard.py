@@ -74,7 +74,7 @@ class Played:
     """One scene with every method."""
 
     timestep: float  #: time step of every method except the fixed steps [s]
-    runs: dict[str, Outcome]  #: by method
+    runs: dict[str, Outcome]  #: outcome of each method
     fixed: dict[float, Outcome]  #: outcomes by fixed step [s]; empty if none was tried
 
     @property

@@ -49,7 +49,7 @@ class Entry:
 
     detector: str
     arm: str
-    seconds: float  #: of training
+    seconds: float  #: training time [s]
     splits: tuple[tuple[str, tuple[Matching, ...]], ...]
 
 

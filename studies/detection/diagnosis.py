@@ -70,10 +70,10 @@ class Size:
     arms: int
     speeds: tuple[float, ...]
     training: Training
-    calibration_hours: float  #: of each arm, for the threshold
-    per_stratum: int  #: collisions of a stratum at one speed
-    pushes: int  #: episodes of five pushes at one speed
-    payloads: int  #: episodes with one payload up and down at one speed
+    calibration_hours: float  #: motion per arm from which the threshold is set
+    per_stratum: int  #: collisions per stratum and speed
+    pushes: int  #: episodes per speed, with five pushes each
+    payloads: int  #: episodes per speed in which a payload is picked up and put down
 
 
 FULL = Size(3, SPEEDS, Training(slices=3), 0.3, 13, 3, 8)
@@ -92,11 +92,11 @@ class Judged:
     """
 
     kind: str
-    speed: float  #: percent
+    speed: float  #: joint speed [% of the maximum]
     collision: Collision | None
-    mass: float  #: [kg]
+    mass: float  #: change of the payload [kg]; 0 for a contact
     diagnosis: Diagnosis | None
-    links: dict[str, int]  #: said by each method, 1-based, 0: none
+    links: dict[str, int]  #: link that each method names, 1-based; 0: none
     errors: dict[str, ContactErrors]
     severity: TrueSeverity | None = None
 

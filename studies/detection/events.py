@@ -27,13 +27,13 @@ UP, DOWN, LONG = 4.0, 8.0, 10.0
 class Event:
     """One event and the alarm that it raised, if any."""
 
-    arm: int  #: mismatch seed
-    speed: float  #: percent
-    kind: str  #: of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
+    arm: int  #: seed of the arm's model errors
+    speed: float  #: joint speed [% of the maximum]
+    kind: str  #: one of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
     trace: Trace
     alarm: Alarm | None
     collision: Collision | None  #: None for a payload change
-    mass: float = 0.0  #: of a payload change [kg]
+    mass: float = 0.0  #: change of the payload [kg]
 
 
 def struck_events(

@@ -74,15 +74,15 @@ NOTES = {
 class Size:
     """Amount of simulated motion."""
 
-    arms: int  #: judged, each with its own detectors
+    arms: int  #: number of arms, each with its own detectors
     detectors: tuple[str, ...]
     training: Training
-    calibration_hours: float  #: collision-free, for the thresholds, of each arm
-    hours: float  #: collision-free, judged, all speeds and arms together
-    per_stratum: int  #: judged collisions of a stratum at one speed
-    faint: int  #: the same below the judged strata
+    calibration_hours: float  #: collision-free motion per arm from which thresholds are set
+    hours: float  #: collision-free test motion, all speeds and arms together
+    per_stratum: int  #: test collisions per stratum and speed
+    faint: int  #: test collisions per faint stratum and speed
     target: float = 0.25  #: false alarms per hour that the third threshold aims at
-    conditions: bool = False  #: also what training did not have
+    conditions: bool = False  #: whether conditions that training lacks are tested, too
 
 
 #: Detectors with the same front end are neighbours, so that it runs once for all of them.

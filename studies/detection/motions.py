@@ -51,12 +51,12 @@ _NONE = (0.0, 0.0)
 class Conditions:
     """Conditions of simulated motions; the defaults are those of the study's first table."""
 
-    payloads: tuple[float, ...] = PAYLOADS  #: gone through in turn [g]
-    temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
-    scale: float = 1.0  #: of the mismatch between the arm and what is believed of it
-    robot: str = "cura6"  #: a name or a file
-    joints: int = 6  #: of the robot
-    share: float = 1.0  #: of the payloads, torques and least forces that are for the CURA6-like arm
+    payloads: tuple[float, ...] = PAYLOADS  #: payloads of the episodes, in turn [g]
+    temperature: float | None = None  #: temperature of the gears [degC]; None: drawn from 25 to 45
+    scale: float = 1.0  #: factor on the model errors of the arm
+    robot: str = "cura6"  #: name or file of the robot
+    joints: int = 6  #: number of joints
+    share: float = 1.0  #: factor on payloads, torques and least forces of the CURA6-like arm
 
     def arm(self, seed: int) -> Mismatch:
         """The arm ``seed`` under these conditions."""
@@ -100,10 +100,10 @@ class Conditions:
 class Training:
     """Amount of training data of one arm's detectors."""
 
-    slices: int = 15  #: with collisions, through the dissertation's payloads
-    collisions: int = 5  #: a slice
-    free: int = 20  #: collision-free slices
-    free_seconds: float = 40.0  #: of each
+    slices: int = 15  #: slices with collisions, over the dissertation's payloads
+    collisions: int = 5  #: collisions per slice
+    free: int = 20  #: number of collision-free slices
+    free_seconds: float = 40.0  #: duration of a collision-free slice [s]
 
     def traces(self, seed: int, arm: int, under: Conditions = Conditions()) -> list[Trace]:
         """The slices of one arm."""
@@ -123,7 +123,7 @@ def stream(seed: int, *key: int) -> int:
 class Struck:
     """One test episode with collisions."""
 
-    arm: int  #: mismatch seed
+    arm: int  #: seed of the arm's model errors
     trace: Trace
     kept: tuple[bool, ...]  #: which of the trace's collisions count, in their order
 

@@ -53,12 +53,12 @@ NOTES = {
 class Extent:
     """How much is trained on and timed."""
 
-    slices: int  #: with collisions
-    free: int  #: collision-free
-    samples: int  #: timed
+    slices: int  #: training slices with collisions
+    free: int  #: training slices without collisions
+    samples: int  #: number of timed samples
     single: int  #: rows that scikit-learn predicts, one per call
-    seconds: float  #: of motion from scene to alarm
-    repeats: int  #: of it
+    seconds: float  #: duration of the motion that is timed from scene to alarm [s]
+    repeats: int  #: how often this motion is timed
 
 
 def motions(extent: Extent, seed: int) -> tuple[list[Trace], Trace]:

@@ -56,9 +56,9 @@ class Operated:
         return {point: alarm.threshold for point, alarm in self.alarms.items()}
 
     def sustained(self, trace: Trace) -> dict[str, Array]:
-        """Scores as every point's alarm compares them, (T,); -inf until all have settled."""
+        """The score that each point's alarm compares with its threshold, (T,); -inf at first."""
         score, early = self.detector.scores(trace), trace.t - trace.t[0] < BEGIN
-        known: dict[int, Array] = {}  # points differ in their thresholds, seldom in the score
+        known: dict[int, Array] = {}  # most points have the same score
         for alarm in self.alarms.values():
             if id(alarm.normalisation) not in known:
                 level = known[id(alarm.normalisation)] = alarm.sustained(trace, score)

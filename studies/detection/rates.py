@@ -59,12 +59,12 @@ class Size:
     """Amount of simulated motion."""
 
     arms: int
-    names: tuple[str, ...]  #: of the detectors
-    asked: tuple[float, ...]  #: false alarms per hour
+    names: tuple[str, ...]  #: names of the detectors
+    asked: tuple[float, ...]  #: wanted rates of false alarms [1/h]
     training: Training
-    calibration_hours: float  #: of each arm
-    hours: float  #: fresh, free of collisions, of each arm
-    per_stratum: int  #: judged collisions of a stratum at one speed
+    calibration_hours: float  #: motion per arm from which thresholds are set
+    hours: float  #: other collision-free motion per arm, for the test
+    per_stratum: int  #: test collisions per stratum and speed
     under: Conditions = field(default_factory=Conditions)
 
 

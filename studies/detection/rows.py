@@ -214,7 +214,7 @@ def _cells(own: list[Row]) -> Row:
 
 
 def _hourly(own: list[Row]) -> Row:
-    """All speeds together, then tau98 by speed."""
+    """The printed row of one detector: all speeds together, then tau98 by speed."""
     whole = next(row for row in own if row["speed"] == 0)
     return {
         "study": "hourly",

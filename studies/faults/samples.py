@@ -50,10 +50,10 @@ class Heard:
     """The monitor's answers to a sequence of packets."""
 
     spans: Spans = field(default_factory=Spans)
-    reasons: list[float] = field(default_factory=list)  #: when a reason was given [s of due]
-    free: list[float] = field(default_factory=list)  #: when the answer was "free"
-    other: list[float] = field(default_factory=list)  #: when it was another
-    starts: list[float] = field(default_factory=list)  #: of alarms
+    reasons: list[float] = field(default_factory=list)  #: times at which a reason was given [s]
+    free: list[float] = field(default_factory=list)  #: times at which the answer was "free"
+    other: list[float] = field(default_factory=list)  #: times at which the answer was another one
+    starts: list[float] = field(default_factory=list)  #: times at which alarms began
 
 
 def heard(tested: ArmLogs, packets: Packets) -> Heard:
@@ -90,7 +90,7 @@ class Tally:
     after: int = 0
     silent: float = 0.0
     struck: int = 0  #: collisions within faults
-    missed: int = 0  #: of them, with no answer but "free"
+    missed: int = 0  #: collisions within faults for which the answer stayed "free"
 
     def add(self, tested: ArmLogs, log: str, name: str, start: float) -> None:
         """Answers with the fault at one moment, beside those on the same samples without it."""

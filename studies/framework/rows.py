@@ -31,7 +31,7 @@ class Point:
     method: str
     cost: float  #: time [us], or the quantity of ``cost_axis``
     error: float  #: in the unit of ``error_axis``; NaN: shown in the table only
-    error_text: str = ""  #: for the table
+    error_text: str = ""  #: the error as text, for the table
     role: str = ""  #: "ours" or "peer": shown in the table; "": shown in the figure only
     cost_axis: str = "microseconds"
     error_axis: str = "error"

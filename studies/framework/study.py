@@ -23,7 +23,7 @@ class Part:
     module: str  #: name of the module within ``studies``
     line: str  #: the question, for ``tauguard bench list``
     options: tuple[str, ...] = ()  #: command-line options that are passed to ``measure``
-    alias: str = ""  #: another name of the part that ``tauguard bench`` takes
+    alias: str = ""  #: another name of the part for ``tauguard bench``
 
     def load(self) -> ModuleType:
         """Import the module."""

@@ -30,7 +30,7 @@ class Push:
     start: float  #: the sensor passes 4 N, or a torque begins to deviate [s from the log's start]
     peak: float  #: peak of the force or torque, or end of a labelled touch [s]
     moving: bool  #: whether the pushed joints moved
-    labelled: bool = False  #: by a switch on the hand, as all contacts of the log are
+    labelled: bool = False  #: a switch on the hand labels all contacts of the log
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Touched:
 
     recording: Recording
     pushes: tuple[Push, ...]
-    quiet: int = 0  #: rows before the first touch
+    quiet: int = 0  #: number of rows before the first touch
     own: Array | None = None  #: the robot's own estimate of the external torque [N m], (T, n)
 
 
@@ -47,13 +47,13 @@ class Touched:
 class ArmData:
     """One arm."""
 
-    name: str  #: folder; also preset and URDF, unless ``columns`` and ``robot`` name others
+    name: str  #: folder of the arm; also its preset and URDF, unless the fields below are set
     free: tuple[str, ...]  #: folders of collision-free logs
-    contact: str = ""  #: folder of logs with pushes, beside the arm's
+    contact: str = ""  #: folder of logs with pushes, in the data folder
     robot: str = ""  #: robot file of the package
-    columns: str = ""  #: preset
+    columns: str = ""  #: preset of the logs' columns
     parts: int = 1  #: number of parts into which a free log is cut
-    loads: dict[str, Load | None] = field(default_factory=dict)  #: by log, if the arm had a load
+    loads: dict[str, Load | None] = field(default_factory=dict)  #: by log; None: unknown load
 
     @property
     def file(self) -> Path:

@@ -93,7 +93,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 
 def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_pairs: int) -> Row:
-    """Times, ratios and errors of one cell."""
+    """Times, ratios and errors of one cell of Table 2.1."""
     n, expected = len(a), outcome == "collision"
     _ = (a.packed, b.packed)
     calls = {name: partial(overlap_by, a, b, method) for name, method in METHODS.items()}

@@ -62,7 +62,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     hull = columns("hull", calls, n, len(pairs), 3)
     rows.append({**hull, "tightness": 1.0, **errors(hit, hit)})
     missed = [count(row["missed"]) for row in rows]
-    return [*rows, error("pairs of hulls that meet, called clear", 0, missed)]
+    return [*rows, error("pairs of hulls that meet, reported as apart", 0, missed)]
 
 
 def columns(name: str, calls: Any, bodies: int, pairs: int, repeats: int) -> Row:

@@ -20,8 +20,8 @@ class FreeLogs:
     """Logs in which some joint moves, and the initial arm of an identification."""
 
     numbers: RobotNumbers  #: numbers of the robot file
-    all_traces: dict[str, Trace]  #: by file name; includes logs in which no joint moves
-    logs: dict[str, Recording]  #: by file name, with their loads
+    all_traces: dict[str, Trace]  #: all logs by file name, also those in which no joint moves
+    logs: dict[str, Recording]  #: logs in which a joint moves, by file name, with their loads
     arm: ArmModel
     source: str  #: source of the drive gains, as text for the user
     scale: str  #: the same as the argument ``scale`` of `calibration.identification.identify`
