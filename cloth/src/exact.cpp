@@ -33,8 +33,7 @@ struct Hull {
   std::array<Vector, 4> corner;
   int corners;
   const Vector& after(int i) const { return corner[(i + 1) % corners]; }
-  // Component k of corner(i) x corner(i + 1). Its sign tells the side of the edge that has the
-  // origin.
+  // Component k of corner(i) x corner(i + 1). The sign says on which side the origin is.
   const Polynomial& side(int i, int k) const {
     auto& known = sides[i][k];
     if (!known) known = cross(corner[i], after(i), k);
@@ -69,8 +68,7 @@ bool between(const Root& t, const Vector& a, const Vector& b) {
 
 // Whether the hull contains the origin at a time t when both are in one plane.
 bool contains_origin(const Hull& hull, const Root& t) {
-  // If the projection of the hull along axis k has an area, the origin must be on the same side of
-  // every edge of the projection.
+  // If the projection along axis k has an area, the origin must be on the same side of all edges.
   for (int k = 0; k < 3; ++k) {
     Polynomial area;
     for (int i = 0; i < hull.corners; ++i) area = area + hull.side(i, k);

@@ -92,8 +92,7 @@ class FeatureTree {
       free_;  // free_: number of empty slots below every node
   std::vector<Mask> occupied_;
   std::vector<std::uint64_t> members_,
-      partners_;  // bits (modulo 64) of the groups below a node, and of the groups that they may
-                  // meet
+      partners_;  // bits (modulo 64): groups below a node; groups that these may meet
 };
 
 }  // namespace tauguard::cloth

@@ -32,8 +32,7 @@ bool separated(const Query& k, Vec3 m, double a, double b) {
   return above || below;
 }
 
-// Whether the normal of the plane or a direction in it separates the features; it nearly always
-// does if they are apart.
+// Whether the normal of the plane or a direction in the plane separates the features.
 bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
   return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||

@@ -1,4 +1,4 @@
-// Queries whether a moving vertex meets a moving face, and whether two moving edges meet.
+// Decides whether a moving vertex meets a moving face, and whether two moving edges meet.
 #pragma once
 
 #include <cstddef>

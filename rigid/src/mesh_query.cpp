@@ -72,8 +72,7 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
     for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
     return;
   }
-  // If no edge pierces (coplanar triangles, touching edges), take the middle of both boxes'
-  // overlap.
+  // Coplanar triangles or touching edges: take the middle of the overlap of both bounding boxes.
   for (int k = 0; k < 3; ++k) {
     lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
                      std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));

@@ -139,8 +139,7 @@ inline bool triangles_overlap(const Triangle& a, const Triangle& b) {
   plane_signs(b, a, sa);
   if (sa[0] == sa[1] && sa[1] == sa[2] && sa[0] != 0) return false;
   if (!(sa[0] && sa[1] && sa[2] && sb[0] && sb[1] && sb[2])) return exact::triangles_meet(a, b);
-  // p is the lonely corner; q and r are in the order for a p on the positive side of the other
-  // plane.
+  // p is the lonely corner; q and r are ordered as if p were on the positive side of the plane.
   const int i = lonely(sa), j = lonely(sb);
   const double *p1 = a.v[i], *q1 = a.v[(i + 1) % 3], *r1 = a.v[(i + 2) % 3];
   const double *p2 = b.v[j], *q2 = b.v[(j + 1) % 3], *r2 = b.v[(j + 2) % 3];

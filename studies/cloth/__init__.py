@@ -20,7 +20,7 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Single queries, labelled queries, frames, and volumes of the broad phase."""
+    """Time and error of single queries, labelled queries, frames and bounding volumes."""
     yield from _queries(rows)
     yield from _labelled(rows)
     yield from _frames(rows)
@@ -42,7 +42,7 @@ def _errors(rows: Sequence[Row]) -> str:
 
 
 def _queries(rows: Sequence[Row]) -> Iterator[Point]:
-    """Candidates of a frame, hits included, beside each peer."""
+    """Time and error of the queries of a frame, with and without hits, beside each peer."""
     own = [row for row in table_rows(rows, "query") if row.get("method") == "ab2pf"]
     latest = max((row["toi_error_most"] for row in own), default=0)
     for peer, mine in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():

@@ -163,7 +163,7 @@ class Tally:
     free_seconds: float = 0.0
 
     def add(self, other: Tally) -> None:
-        """Add the other's episodes."""
+        """Add the episodes of the other tally."""
         self.outcomes += other.outcomes
         self.cases += other.cases
         self.false_cases += other.false_cases

@@ -23,7 +23,7 @@ STUDY = Study(
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
     """Delay of the detection of faults, and fraction of missed faults."""
-    axes = ("median delay of what is seen [ms]", "fraction not seen")
+    axes = ("median delay of detected faults [ms]", "fraction of faults missed")
     for row in table_rows(rows, "faults"):
         if row["median_ms"] is not None:
             delay, missed = max(row["median_ms"], 1.0), 1 - row["seen"]["value"]

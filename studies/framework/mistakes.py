@@ -26,7 +26,7 @@ def mistakes(folder: Path, seed: int) -> str:
     kept = folder / "wrong.json"
     found, why = _kept(kept, seed)
     if why:
-        print(f"mistakes: {why}; training the demo's detector takes minutes", flush=True)
+        print(f"mistakes: {why}; training the detector of the demo takes minutes", flush=True)
         found = {"seed": seed, "build": build(), **judged(folder / "wrong", seed)}
         write_json(kept, found)
     return _html(folder, found["counts"], found["rows"])

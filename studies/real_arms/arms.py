@@ -104,7 +104,7 @@ def available() -> list[ArmData]:
 
 
 def nominal(arm: ArmData) -> ArmModel:
-    """The arm model of a user who has not calibrated."""
+    """The arm model without a calibration: the robot file and the drives' nominal gains."""
     robot = RobotNumbers.from_pin(pin_model(arm.file))
     drive = DRIVES.get(arm.name)
     return ArmModel(robot, np.array(drive.gain) if drive else np.ones(robot.joints))

@@ -33,7 +33,7 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Time steps of the arm, impacts on a rail, and an environment's step beside rollout's."""
+    """Time and error: steps of the arm, impacts on a rail, an environment beside rollout."""
     for row in table_rows(rows, "timestep"):
         name, axis = f"{row['timestep_ms']:g} ms", "largest joint error [rad]"
         yield from _point(
