@@ -112,7 +112,7 @@ class MeshTree:
         return self._volume
 
     def __reduce__(self) -> tuple[type[MeshTree], tuple[Any, ...]]:
-        """A copy builds its own tree."""
+        """``copy`` and ``pickle`` build the tree again."""
         return type(self), (self._vertices, self._faces, self._volume)
 
     def __len__(self) -> int:
@@ -131,7 +131,7 @@ class MeshTree:
             )
 
     def overlap(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshOverlap:
-        """Whether the surfaces intersect, with the other mesh posed in this one's frame.
+        """Whether the surfaces intersect, with the other mesh at ``pose`` in this mesh's frame.
 
         The search ends at the first intersecting pair of triangles.
 

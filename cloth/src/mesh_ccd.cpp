@@ -20,7 +20,7 @@ constexpr double worn = 2;
 // on meshes of 20,000 to 90,000 triangles: equal between 0.28 and 0.34).
 constexpr double fast = 0.28;
 constexpr std::size_t sampled = 1024;  // number of edges over which the average is taken
-// Largest number of leaf pairs of a step, per collision that the limit allows.
+// The limit on leaf pairs of a step is this many times the limit on collisions.
 constexpr std::size_t leaf_pairs = 8;
 
 // Prefetches the volumes and vertices of a leaf.

@@ -10,7 +10,7 @@ struct SourcePoints {
   Vec3 a, b;
 };
 
-// The first row that is furthest along n.
+// The row of the point that is furthest along n; the first one if there are several.
 std::size_t extreme(const PointList& points, const Vec3& n) {
   std::size_t best = 0;
   double most = dot(n, points[0]);

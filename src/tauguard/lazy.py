@@ -13,10 +13,9 @@ from typing import Any
 def on_demand(package: str) -> Callable[[str], Any]:
     """A ``__getattr__`` for ``package`` that imports names listed under ``if TYPE_CHECKING:``.
 
-    ``dir`` and completion list those names, too, without importing any.
-
-    Type checkers read those imports. At run time a name loads its own module only, so that a light
-    part of a package does not load the libraries of the heavy parts.
+    Type checkers read these imports. At run time a name loads only the module that defines it, so
+    that a light part of a package does not load the libraries of the heavy parts. ``dir`` and
+    completion list all names without importing any.
     """
     where = _typed_imports(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
 

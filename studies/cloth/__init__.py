@@ -69,7 +69,7 @@ def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
 
 
 def _frames(rows: Sequence[Row]) -> Iterator[Point]:
-    """The largest frame beside each peer, then every method and volume over all scenes."""
+    """Points of the largest frame and each peer, then of all methods over all scenes."""
     frames = table_rows(rows, "frame")
     peers = [row for row in table_rows(rows, "frame peer") if "speedup" in row]
     largest = max(peers, key=lambda row: number(row["ab2pf_ms"]) or 0.0, default={"scene": None})

@@ -83,7 +83,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def _methods(frame: Frame, repeats: int) -> list[Row]:
-    """Every method on one frame.
+    """A row for every method on one frame.
 
     ab2pf is the reference: its hits on the recorded frames are exactly the listed ones.
     """

@@ -81,14 +81,14 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
 
 
 def found(rows: Sequence[Row]) -> Iterator[Found]:
-    """Every detector at the threshold for a rate of false alarms, ours first."""
+    """Results of all detectors at a requested rate of false alarms, tauguard's own first."""
     for row in (row for row in table_rows(rows, "hourly") if row["speed"] == 0):
         rate = row["false_alarms_per_hour"]
         yield Found(row["detector"], row["sensitivity"], rate, row["hours"], asked=0.25)
 
 
 def detections(rows: Sequence[Row]) -> Iterator[Row]:
-    """Every detector at the threshold for a rate of false alarms, all speeds together."""
+    """Rows of all detectors at a requested rate of false alarms, all speeds together."""
     for row in (row for row in table_rows(rows, "hourly") if row["speed"] == 0):
         delay, found = row["delay_ms"], row["sensitivity"]
         yield {

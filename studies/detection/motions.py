@@ -84,7 +84,7 @@ class Conditions:
         )
 
     def torques(self, stratum: Stratum) -> Stratum:
-        """A stratum of this robot [N m]."""
+        """``stratum`` scaled to the torques of this robot [N m]."""
         return self.share * stratum[0], self.share * stratum[1]
 
     def forces(self, span: tuple[float, float]) -> tuple[float, float]:

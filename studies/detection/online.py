@@ -93,7 +93,7 @@ def spread(spent: Array) -> Row:
 
 
 def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
-    """``step``: one sample through observer, payload estimate, method, threshold and filter."""
+    """Row ``step``: time of a sample in observer, payload estimate, method and threshold."""
     count = min(samples, len(trace.t))
     score, dt = alarm.scores(trace)[:count], [None, *np.diff(trace.t[:count])]
     rows = list(zip(trace.q[:count], trace.qd[:count], trace.current[:count], dt, strict=True))
@@ -123,7 +123,7 @@ def difference_online(alarm: CollisionAlarm, trace: Trace, score: Array) -> floa
 
 
 def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int) -> Row:
-    """``real time``: what a sample costs from the scene to the alarm, one core."""
+    """Row ``real time``: time per sample on one core, from simulation to alarm."""
     from dataclasses import replace
 
     from threadpoolctl import threadpool_limits
@@ -140,7 +140,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
     calls: dict[str, Callable[[], object]] = {
         "simulation": lambda: simulate(episode),
         "observer": lambda: observe(arm.robot, trace.t, trace.q, trace.qd, tau, threads=1),
-        "detection": lambda: alarm.detect(replace(trace)),  # a copy: estimates are kept by trace
+        "detection": lambda: alarm.detect(replace(trace)),  # a copy: a trace caches estimates
         "peer": rollout_along(Simulation(episode).motion),
     }
     with threadpool_limits(1):
@@ -178,7 +178,7 @@ def peer(regressor: SrqRegressor) -> Callable[[Array], Array]:
 
 
 def kernel_rows(regressor: SrqRegressor, windows: Array, single: int, seed: int) -> list[Row]:
-    """``kernel``: the full sum beside scikit-learn, then reduced sets: time against error."""
+    """Rows ``kernel``: the sum over all vectors and scikit-learn's, then reduced sets."""
     rng = np.random.default_rng([seed, 9])
     own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
     value = np.empty(single)

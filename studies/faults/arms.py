@@ -30,7 +30,7 @@ def trained(traces: Sequence[Trace], rate: float, per_hour: float) -> CollisionA
 
 @dataclass(frozen=True)
 class ArmLogs:
-    """A trained detector and logs that neither it nor its fault checks have seen."""
+    """A trained detector, and logs that were used neither for it nor for its fault checks."""
 
     name: str
     alarm: CollisionAlarm
@@ -40,7 +40,7 @@ class ArmLogs:
 
     @cached_property
     def alarms(self) -> dict[str, list[float]]:
-        """When alarms begin in each log, by its own clock [s]."""
+        """Times at which alarms begin in each log, by the log's clock [s]."""
         return {
             name: [float(alarm.start) for alarm in self.alarm.detect(trace).alarms]
             for name, trace in self.logs.items()

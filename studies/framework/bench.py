@@ -193,7 +193,7 @@ def printed(module: Any, rows: list[Row]) -> list[Row]:
 def brief(module: Any, rows: list[Row]) -> list[Row]:
     """What is printed unless every table is asked for: the points of the figure, and the summary.
 
-    Parts without points have all their tables.
+    For a part without points all tables are printed.
     """
     make = getattr(importlib.import_module(module.__package__), "points", None)
     points = list(make(rows)) if make else []
