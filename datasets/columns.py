@@ -267,7 +267,7 @@ def presets_of_width(width: int) -> list[str]:
 
 
 def column_map(columns: str | None) -> ColumnMap | str | None:
-    """The name of a preset unchanged, or the map in a JSON file.
+    """The map in the JSON file ``columns``; the name of a preset is returned unchanged.
 
     Raises:
         ValueError: no such file, or not the fields of a :class:`ColumnMap`.

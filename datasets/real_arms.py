@@ -218,7 +218,7 @@ def calibration_notes(
     Args:
         joints: names of the joints.
         left: unexplained torque of each log in which some joint moves, by file name.
-        logs: by file name, with their loads.
+        logs: recordings with their loads, by file name.
         held: held-out residual of each log in ``logs`` [N m], (n,) each; empty: not known.
 
     Raises:

@@ -24,22 +24,22 @@ float64[] effort    # empty: the current is on /motor_currents
 MOTOR_CURRENTS = """\
 std_msgs/Header header
 float64 time       # exact sample time [s]; header.stamp is rounded to 1 ns
-float64[] current  # measured, signed [A], one a joint
+float64[] current  # measured, signed [A], one per joint
 """
 JOINT_COMMAND = """\
 std_msgs/Header header
-float64[] position      # commanded [rad], empty where not recorded
-float64[] velocity      # commanded [rad/s], empty where not recorded
-float64[] acceleration  # commanded [rad/s^2], empty where not recorded
+float64[] position      # commanded [rad], empty if not recorded
+float64[] velocity      # commanded [rad/s], empty if not recorded
+float64[] acceleration  # commanded [rad/s^2], empty if not recorded
 """
 CONTACT_TRUTH = """\
 std_msgs/Header header
 float64[] tau_ext            # torque of contacts and applied wrenches at the joints [N m]
 float64 contact_force        # norm of the net external contact force [N]
-float64 payload              # mass at the flange that the observer is not told of [kg]
+float64 payload              # mass at the flange, unknown to the observer [kg]
 int64 link                   # link of the largest contact force, 0 for none
-geometry_msgs/Point point    # its point, world frame [m], NaN for none
-geometry_msgs/Vector3 force  # its force on the arm, world frame [N]
+geometry_msgs/Point point    # point of this contact, world frame [m], NaN for none
+geometry_msgs/Vector3 force  # force of this contact on the arm, world frame [N]
 """
 OBSTACLES = """\
 std_msgs/Header header
@@ -52,7 +52,7 @@ uint8 CLAMP=1
 uint8 PULSE=2
 std_msgs/Header header
 float64 onset                # first sample with contact force [s]
-float64 end                  # last such sample [s]
+float64 end                  # last sample with contact force [s]
 float64 peak_tau             # largest |tau_ext| over joints 1-4 [N m]
 int64 link                   # the struck link, 1-based
 geometry_msgs/Point point    # at the sample of peak force, world frame [m]
@@ -64,7 +64,7 @@ std_msgs/Header header
 float64 time        # exact sample time [s]
 float64[] residual  # the observer's estimate of tau_ext [N m]
 float64 score       # the detector's output
-float64 threshold   # above it is a raw alarm
+float64 threshold   # a score above it is a raw alarm
 bool alarm          # after the output filter
 """
 ALARM = """\
@@ -76,10 +76,10 @@ CHECKED_CONTACT = """\
 std_msgs/Header header
 string[] partners              # bodies and flexes
 float64 time                   # exact time of contact [s]
-int64 first                    # both partners, counted from 0
+int64 first                    # indices of both partners in partners, from 0
 int64 second
-geometry_msgs/Point point      # world frame [m], NaN where it is not known
-geometry_msgs/Vector3 normal   # from the first to the second
+geometry_msgs/Point point      # world frame [m], NaN if unknown
+geometry_msgs/Vector3 normal   # from the first partner to the second
 float64 distance               # between the surfaces, negative in penetration [m]
 """
 

@@ -33,7 +33,7 @@ class EnergyMeter:
         self._sheets = sheets_of(model)
 
     def between(self, first: Array, last: Array) -> EnergyBalance:
-        """The balance of two states (``mjSTATE_INTEGRATION``)."""
+        """The balance between two states, each a vector of ``mjSTATE_INTEGRATION``."""
         rows = [self._read(state) for state in (first, last)]
         return EnergyBalance(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]))
 

@@ -31,7 +31,7 @@ class TunnellingEvents:
         self._number = {pair: first + k for k, pair in enumerate(pairs)}
 
     def find(self, x_t0: Array, x_t1: Array) -> list[tuple[int, list[int], float]]:
-        """One row per crossing: number of the pair, vertices, and bound of their approach [m].
+        """One row per crossing: number of the pair, its vertices, upper bound of its approach [m].
 
         Args:
             x_t0: Vertices of all flexes at the start of a step. Shape (V, 3), m.

@@ -8,7 +8,7 @@ from tauguard.contacts.scenes.impacts import ball_cloth, sphere_plate
 from tauguard.contacts.scenes.scene import ContactScene, Control
 from tauguard.contacts.scenes.table import bunny_table
 
-#: Builders by name; each has defaults for all its arguments.
+#: Scene builders by name; each builder has defaults for all its arguments.
 SCENES: dict[str, Callable[..., ContactScene]] = {
     build.__name__: build
     for build in (

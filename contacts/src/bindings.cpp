@@ -13,7 +13,7 @@ Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1,
   return {xpos_t0.data(), xmat_t0.data(), xpos_t1.data(), xmat_t1.data()};
 }
 
-// Contacts as rows (first, second, feature) and rows (time, distance, point, normal); and counts.
+// Contacts: rows (first, second, feature), rows (time, distance, point, normal), counts of work.
 using Answer = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
                          nb::ndarray<nb::numpy, double, nb::shape<-1, 8>>,
                          nb::typed<nb::tuple, int, int, int>>;

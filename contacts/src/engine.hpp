@@ -11,7 +11,7 @@
 
 namespace tauguard::contacts {
 
-// Bits of MuJoCo's mjtState: the parts of a state that determine a step, and its kinematics.
+// Bits of MuJoCo's mjtState: the parts of a state that determine a step; those for the kinematics.
 struct Signatures {
   int integration, pose;
 };
@@ -21,7 +21,7 @@ struct Contact {
   double distance;
   int dim, row;  // condim; first constraint row, or -1
   int geom[2], flex[2];
-  const double *at, *normal;  // from the first partner to the second
+  const double *at, *normal;  // point; unit vector from the first partner to the second
 };
 
 struct Engine {

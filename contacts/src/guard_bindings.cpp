@@ -182,8 +182,8 @@ class Guard {
     pulled_.clear();
   }
 
-  // Call this after everything was added. `sheets`: whether pairs of flexes are covered, whose
-  // crossings `owner._tunnelling_events` finds.
+  // Call this after everything was added. `sheets`: whether pairs of flexes are covered;
+  // `owner._tunnelling_events` finds their crossings.
   void start(bool sheets) {
     if (stepper_)
       stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),

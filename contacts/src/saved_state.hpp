@@ -1,4 +1,4 @@
-// Saves a guard's memory of earlier steps as bytes, with which a copy continues with the same bits.
+// Saves a guard's memory of earlier steps as bytes, so that a copy can continue with equal bits.
 #pragma once
 
 #include <cstring>
@@ -36,7 +36,7 @@ class Reader {
     if (static_cast<std::size_t>(end_ - at_) < sizeof value) fail();
     std::memcpy(&value, at_, sizeof value), at_ += sizeof value;
   }
-  // Reads or writes a list; on reading, its length must be the saved one.
+  // Reads a list, which must have the saved length.
   template <class T>
   void operator()(std::vector<T>& values) {
     std::size_t count = 0;

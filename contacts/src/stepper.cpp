@@ -279,8 +279,8 @@ std::vector<int> Stepper::release() {
   if (!guarded_count_) return out;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
-    // Pairs with a moving mocap body are always released: it sinks into others within a whole step,
-    // and a stiff contact would eject them.
+    // Pairs with a moving mocap body are always released: the mocap body sinks into other bodies
+    // within a whole step, and a stiff contact would eject them.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

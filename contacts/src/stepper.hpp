@@ -55,7 +55,7 @@ class Stepper {
  public:
   // Appends the crossings of flexes with flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
-  // Repeats a sub-step of this length from `qpos`, with the hits' partners in impact zones.
+  // ImpactZone(hits, qpos, length) repeats a sub-step from `qpos`, with the hits in impact zones.
   struct Stopped {
     std::vector<int> pairs;
     double work;  // work of mocap bodies [J]

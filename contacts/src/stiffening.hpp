@@ -25,14 +25,14 @@ struct Partners {
 
 class Stiffening {
  public:
-  // So stiff that a fast body sinks in by less than its own radius.
+  // Stiff contact parameters: a fast body sinks in by less than its own radius.
   static constexpr std::array<double, 2> solref = {1e-4, 1.0};
   static constexpr std::array<double, 5> solimp = {0.99, 0.999, 0.001, 0.5, 2.0};
 
   Stiffening(const Engine& engine, const std::vector<Partners>& pairs)
       : e_(engine), pairs_(pairs), stiff_(pairs.size(), 0) {}
 
-  // Makes a pair stiff. `carrier` gets a priority above that of the other partner, so that MuJoCo
+  // Makes a pair stiff. `carrier` gets a higher priority than the other partner, so that MuJoCo
   // does not average the parameters. False if the pair was stiff already.
   bool stiffen(int pair);
   // Restores the parameters once no other pair needs them stiff. False if the pair was not stiff.

@@ -25,7 +25,7 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
 }
 
 // The memory of a pair from earlier steps. apart: the eroded shapes of some level were apart.
-// sunk: those of every level overlapped.
+// sunk: the eroded shapes of every level overlapped.
 enum : char { unknown, apart, sunk };
 
 // `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never

@@ -58,7 +58,7 @@ class Verdict {
   };
   struct Pair {
     std::vector<std::int32_t> a, b;
-    char known;  // from the steps before
+    char known;  // memory of earlier steps
   };
   struct FlexPair {
     std::vector<std::int32_t> a;

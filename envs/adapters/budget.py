@@ -41,7 +41,7 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         return observation, info | {"cost_left": self._limit}
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act; the episode is terminated once the budget is exceeded."""
+        """Apply the action; the episode is terminated once the budget is exceeded."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         left = self._limit - info["cost_sum"]
         return observation, reward, terminated or left < 0, truncated, info | {"cost_left": left}
@@ -71,7 +71,7 @@ class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     def step(  # type: ignore[override]
         self, action: Array
     ) -> tuple[Array, Any, float, bool, bool, dict[str, Any]]:
-        """Act."""
+        """Apply the action."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         cost = self._scale * float(info["cost"])
         return observation, reward, cost, terminated, truncated, info

@@ -77,7 +77,7 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
         return self._seen(observation), info
 
     def step(self, action: Array) -> tuple[Pictures, Any, bool, bool, dict[str, Any]]:
-        """Act."""
+        """Apply the action."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self._seen(observation), reward, terminated, truncated, info
 
@@ -141,7 +141,7 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
         return self._joined(observation, info), info
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act."""
+        """Apply the action."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self._joined(observation, info), reward, terminated, truncated, info
 

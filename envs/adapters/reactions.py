@@ -111,7 +111,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return observation, info | {"reacting": self._since is not None}
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act, or react."""
+        """Apply the action, or the reaction in its place."""
         if self._since is not None and self.reaction != "continue":
             kind, speed = self._react()
             self._arm.batch.plants[0].override(kind, speed)

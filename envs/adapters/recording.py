@@ -65,7 +65,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         return result
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act, and store the rows of the action."""
+        """Apply the action, and store its rows."""
         targets = self._arm.batch.target[0].tolist()
         result = self.env.step(action)
         if not self._arm.batch.metrics["diverged"][0]:

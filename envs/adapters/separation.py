@@ -92,7 +92,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         return observation, info | self._judge()
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act, or hold the arm still if it is stopped."""
+        """Apply the action, or hold the arm still if it is stopped."""
         still = np.zeros(len(self._deceleration))
         self._arm.batch.plants[0].override(
             Override.VELOCITY if self._stopped else Override.FREE, still

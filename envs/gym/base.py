@@ -142,7 +142,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         return self._seen.copy(), self._info(self._metrics(), self._no_reward, False, "")
 
     def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
+        """Apply an action for one control step; entries beyond [-1, 1] count as -1 and 1.
 
         Raises:
             ValueError: an action of another shape, or with entries that are not finite.

@@ -23,7 +23,7 @@ ARMS = "contact_arms"
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
     """The scene with a second, nominal arm of the same kind; its joints and links come last.
 
-    The two arms can touch each other and all things around them. Only ``xml`` has visual shapes.
+    The two arms can touch each other and all things around them. Visual shapes are only in ``xml``.
     """
     whole = mujoco.MjSpec.from_string(scene.xml)
     other = mujoco.MjSpec.from_string(scene.arm_xml)

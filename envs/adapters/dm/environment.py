@@ -38,7 +38,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
         return dm_env.restart(observation)
 
     def step(self, action: Any) -> dm_env.TimeStep:
-        """Act; the first step after the end of an episode ignores the action and resets."""
+        """Apply the action; the first step after the end of an episode resets instead."""
         if self._over:
             return self.reset()
         observation, reward, terminated, truncated, self.info = self._env.step(action)
