@@ -27,8 +27,8 @@ class Pairs:
     """Pairs that may touch.
 
     Attributes:
-        first: Ids of geoms (or of flexes, between flexes). Shape (P,).
-        second: Ids of geoms or flexes. Shape (P,).
+        first: Ids of geoms; of flexes for pairs of two flexes. Shape (P,).
+        second: Ids of geoms; of flexes for pairs with a flex. Shape (P,).
         margin: Distance below which a force acts. Shape (P,), m.
         gap: MuJoCo lists contacts at distances up to margin + gap. Shape (P,), m.
     """
@@ -46,7 +46,7 @@ class Pairs:
         return Pairs(self.first[rows], self.second[rows], self.margin[rows], self.gap[rows])
 
     def reach(self, threshold: str) -> Array:
-        """Largest distance of a contact by ``threshold`` (see ``RigidChecker``) [m], at least 0."""
+        """Largest distance that ``threshold`` (see ``RigidChecker``) counts as a contact [m]."""
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:

@@ -99,7 +99,9 @@ class ColumnMap:
         if not (isinstance(self.separator, str) and len(self.separator) == 1):
             raise ValueError(f"columns.separator: {self.separator!r}, expected one character")
         if self.decimal not in (".", ",") or self.decimal == self.separator:
-            raise ValueError(f"columns.decimal: {self.decimal!r}, expected . or , but no separator")
+            raise ValueError(
+                f"columns.decimal: {self.decimal!r}, expected . or , and not the separator"
+            )
 
     def groups(self) -> dict[str, tuple[Column, ...]]:
         """The columns of each signal that the map has, by the name of the trace's field."""

@@ -157,8 +157,8 @@ def episodes_of_splits(
     there = [split for split in chosen if arm in arms_of(folder, [split])]
     if not there:
         raise ValueError(
-            f"{folder}: the model is of {arm or 'no arm of this dataset'}; {', '.join(chosen)} "
-            f"have {', '.join(arms_of(folder, chosen))}"
+            f"{folder}: the model was trained for {arm or 'no arm of this dataset'}; the arms of "
+            f"{', '.join(chosen)} are {', '.join(arms_of(folder, chosen))}"
         )
     for split in there:
         yield split, read(folder, [split], arm)

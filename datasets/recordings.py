@@ -138,7 +138,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
     for path in tqdm(paths, desc="read", unit="file", disable=None, leave=False):
         trace = read_mcap(path)
         if trace.truth is None:
-            raise ValueError(f"{path}: no truth in it; simulated recordings have one")
+            raise ValueError(f"{path}: no truth in it; only simulated recordings have it")
         with reading(path):  # refuses gaps, which would count as time without an alarm
             checked(trace, lambda row: f"sample {row}")
         traces.append(replace(trace, meta={**trace.meta, "log": str(path.relative_to(folder))}))

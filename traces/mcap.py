@@ -178,7 +178,7 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
 
 
 def collision_layout() -> Layout:
-    """``tauguard_msgs/msg/Collision``."""
+    """The layout of ``tauguard_msgs/msg/Collision``."""
     layout = Layout().header().number("onset", "f8").number("end", "f8").number("peak_tau", "f8")
     return (
         layout.number("link", "i8")
@@ -212,7 +212,7 @@ def collision_group(collisions: tuple[Collision, ...]) -> Group:
 
 
 def alarm_layout() -> Layout:
-    """``tauguard_msgs/msg/Alarm``."""
+    """The layout of ``tauguard_msgs/msg/Alarm``."""
     return Layout().header().number("start", "f8").number("end", "f8")
 
 

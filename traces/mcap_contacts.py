@@ -33,7 +33,7 @@ def describe(contacts: Sequence[CheckedContacts]) -> list[dict[str, Any]]:
 
 
 def layout(partners: Sequence[str]) -> Layout:
-    """``tauguard_msgs/msg/CheckedContact``."""
+    """The layout of ``tauguard_msgs/msg/CheckedContact``."""
     contact = Layout().header().strings(list(partners)).number("time", "f8")
     contact.number("pair", "i8", 2).number("point", "f8", 3).number("normal", "f8", 3)
     return contact.number("distance", "f8")

@@ -36,7 +36,7 @@ def search(
     Args:
         distance: Distances of pairs at given times.
         bound: Bound L of each pair [m], shape (N,).
-        tolerance: Depth above which no greater depth of a pair is searched for [m].
+        tolerance: Once a pair is deeper than this, greater depths are not searched for [m].
         resolution: Distance below which a pair may be reported as touching [m].
     """
     n = len(bound)

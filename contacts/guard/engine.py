@@ -106,8 +106,8 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     Args:
         model: MjModel.
         data: The MjData to step.
-        end: Another MjData of the model.
-        other: A third MjData; without mocap bodies it may be ``end``.
+        end: Another MjData, for the kinematics at the end of a step.
+        other: A third MjData, for other mocap poses; without mocap bodies it may be ``end``.
 
     Raises:
         RuntimeError: the structs of the installed MuJoCo differ from their declared layout.

@@ -83,7 +83,7 @@ def ball_cloth(
 
 
 def _impact_point(model: mujoco.MjModel, impact: str) -> Array:
-    """A point of the face that is nearest to the cloth's middle, shape (3,) [m]."""
+    """The impact point on the face nearest to the cloth's middle, shape (3,) [m]."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     faces = data.flexvert_xpos[model.flex_elem.reshape(-1, 3)]

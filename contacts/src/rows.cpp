@@ -5,7 +5,7 @@
 namespace tauguard::contacts {
 namespace {
 
-// Time constant of a constraint row with the integrator `discrete`; it acts within the step [s].
+// Time constant [s] of constraint rows with the integrator `discrete`: they act within one step.
 constexpr double rigid = 1e-6;
 
 constexpr int least_iterations = 100;

@@ -12,8 +12,8 @@
 
 namespace tauguard::contacts {
 
-// A pair that a step brings into contact. For a flex, `time` is the earliest and `deepest` the
-// deepest over its simplices.
+// A pair that a step brings into contact. For a flex, `time` is the earliest time and `deepest` the
+// deepest level over the flex's simplices.
 struct PairHit {
   int pair, deepest;  // number of the pair; deepest level (verdict.hpp) whose eroded shapes met
   bool passed;        // the eroded shapes of the last level met: the pair would have passed through

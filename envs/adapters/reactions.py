@@ -72,7 +72,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         one_of("trigger", trigger, TRIGGERS)
         self._arm: ArmEnv = arm_env(env)
         if trigger == "alarm" and self._arm.batch.sensing is None:
-            raise ValueError("trigger 'alarm': the environment has no detector; use detector=")
+            raise ValueError("trigger 'alarm': the environment has no detector; pass detector=")
         self.reaction, self.trigger = reaction, trigger
         compiled = self._arm.compiled
         n = len(compiled.scene.joint_names)

@@ -280,7 +280,7 @@ def arm_reach(scene: Scene) -> float:
 
 
 def pose_box(scene: Scene) -> tuple[Array, Array]:
-    """Lower and upper end of the random poses: around home, within range [rad], shapes (n,)."""
+    """Bounds of the random poses: around home, within the joints' ranges [rad], shapes (n,)."""
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
     spread = np.resize(scene.facts.spread, len(joints))

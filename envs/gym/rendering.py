@@ -1,4 +1,4 @@
-"""Pictures of an environment; this module is imported with the first picture."""
+"""Pictures of an environment; this module is only imported when the first picture is drawn."""
 
 from __future__ import annotations
 
