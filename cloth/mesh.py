@@ -106,7 +106,7 @@ class MeshCCD:
 
     @property
     def edges(self) -> NDArray[np.int32]:
-        """All edges, of faces and given ones, each once, smaller vertex first, read-only.
+        """Edges of faces and given edges, without repetition, smaller vertex first, read-only.
 
         ``Frame.ee`` has row numbers of this array. Shape (E, 2).
         """

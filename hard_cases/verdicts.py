@@ -1,4 +1,4 @@
-"""Run every case on every library; each answer is one row."""
+"""Run every case on every library, and count the verdicts."""
 
 from collections.abc import Iterable
 from typing import Any

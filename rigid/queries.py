@@ -36,7 +36,7 @@ def check_method(method: object, known: Sequence[str]) -> None:
 
 
 def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
-    """Whether bodies without radii share a point; the methods are those of the public query."""
+    """Whether bodies without radii share a point; ``method`` as in the public ``overlap``."""
     hit = native_overlap(a, b, method, threads)[0]
     return Overlap(hit, lambda: find_witness(a, b, hit, threads))
 

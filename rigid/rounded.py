@@ -134,7 +134,7 @@ _SHARP = np.zeros(1)
 
 
 def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
-    """The core of a batch and its radii; one zero for bodies without radii."""
+    """The core of a batch and the radii; a single zero for bodies without radii."""
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
     return solid, _SHARP

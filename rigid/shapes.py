@@ -35,7 +35,7 @@ class _Batch(Rebuilt):
 
 @dataclass(frozen=True, eq=False)
 class Tetrahedra(_Batch):
-    """The convex hulls of four points each, in any order and orientation.
+    """Tetrahedra: convex hulls of four points, in any order and orientation.
 
     Args:
         vertices: Shape (N, 4, 3).
@@ -172,7 +172,7 @@ class Parallelepipeds(_Batch):
 
 @dataclass(frozen=True, eq=False)
 class PointSets(_Batch):
-    """Base of :class:`Hulls` and :class:`Polygons`: bodies of any number of points each."""
+    """Base of :class:`Hulls` and :class:`Polygons`, whose bodies have any number of points."""
 
     vertices: NDArray[np.float64]
     offsets: NDArray[np.int64]
@@ -199,7 +199,7 @@ class PointSets(_Batch):
 
 
 class Hulls(PointSets):
-    """The convex hulls of any number of points each.
+    """Convex hulls; each body has any number of points.
 
     Body n owns ``vertices[offsets[n]:offsets[n + 1]]``.
 
@@ -216,7 +216,7 @@ class Hulls(PointSets):
 
 
 class Polygons(PointSets):
-    """Convex polygons in the plane: the hulls of any number of points each, in any order.
+    """Convex polygons in the plane: hulls of any number of points, in any order.
 
     They are tested against polygons only. Arguments and errors are those of :class:`Hulls`, with
     ``vertices`` of shape (M, 2).

@@ -193,7 +193,7 @@ void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
 template <int slots>
 void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
   const std::int32_t* v = vertices(leaf);
-  // Vertices are scattered in memory, so those of the next leaf are prefetched.
+  // Vertices are scattered in memory, so the vertices of the next leaf are prefetched.
   if (leaf + 1 < leaves_)
     for (int i = 0; i < lanes * arity_; ++i)
       __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));

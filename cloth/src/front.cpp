@@ -50,7 +50,7 @@ class Walk {
   void move(const NodePair* entry, int n) {
     bool meet[kept_grain];
     for (int i = 0; i < n; ++i) {
-      // Nodes are scattered in memory, so those of later entries are prefetched.
+      // Nodes are scattered in memory, so the nodes of later entries are prefetched.
       const NodePair& later = entry[std::min(i + ahead, n - 1)];
       fetch(a_, later.a);
       fetch(b_, later.b);

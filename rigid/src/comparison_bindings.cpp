@@ -100,7 +100,7 @@ struct KDopVolume : KDop {
   }
 };
 
-// Bodies, each of which is a range of triangles and has one volume.
+// Bodies: each is a range of triangles and has one volume.
 template <class Volume>
 class Volumes {
  public:

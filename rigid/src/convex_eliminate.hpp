@@ -74,7 +74,7 @@ class HullElimination {
     return cross(u, q - o);
   }
 
-  // Chooses vertices of A, each the farthest from the span of those before it.
+  // Chooses vertices of A: each is the farthest from the span of the vertices before.
   bool choose_simplex() {
     chosen_[0] = 0;
     Vec3 along{}, across{};

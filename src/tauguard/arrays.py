@@ -16,7 +16,7 @@ FEW, SHORT = 7, 60
 
 
 def runs(mask: ArrayLike) -> NDArray[np.int64]:
-    """First row, and the row after the last, of each run of True in a mask (T,). Shape (K, 2)."""
+    """Each run of True in a mask (T,), as first row and row after the last. Shape (K, 2)."""
     padded = np.concatenate([[False], np.asarray(mask, dtype=np.bool_), [False]])
     return np.flatnonzero(np.diff(padded.astype(np.int8))).reshape(-1, 2)
 

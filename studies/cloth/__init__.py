@@ -57,7 +57,7 @@ def _queries(rows: Sequence[Row]) -> Iterator[Point]:
 
 
 def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
-    """Every method's mean over all labelled sets, weighted by their queries."""
+    """Mean results of each method over all labelled sets, weighted by numbers of queries."""
     axes = ("microseconds a query", "fraction of wrong answers")
     by_method = groups(table_rows(rows, "hard query"), lambda row: str(row["method"]))
     for method, mine in by_method.items():

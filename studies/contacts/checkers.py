@@ -51,7 +51,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def _scene(name: str, timestep: float, seconds: float | None, fine: int) -> list[Row]:
-    """A row for each checker."""
+    """A row for each checker in the scene."""
     report = compare(SCENES[name](), CHECKERS, timestep=timestep, seconds=seconds, fine=fine)
     missed = sum(not one.generated for one in report.outcomes)
     lost = sum(not one.held for one in report.outcomes)

@@ -248,7 +248,7 @@ def _overhead(scene: Any, steps: int) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Scenes held (no method can hold `squeeze`), silent tunnelling, and time, beside targets."""
+    """Targets of scenes held (no method can hold `squeeze`), silent tunnelling and time."""
     whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     out: list[Row] = []
     for method in METHODS:

@@ -1,4 +1,4 @@
-"""Generation of datasets: speed beside ``mujoco.rollout``, size and reading speed."""
+"""Generation of datasets: speed compared with ``mujoco.rollout``, size, reading speed."""
 
 import io
 import tempfile
@@ -58,7 +58,7 @@ def draw(rows: list[Row], figure: Any) -> None:
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:
-    """Microseconds for each sample, without and with collisions, and the speed of a mix of both.
+    """Time per sample without and with collisions, and the speed of generating half of each.
 
     The seed was not used in development. All arms of the first split and the arm of the last split
     take part.

@@ -1,4 +1,4 @@
-"""Events of the diagnosis study: collisions, pushes and payloads, with the truth of each."""
+"""Events of the diagnosis study: collisions, pushes and payloads, with their truth."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

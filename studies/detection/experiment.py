@@ -168,7 +168,7 @@ def _rest(found: list[Row], names: Sequence[str], more: Iterator[list[Row]]) -> 
 def _fleets(
     size: Size, seed: int, arms: Sequence[int], cache: JobCache, each: Each
 ) -> dict[int, Fleet]:
-    """Every arm's detectors with their alarms, from that arm's own motion."""
+    """The detectors of every arm, with alarms from motion of the same arm."""
     # Two jobs per arm: neighbours in the list share their front end, so they stay together.
     half = -(-len(size.detectors) // 2)
     halves = [own for own in (size.detectors[:half], size.detectors[half:]) if own]

@@ -87,7 +87,7 @@ def timed(calls: Callable[[int], object], count: int) -> Array:
 
 
 def spread(spent: Array) -> Row:
-    """Median with its quartiles [us]."""
+    """Median and quartiles [us]."""
     low, median, high = (float(x) for x in np.percentile(spent, (25, 50, 75)))
     return {"median": median, "low": low, "high": high}
 
@@ -140,7 +140,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
     calls: dict[str, Callable[[], object]] = {
         "simulation": lambda: simulate(episode),
         "observer": lambda: observe(arm.robot, trace.t, trace.q, trace.qd, tau, threads=1),
-        "detection": lambda: alarm.detect(replace(trace)),  # a copy: a trace caches estimates
+        "detection": lambda: alarm.detect(replace(trace)),  # a copy: estimates are cached by trace
         "peer": rollout_along(Simulation(episode).motion),
     }
     with threadpool_limits(1):

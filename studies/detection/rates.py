@@ -129,7 +129,7 @@ def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
 
 
 def tallies_by_rate(job: tuple[Size, int, int, Sequence[float | None]]) -> list[Tallies]:
-    """:func:`arm_tallies` of one motion logged at each sample rate [Hz]; None: as simulated."""
+    """:func:`arm_tallies` for one motion at several sample rates [Hz]; None: as simulated."""
     size, seed, arm, rates = job
     payloads = tuple(sorted(map(float, set(TRAINING_PAYLOADS))))
     known, hours = replace(size.under, payloads=payloads), size.calibration_hours / len(SPEEDS)

@@ -1,4 +1,4 @@
-"""Rows of the dissertation's experiment, how they are printed, and their figure."""
+"""Rows of the dissertation's experiment, and their tables and figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -69,7 +69,7 @@ def countable(tally: Tally) -> list[Outcome]:
 
 
 def sensitivity(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """A rate with its Wilson interval."""
+    """The fraction of collisions found, with a Wilson interval."""
     return rate(sum(outcome.delay is not None for outcome in outcomes), len(outcomes))
 
 

@@ -1,4 +1,4 @@
-"""The arms of the fault study: a detector each, and logs that it was not trained on."""
+"""The arms of the fault study, each with a detector and logs that did not train it."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class Tally:
     missed: int = 0  #: collisions within faults for which the answer stayed "free"
 
     def add(self, tested: ArmLogs, log: str, name: str, start: float) -> None:
-        """Answers with the fault at one moment, beside those on the same samples without it."""
+        """Add the answers with the fault at one moment, compared with those without the fault."""
         trace = tested.logs[log]
         settle = tested.alarm.settle
         whole = Packets.of(trace)

@@ -34,7 +34,7 @@ def headlines(points: Sequence[Point], found: Sequence[Found]) -> str:
 
 
 def _pairs(points: Sequence[Point], usable: Callable[[Point], bool]) -> list[tuple[Point, Point]]:
-    """The points of tauguard and of a peer, for each question that has both."""
+    """Pairs of points of tauguard and of a peer, from the questions that have both."""
     return [
         (ours, peer)
         for own in groups([p for p in points if usable(p)], lambda p: p.question).values()

@@ -125,7 +125,7 @@ def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
 
 
 class _Results(pickle.Unpickler):
-    """Reads results: arrays, plain values, and data classes of ours or of the user's module."""
+    """Reads results: arrays, plain values, and data classes of tauguard or the user's module."""
 
     def find_class(self, module: str, name: str) -> Any:
         package = module.partition(".")[0]

@@ -223,7 +223,7 @@ class Report:
         return f"<p>{escape(run)}</p>{figure}" + folded("Tables", text)
 
     def _figure(self, name: str, module: ModuleType) -> str:
-        """The part's own figure; those of ``points`` stand on the first page."""
+        """The part's own figure; the first page has the figures of ``points``."""
         what, rows = f"figure of {name}", self.found[name]["rows"]
         with warnings.catch_warnings(record=True) as raised:
             warnings.simplefilter("always", UserWarning)
@@ -262,7 +262,7 @@ class Report:
 
 
 def time_text(us: float) -> str:
-    """A time with its unit, three digits."""
+    """A time as text: three digits and a unit."""
     unit, size = next(((u, s) for u, s in UNITS if us >= s), UNITS[-1])
     return f"{us / size:.3g} {unit}"
 

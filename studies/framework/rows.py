@@ -58,7 +58,7 @@ def time_in_turn(
     repeats: int = 5,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, dict[str, float]]:
-    """Seconds of each call. Calls alternate (A B A B ...) after one warm-up each.
+    """Time of each call [s]. Calls alternate (A B A B ...) after a warm-up of all.
 
     Because the calls take turns, a drift of the machine's speed affects all methods alike.
     The clock ``time.process_time`` excludes the time of other programs, for work in a single

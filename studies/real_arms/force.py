@@ -117,7 +117,7 @@ def pushed(
     force: Array,
     spans: list[tuple[int, int]],
 ) -> list[Row]:
-    """Changes of the drives' torques in a push: of the arm, and of the twin with its force."""
+    """Change of the drives' torques in each push, of the arm and of the pushed twin."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
 

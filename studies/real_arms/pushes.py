@@ -140,7 +140,7 @@ def detectors(
 
 
 def franka(one: Touched) -> dict[str, Alarms]:
-    """Franka's own estimate, with the examples' thresholds and with those of the other peers."""
+    """Franka's own estimate, with the examples' thresholds and with thresholds from logs."""
     if one.own is None:
         return {}
     own = one.own - np.median(one.own[: one.quiet], axis=0)

@@ -1,4 +1,4 @@
-"""Lines of the summary: the worst of several values, beside its target."""
+"""Lines of the summary: the worst of several values and its target."""
 
 from collections.abc import Iterable, Sequence
 

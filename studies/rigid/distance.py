@@ -62,7 +62,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Wrong signs, errors, and coal's time over ours."""
+    """Wrong signs, errors, and the ratio of times, coal / tauguard."""
     found = table_rows(rows, "distance")
     ratios = [
         row["coal_ns"] / row["distance_ns"]["median"]
@@ -78,7 +78,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 
 def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row:
-    """Time per pair, and the error of the first ``exact`` rows relative to their size."""
+    """Time per pair, and the errors of the first ``exact`` pairs relative to the pairs' sizes."""
     got, hit = distance(a, b).distance, overlap(a, b).hit
     calls: dict[str, Callable[[], object]] = {
         "distance": partial(distance, a, b),

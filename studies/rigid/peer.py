@@ -1,4 +1,4 @@
-"""coal as the peer: its overlap without call overhead, and advancement with its distance."""
+"""coal as the peer: overlap without the overhead of calls; advancement by coal's distance."""
 
 import time
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from tauguard.rigid.shapes import Bodies
 
 
 def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], float]:
-    """coal's answers, nanoseconds per pair, and their median without loop and call.
+    """coal's answers, time per pair [ns], and its median without loop and call.
 
     Loop and call are timed on two spheres far apart, the fastest query there is.
     """

@@ -1,4 +1,4 @@
-"""Simulation and environments: what each modelled thing costs, and what a step's length costs."""
+"""Simulation and environments: cost of the parts of a scene, and of the time step."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What an environment costs beside its physics, many at once, and what reactions are worth."""
+"""Cost of one and of many environments beside bare physics, and effect of reactions."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -76,7 +76,7 @@ def judge(rows: list[Row]) -> list[Row]:
 
 
 def steps(count: int, repeats: int, seed: int) -> list[Row]:
-    """Microseconds of an action at 100 Hz: bare physics, then with one more thing each."""
+    """Time of an action at 100 Hz [us]: bare physics, the environment, one option more."""
     env = reach(seed)
     actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6)).astype(np.float32)
     forces, error = recorded(env, actions, seed)
@@ -122,7 +122,7 @@ def acting(env: Any, actions: np.ndarray, seed: int) -> Callable[[], object]:
 
 
 def vectors(count: int, repeats: int, seed: int) -> list[Row]:
-    """Actions a second of many environments, beside Gymnasium's and MuJoCo's vector forms."""
+    """Actions per second of many environments, compared with Gymnasium and MuJoCo."""
     envs: dict[str, Any] = {
         "SyncVectorEnv": SyncVectorEnv([lambda: gymnasium.make(REACH)] * COPIES)
     }

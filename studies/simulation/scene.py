@@ -1,4 +1,4 @@
-"""What each modelled thing of a scene costs per step, and error against cost of the time step."""
+"""Cost of each part of a scene per step, and error against cost of the time step."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -46,7 +46,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def costs(motion: Motion, repeats: int) -> list[Row]:
-    """Microseconds for each step: MuJoCo alone, then the arm with one thing more each."""
+    """Time of a step [us]: MuJoCo alone, then the arm, then the arm with one thing more."""
     drive = cura6_drive()
     ideal = replace(drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None)
     bare = SceneSpec(labels=False)

@@ -180,7 +180,7 @@ def opened(
 
 
 class Terminal:
-    """Prints a line at each change of the state and, on a terminal, the current score."""
+    """Prints a line when the state changes and, on a terminal, the current score."""
 
     def __init__(self, threshold: float = 1.0, every: float = 0.1) -> None:
         """Keep the threshold of the score and the interval of its display [s]."""

@@ -121,7 +121,7 @@ def command(
 
 
 def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
-    """The logs that the other logs predict, and a note on each one left out.
+    """The logs that the other logs predict, and a note on each log that is left out.
 
     Raises:
         ValueError: logs of two arms.

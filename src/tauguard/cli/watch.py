@@ -102,7 +102,7 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def opened(inner: Any, save: Path | None, port: int) -> Any:
-    """The viewer, or the file, with its charts."""
+    """The viewer or the file to write, with the charts laid out."""
     from tauguard.replay.live import LiveView
 
     view = LiveView(inner.compiled.shown(), save, port)
