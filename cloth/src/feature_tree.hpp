@@ -23,8 +23,8 @@ struct Features {
   const std::int32_t* of(std::size_t i) const { return vertices.data() + arity * i; }
 };
 
-// The group of each vertex, and a symmetric table of the groups to test against each other. If
-// empty, all vertices are tested.
+// The group of each vertex, and a symmetric table of the groups to test against each other. Without
+// groups all vertices are tested.
 struct Groups {
   std::vector<std::int32_t> of_vertex;
   std::vector<std::uint8_t> meets;  // count x count

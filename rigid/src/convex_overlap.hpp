@@ -33,8 +33,8 @@ using RowMethod =
 RowMethod row_method(Kind a, Kind b);
 
 // Like `overlap`, but tests the given normal of each row first (3 numbers; zeros if there is none).
-// If it does not separate the pair but the pair is apart, it is replaced by a normal that
-// separates. Returns the number of rows that the given normals decided.
+// A normal that does not separate a pair that is apart is replaced by one that does. Returns the
+// number of rows that the given normals decided.
 std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads,
                            double* normals, std::uint8_t* hit);
 

@@ -32,7 +32,7 @@ struct ObbTree {
 };
 
 // The axes of a box are the principal axes of the second moments of its surface, which are summed
-// from the leaves up. For a leaf they come from its normal and longest edge. A box contains
+// from the leaves up. For a leaf the axes come from its normal and longest edge. A box contains
 // all corners.
 ObbTree fit_obbs(const Tree& tree);
 

@@ -3,7 +3,7 @@
 Each detector is trained on the first split of one arm, with a threshold for 10 false alarms an
 hour. It is judged on the test splits, as by ``tauguard train --traces`` and ``tauguard evaluate
 --data``. Detectors are ranked by their sensitivity from 16 N m up on the split ``test`` over all
-arms; their false alarms stand beside it.
+arms. The table also has their false alarms.
 """
 
 import tempfile

@@ -106,7 +106,7 @@ class Training:
     free_seconds: float = 40.0  #: duration of a collision-free slice [s]
 
     def traces(self, seed: int, arm: int, under: Conditions = Conditions()) -> list[Trace]:
-        """The slices of one arm."""
+        """The simulated training slices of one arm."""
         own, mismatch = stream(seed, TRAIN, arm), under.arm(arm)
         speeds, payloads = TRAINING_SPEEDS, TRAINING_PAYLOADS
         struck = struck_episodes(own, self.slices, self.collisions, speeds, payloads, mismatch)

@@ -246,7 +246,7 @@ def _together(own: Sequence[Row]) -> str:
 
 
 def draw(found: list[Row], figure: Any) -> None:
-    """Sensitivity over the torque, tau98, delay, and the cells beside the dissertation's."""
+    """Panels: sensitivity over torque; tau98 and delay over speed; cells of all methods."""
     (torque, least), (delay, cells) = figure.subplots(2, 2)
     hourly = groups(table_rows(found, "hourly"), lambda row: str(row["detector"]))
     strata = [row for row in table_rows(found, "strata") if row["point"] == HOURLY]

@@ -119,7 +119,7 @@ def received(pipe: Connection) -> int:
 
 
 def heard(folder: Path, rate: float) -> Row:
-    """Listen to the played log."""
+    """Receive the played log, and return its row."""
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
     truth = detect_with_faults(alarm, trace).detection.alarm

@@ -115,7 +115,7 @@ class Tally:
         late = [t for t in true if t > start + LASTS + settle + 0.2]
         self.after += len(late)
         self.found += sum(any(abs(t - u) < 0.1 for u in said) for t in late)
-        gaps = {t for t in b.free if start + 0.02 < t < start + LASTS}  # a burst has one time
+        gaps = {t for t in b.free if start + 0.02 < t < start + LASTS}  # one per arrival time
         self.silent += len(gaps) * trace.dt
         within = [t for t in true if start + 0.02 < t < start + LASTS]
         self.struck += len(within)
@@ -177,7 +177,7 @@ def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple
 
 
 def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
-    """A log without a fault."""
+    """The row of a log without faults."""
     found = heard(tested, Packets.of(trace))
     batch = tested.alarm.detect(trace).alarm
     return {

@@ -34,7 +34,7 @@ CONVEX = {
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Convex bodies (means over all cells), time of impact, meshes."""
+    """Time and error: convex bodies (mean over all cells), time of impact, meshes."""
     convex = table_rows(rows, "table 2.1 static")
     for method, (time, errors, role) in CONVEX.items():
         times = [value for row in convex if (value := number(row.get(time))) is not None]
@@ -54,7 +54,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
     for row in table_rows(rows, "figure 1.1 volumes"):
         question, cost = "bounding volumes of pieces of a mesh", 1e-3 * row["test_ns"]["median"]
         text = f"{row['volume']}, {row['tightness']:.2g} times the hull's volume"
-        axes = "microseconds a test", "hulls apart, volumes not"
+        axes = "microseconds a test", "separate hulls with overlapping volumes"
         yield Point(question, text, cost, row["false_hits"]["value"], "", "", *axes)
     meshes = groups(table_rows(rows, "table 2.2 static"), lambda row: str(row["volume"]))
     for volume, own in meshes.items():

@@ -70,7 +70,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Wrong answers of every method; ratios of times beside the published ones, SAT and coal."""
+    """Wrong answers, and ratios of times: ABFME to textbook SAT, and ours to SAT and coal."""
     static, hard = table_rows(rows, "table 2.1 static"), table_rows(rows, "hard cases")
     found = []
     for method in ("abfme", "sat", "auto"):

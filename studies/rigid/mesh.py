@@ -105,7 +105,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Build and first hit of the default volume over coal's; wrong answers; late contacts."""
+    """Ratios of build and first-hit times to coal's, wrong answers, and late contacts."""
     static = table_rows(rows, "table 2.2 static")
     moving = table_rows(rows, "table 2.2 dynamic") + table_rows(rows, "mesh and convex in motion")
     convex, own = table_rows(rows, "mesh and convex"), [r for r in static if r["volume"] == "obb"]

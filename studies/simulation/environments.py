@@ -111,7 +111,7 @@ def steps(count: int, repeats: int, seed: int) -> list[Row]:
 
 
 def acting(env: Any, actions: np.ndarray, seed: int) -> Callable[[], object]:
-    """An episode with the given actions, of one environment or of many."""
+    """A function that runs an episode with these actions in one or many environments."""
 
     def call() -> None:
         env.reset(seed=seed)
