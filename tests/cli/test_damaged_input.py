@@ -39,8 +39,8 @@ individuals = [10]
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("simulate --out new --speeds", "expected a number or more"),
-        ("simulate --out new --payloads-g", "expected a number or more"),
+        ("simulate --out new --speeds", "expected at least one number after each"),
+        ("simulate --out new --payloads-g", "expected at least one number after each"),
         ("simulate --out new --workers 0", "--workers 0: expected 1 or more"),
         ("simulate --out new --mismatch-seed -3", "--mismatch-seed -3: expected 0 or more"),
         ("simulate --out new --arm-joints a,b", "leave `joints` out"),

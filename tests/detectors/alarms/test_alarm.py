@@ -175,7 +175,7 @@ def test_bad_input(alarm, training, robot, arm, unseen):
     with pytest.raises(ValueError, match=r"joints \(7,\): expected some of 1 to 6"):
         SrqSvr(front=front).fit(training, arm)
     free = [t for t in training if not t.truth.collisions]
-    with pytest.raises(ValueError, match="hold no collision"):
+    with pytest.raises(ValueError, match="contain no collision"):
         SrqSvr().fit(free[:3], arm)
     with pytest.raises(ValueError, match=r"drive_gain: shape \(2,\)"):
         ArmModel(robot, arm.drive_gain[:2])
