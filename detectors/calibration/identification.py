@@ -170,7 +170,7 @@ def identify(
 
     Args:
         arm: nominal arm. Its gains are kept with ``scale="gains"``, else they are initial values.
-        recordings: collision-free logs of this arm.
+        recordings: collision-free logs of this arm, at least 10 s of motion in all.
         scale: what determines the scale of the torques: "gains" (of ``arm``), "payload" (a
             recording with a known load above 0) or "masses" (of ``arm``).
         friction: the friction columns.
