@@ -117,7 +117,7 @@ def test_the_automatic_volume_moves_in_fast_steps_alone():
             assert np.array_equal(want, have)
 
 
-@pytest.mark.parametrize("volume", ["aabb", "moving_k_dop18"])
+@pytest.mark.parametrize("volume", ["aabb", "moving_k_dop18", "auto"])
 def test_front_equals_fresh_descent_over_a_motion(volume):
     rng = np.random.default_rng(3)
     faces, x, _ = sheet(24, rng)

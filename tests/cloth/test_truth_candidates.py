@@ -14,7 +14,7 @@ def scene(data_dir, request):
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("volume", ["aabb", "k_dop18", "moving_k_dop14", "moving_k_dop26"])
+@pytest.mark.parametrize("volume", ["auto", "aabb", "k_dop18", "moving_k_dop14", "moving_k_dop26"])
 def test_no_collision_is_lost(scene, volume):
     ccd = MeshCCD(scene.faces, volume=volume)
     assert np.array_equal(ccd.edges, scene.edges)
