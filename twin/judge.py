@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
@@ -186,29 +187,35 @@ def _peaks(values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array
     return np.array([np.quantile(p, 0.99) if len(p) >= 10 else np.nan for p in peaks])
 
 
-def _windows(
-    values: Sequence[Array],
-    rows: Sequence[Bools],
-    times: Sequence[Array],
-    motions: Sequence[Array],
-) -> tuple[Array, NDArray[np.int64]]:
-    """Features of each window, and the group of windows that it belongs to."""
-    table, place, logs, starts = [], [], [], []
-    for log, (value, wanted, t) in enumerate(zip(values, rows, times, strict=True)):
-        for span in _spans(t, WINDOW):
-            if wanted[span].all():
-                part = value[span]
-                steps = np.diff(part, axis=0)
-                table.append(
-                    np.concatenate([
-                        part.mean(axis=0), part.std(axis=0), steps.std(axis=0),
-                        np.abs(steps).max(axis=0), np.abs(part).max(axis=0), part[-1] - part[0],
-                    ])
-                )  # fmt: skip
-                place.append(motions[log][span].mean(axis=0))
-                logs.append(log)
-                starts.append(t[span.start] - t[0])
-    return np.array(table), _groups(np.array(place), np.array(logs), np.array(starts))
+def _windows(rows: Sequence[Bools], times: Sequence[Array]) -> list[tuple[int, slice]]:
+    """Log and samples of each window of wanted rows."""
+    found = []
+    for log, (wanted, t) in enumerate(zip(rows, times, strict=True)):
+        found += [(log, span) for span in _spans(t, WINDOW) if wanted[span].all()]
+    return found
+
+
+def _features(values: Sequence[Array], windows: Sequence[tuple[int, slice]]) -> Array:
+    table = []
+    for log, span in windows:
+        part = values[log][span]
+        steps = np.diff(part, axis=0)
+        table.append(
+            np.concatenate([
+                part.mean(axis=0), part.std(axis=0), steps.std(axis=0),
+                np.abs(steps).max(axis=0), np.abs(part).max(axis=0), part[-1] - part[0],
+            ])
+        )  # fmt: skip
+    return np.array(table)
+
+
+def _groups_of(
+    windows: Sequence[tuple[int, slice]], times: Sequence[Array], motions: Sequence[Array]
+) -> NDArray[np.int64]:
+    """The group of each window, see :func:`_groups`."""
+    place = [motions[log][span].mean(axis=0) for log, span in windows]
+    starts = [times[log][span.start] - times[log][0] for log, span in windows]
+    return _groups(np.array(place), np.array([log for log, _ in windows]), np.array(starts))
 
 
 def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.int64]:
@@ -218,20 +225,63 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
     it was trained on, and could distinguish even two draws of one process. With fewer motions than
     folds, as of an arm that stands in few poses, the groups are parts of a log, and areas can be
     too large.
+
+    Args:
+        place: position and velocity in units of :data:`PLACE` and :data:`SPEED`, shape (W, 2 n).
+        logs: in ascending order, shape (W,).
+        starts: time since the log's beginning [s], ascending in each log, shape (W,).
     """
+    if not len(place):
+        return np.empty(0, dtype=np.int64)
     parts = 100_000 * logs + (starts / GROUP).astype(np.int64)
-    groups = np.empty(len(place), dtype=np.int64)
-    for i, here in enumerate(place):
-        far = np.linalg.norm(place - here, axis=1)
-        far[(logs == logs[i]) & (np.abs(starts - starts[i]) <= APART)] = np.inf
-        before = int(np.argmin(far[:i])) if i else 0
-        if i and far[before] < ALIKE:
-            groups[i] = groups[before]
-            continue
-        repeated = bool((far < ALIKE).any())
-        length = REPEATED if repeated else GROUP
-        groups[i] = 2 * (100_000 * logs[i] + int(starts[i] / length)) + repeated
+    before, repeated = _alike(place, logs, starts)
+    length = np.where(repeated, REPEATED, GROUP)
+    groups = 2 * (100_000 * logs + (starts / length).astype(np.int64)) + repeated
+    for i in np.flatnonzero(before >= 0):  # in order, so that groups[before[i]] is final
+        groups[i] = groups[before[i]]
     return groups if len(np.unique(groups)) >= FOLDS else parts
+
+
+def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArray[np.int64], Bools]:
+    """The nearest earlier window that each one repeats, -1 without one; and whether any does.
+
+    Of equal places only the first and the last window count: if those are too near in time, so are
+    the windows between. More and more neighbours are looked up, until an earlier one is among them.
+    """
+    count = len(place)
+    # Mean positions at rest differ in the last bits.
+    places, first, which = np.unique(
+        np.round(place, 9), axis=0, return_index=True, return_inverse=True
+    )
+    last = np.zeros(len(places), dtype=np.int64)
+    np.maximum.at(last, which.ravel(), np.arange(count))
+    tree = cKDTree(places)
+
+    def apart(i: NDArray[np.int64], j: NDArray[np.int64]) -> Bools:
+        out: Bools = (logs[i] != logs[j]) | (np.abs(starts[i] - starts[j]) > APART)
+        return out
+
+    before, repeated = np.full(count, -1), np.zeros(count, dtype=np.bool_)
+    left, near = np.arange(count), 32
+    while len(left):
+        near, more = min(near, len(places)), []
+        for rows in np.array_split(left, 1 + len(left) * near // 2_000_000):
+            far, at = tree.query(place[rows], near, distance_upper_bound=ALIKE)
+            far, at, own = far.reshape(len(rows), -1), at.reshape(len(rows), -1), rows[:, None]
+            within = np.isfinite(far)
+            at[~within] = 0
+            early, late = first[at], last[at]
+            usable = within & (early < own) & apart(early, own)
+            far[~usable] = np.inf
+            least = far.min(axis=1)
+            found = np.isfinite(least)
+            nearest = np.where(usable & (far <= least[:, None] + 1e-9), early, count).min(axis=1)
+            before[rows[found]] = nearest[found]
+            repeated[rows] |= (within & (apart(early, own) | apart(late, own))).any(axis=1)
+            more.append(rows[within[:, -1] & ~found])
+        left = np.concatenate(more) if near < len(places) else np.empty(0, dtype=np.int64)
+        near *= 4
+    return before, repeated
 
 
 def told_apart(
@@ -255,10 +305,10 @@ def told_apart(
     Returns:
         Areas of boosted trees and of logistic regression; NaN with too few windows or groups.
     """
-    a, groups = _windows(real, rows, times, motions)
-    b, _ = _windows(twin, rows, times, motions)
-    labels = np.repeat([0, 1], [len(a), len(b)])
-    return _area(np.concatenate([a, b]), labels, np.concatenate([groups, groups]), seed)
+    windows = _windows(rows, times)
+    table = np.concatenate([_features(real, windows), _features(twin, windows)])
+    groups = _groups_of(windows, times, motions)
+    return _area(table, np.repeat([0, 1], len(windows)), np.tile(groups, 2), seed)
 
 
 def _programs_auc(
@@ -277,13 +327,13 @@ def _programs_auc(
     residuals = [residual_of(arm, trace)[end] for trace, end in ends]
     moving = [np.asarray((np.abs(trace.qd[end]) > SLOW).any(axis=1)) for trace, end in ends]
     at, like = [trace.t[end] for trace, end in ends], [_motion(trace) for trace in own]
-    count = len(_windows(residuals, moving, at, like)[0])
-    table, groups = _windows(
-        [*residuals, *real], [*moving, *rows], [*at, *times], [*like, *motions]
-    )
-    if min(count, len(table) - count) < FEWEST:
+    at = [*at, *times]
+    windows = _windows([*moving, *rows], at)
+    labels = np.array([float(log >= len(own)) for log, _ in windows])
+    if min(np.sum(labels == 0), np.sum(labels == 1)) < FEWEST:
         return (float("nan"),) * 2
-    return _area(table, np.where(np.arange(len(table)) < count, 0.0, 1.0), groups, seed)
+    table = _features([*residuals, *real], windows)
+    return _area(table, labels, _groups_of(windows, at, [*like, *motions]), seed)
 
 
 def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> tuple[float, float]:

@@ -8,7 +8,7 @@ guarantee (:mod:`.guarantee`). :mod:`.expected_rate` computes an interval of the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.nominal import nominal_arm
-from tauguard.detectors.calibration.recording import Load, Recording, pieces
+from tauguard.detectors.calibration.recording import LEAST, Load, Recording, motion_length, pieces
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
@@ -124,41 +124,58 @@ def train_and_score(
 def train_beside(
     detector: Detector,
     struck: Sequence[Trace],
-    logs: Sequence[Trace],
+    logs: Mapping[str, Trace],
     arm: ArmModel,
     per_hour: float,
-) -> tuple[CollisionAlarm, list[FreeScores]]:
+) -> tuple[CollisionAlarm, list[FreeScores], tuple[str, ...]]:
     """A learned alarm to run beside free motion, which already has plain thresholds.
 
-    The threshold comes from the logs alone: simulated noise differs. Each log is scored by a
-    detector and an arm model that were made without it. Few logs show little of the scores' tail,
-    so the threshold exceeds all these scores, the more the fewer logs there are (:data:`UNLIKE`).
+    The threshold comes from the logs alone: simulated noise differs. Each log, or each half of a
+    single one, is scored by a detector and an arm model that were made without it. Few logs show
+    little of the scores' tail, so the threshold exceeds all these scores, the more the fewer logs
+    there are (:data:`UNLIKE`).
 
     Args:
         detector: settings of a method.
         struck: simulated traces with truth, with the arm's joint names.
-        logs: collision-free and without a load, of the arm.
+        logs: collision-free and without a load, of the arm, by name.
         arm: calibrated from all logs.
         per_hour: accepted false alarms per hour of motion like the logs'.
+
+    Returns:
+        The alarm, the normalised scores that its threshold comes from, and notes for the user.
 
     Raises:
         ValueError: traces that do not fit, or too little motion.
     """
-    parts = pieces([Recording(log) for log in logs], 2)
-    calibrated, found = Subsets(arm, parts), list[FreeScores]()
+    parts = pieces([Recording(log) for log in logs.values()], 2)
+    halved = len(parts) > len(logs)
+    names = [f"half {k} of {name}" for name in logs for k in (1, 2)] if halved else list(logs)
+    calibrated, found, notes = Subsets(arm, parts), list[FreeScores](), list[str]()
     for fold in range(min(FOLDS, len(parts))):
-        rest = [k for k in range(len(parts)) if k % FOLDS != fold]
-        try:
+        rest, without = [k for k in range(len(parts)) if k % FOLDS != fold], arm
+        if (seconds := motion_length([parts[k] for k in rest])) >= LEAST:
             without = calibrated(rest)
-        except ValueError:  # too little motion is left without the fold
-            without = arm
+        else:
+            notes.append(
+                f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "
+                f"because {seconds:.1f} s of motion are left without it, expected {LEAST:g} s"
+            )
         fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
         found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]], CONFIRMATION)
     found = [replace(scores, floor=None) for scores in found]
-    alarm, scores = _with_rate(detector.fit([*struck, *logs], arm), found, per_hour, CONFIRMATION)
+    whole = detector.fit([*struck, *logs.values()], arm)
+    alarm, scores = _with_rate(whole, found, per_hour, CONFIRMATION)
     beyond = max(1.0, 1 / (UNLIKE * (len(scores) + 1)))
     least = beyond * max(one.peak for one in scores)
-    return replace(alarm, threshold=max(alarm.threshold, least)), scores
+    if least > alarm.threshold:
+        kind = "halves of a log" if halved else "logs"
+        few = "; few logs make it rarely fire: more, separate logs lower it" if beyond > 1 else ""
+        notes.append(
+            f"the learned score's threshold is {beyond:.2g} times the highest score of "
+            f"{len(scores)} {kind}, whatever --false-alarms-per-hour{few}"
+        )
+    return replace(alarm, threshold=max(alarm.threshold, least)), scores, tuple(notes)
 
 
 def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:

@@ -116,6 +116,8 @@ def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, c
     run(folder, "train", "--twin", made, "--free", folder / "free", "--model", model)
     said = capsys.readouterr().out
     assert "free-motion and srq-svr, of 3 logs and" in said
+    assert "threshold is 5 times the highest score of 3 logs, whatever --false-alarms" in said
+    assert "more, separate logs lower it" in said
     alarm = load_model(model)
     assert alarm.detector.arm.robot.joint_names == ("a", "b", "c")
     found = alarm.detector

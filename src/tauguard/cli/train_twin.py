@@ -72,7 +72,7 @@ def twin_contacts(
             )
     names, logs = arm.robot.joint_names, list(read.traces.values())
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]
-    learned, scores = train_beside(method, struck, logs, arm, per_hour)
+    learned, scores, notes = train_beside(method, struck, read.traces, arm, per_hour)
     quiet = FreeMotion().fit(logs, arm)
     both = BesideFreeMotion(quiet, learned)
     usual = UsualInput.of(logs, quiet.arm)
@@ -83,6 +83,7 @@ def twin_contacts(
         f"score's threshold is {learned.threshold:.3g}"
     )
     print(f"{detector}: {aimed_at(learned, scores, per_hour)}")
+    print_notes(notes)
 
 
 def contacts(twin: Path) -> list[Trace]:
