@@ -5,14 +5,17 @@ from __future__ import annotations
 import functools
 import hashlib
 import io
+import json
 import multiprocessing
 import os
-import pickle
+import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tauguard.atomic_write import write_atomic
@@ -20,8 +23,6 @@ from tauguard.report import versions
 
 #: Packages whose data classes a cached result may contain.
 OURS = ("tauguard", "studies")
-#: What pickled arrays and numbers of numpy consist of.
-ARRAYS = ("_reconstruct", "_frombuffer", "ndarray", "dtype", "scalar")
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
@@ -33,10 +34,7 @@ class Workers:
 
     #: The number of processes; None: one per processor.
     count: int | None = None
-
-    def __init__(self) -> None:
-        """Start no process yet; they start on entry."""
-        self._processes: Any = None
+    _processes: Any = None
 
     def __enter__(self) -> Each:
         """Start the processes; the map takes a function of a module and its jobs."""
@@ -94,55 +92,89 @@ class JobCache:
     ) -> Iterator[Any]:
         if self.folder is None:
             return each(call, jobs)
-        paths = [self.folder / f"{name}-{k:03d}.pickle" for k in range(len(jobs))]
-        known = [path.exists() for path in paths]
-        every = zip(jobs, paths, known, strict=True)
-        missing = [(call, job, path) for job, path, done in every if not done]
-        return _InOrder(iter(zip(paths, known, strict=True)), each(_done, missing))
-
-
-@dataclass(frozen=True)
-class _InOrder:
-    """Results in the order of the jobs; if one raises, iteration can continue with the next."""
-
-    jobs: Iterator[tuple[Path, bool]]  #: file of each result, and whether it is cached
-    fresh: Iterator[Any]
-
-    def __iter__(self) -> _InOrder:
-        return self
-
-    def __next__(self) -> Any:
-        path, known = next(self.jobs)
-        return read(path) if known else next(self.fresh)
+        paths = [self.folder / f"{name}-{k:03d}.npz" for k in range(len(jobs))]
+        kept = {path for path in paths if path.exists()}
+        every = zip(jobs, paths, strict=True)
+        fresh = each(_done, [(call, job, path) for job, path in every if path not in kept])
+        # After an error, iteration can continue with the next job, unlike that of a generator.
+        return map(lambda path: read(path) if path in kept else next(fresh), paths)
 
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
     """Run a job and write its result to a file."""
     call, own, path = job
     result = call(own)
-    write_atomic(path, pickle.dumps(result))
+    try:
+        write_atomic(path, _data(result))
+    except ValueError as error:
+        warnings.warn(f"{path} is not kept: {error}", stacklevel=1)
     return result
 
 
-class _Results(pickle.Unpickler):
-    """Reads results: arrays, plain values, and data classes of tauguard or the user's module."""
+def _data(result: Any) -> bytes:
+    """Arrays, and a list in JSON of all objects, each once and after its parts."""
+    objects, places, arrays = list[Any](), dict[int, list[int]](), dict[str, Any]()
 
-    def find_class(self, module: str, name: str) -> Any:
-        package = module.partition(".")[0]
-        if package in OURS:
-            kind = super().find_class(module, name)
-            if is_dataclass(kind):
-                return kind
-        if package == "numpy" and name in ARRAYS:
-            return super().find_class(module, name)
-        from tauguard.detectors.registry import file_type
+    def listed(value: Any) -> Any:
+        kind, name = type(value), type(value).__name__
+        parts: Any = None
+        if value is None or kind in (bool, int, float, str):
+            return value
+        if id(value) in places:
+            return places[id(value)]
+        if kind in (list, tuple):
+            parts = [listed(one) for one in value]
+        elif kind is dict:
+            parts = [[listed(one) for one in pair] for pair in value.items()]
+        elif is_dataclass(kind):
+            name = f"{kind.__module__}:{kind.__qualname__}"
+            parts = {own.name: listed(getattr(value, own.name)) for own in fields(kind) if own.init}
+        elif isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+            name, arrays[str(len(objects))] = "array", value
+        else:
+            raise ValueError(f"a {name} is neither an array nor a data class nor plain data")
+        objects.append([name, parts])
+        return places.setdefault(id(value), [len(objects) - 1])
 
-        return file_type(f"{module}:{name}")
+    file, text = io.BytesIO(), json.dumps([listed(result), objects])
+    np.savez(file, objects=np.frombuffer(text.encode(), np.uint8), **arrays)
+    return file.getvalue()
+
+
+def _type(name: str) -> Any:
+    """A data class in a module that is loaded, of a detector, or in the user's module."""
+    from tauguard.detectors.registry import file_type
+
+    module, _, own = name.partition(":")
+    ours = module.partition(".")[0] in OURS
+    kind = getattr(sys.modules.get(module), own, None) if ours else None
+    kind = kind or file_type(own if ours else name)
+    if not (isinstance(kind, type) and is_dataclass(kind)):
+        raise ValueError(f"{name} is no data class")
+    return kind
 
 
 def read(path: Path) -> Any:
     """Read a cached result; ``ValueError`` names a damaged file."""
+    made: list[Any] = []
+
+    def value(part: Any) -> Any:
+        return made[part[0]] if isinstance(part, list) else part
+
     try:
-        return _Results(io.BytesIO(path.read_bytes())).load()
+        with np.load(path, allow_pickle=False) as arrays:
+            if any(member.compress_type for member in arrays.zip.infolist()):
+                raise ValueError("compressed")  # it might not fit in memory
+            result, objects = json.loads(arrays["objects"].tobytes())
+            for k, (name, parts) in enumerate(objects):
+                if name == "array":
+                    made.append(arrays[str(k)][()])
+                elif name == "dict":
+                    made.append({value(key): value(one) for key, one in parts})
+                elif name in ("list", "tuple"):
+                    made.append((list if name == "list" else tuple)(map(value, parts)))
+                else:
+                    made.append(_type(name)(**{own: value(one) for own, one in parts.items()}))
+        return value(result)
     except Exception as error:  # a damaged file can make the reader raise anything
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error

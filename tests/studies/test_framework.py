@@ -234,7 +234,7 @@ def test_jobs_that_the_cache_holds_are_not_run_again(checkout):
     other = ("--seed", "1", "--workers", "1")  # another seed, another folder
     assert checkout("bench", *flags, *other).returncode == 0
     assert len(log.read_text().split()) == len(first) + len(again) + 3
-    for path in checkout.folder.glob("kept/jobs-seed0-*/*.pickle"):
+    for path in checkout.folder.glob("kept/jobs-seed0-*/*.npz"):
         path.write_bytes(path.read_bytes()[:-40])
     done = checkout("bench", *flags, "--workers", "1")
     assert "damaged, or of another build: delete it" in done.stderr
