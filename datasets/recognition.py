@@ -28,10 +28,10 @@ WORDS = {
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
 #: Unit of a time column by its usual step: smallest step of each unit, and the unit [s].
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
-#: Words in names of commands, of estimates and of the tool's signals, which are not joint sensors.
+#: Words in names of commands and estimates, then also of the tool's signals: no joint sensors.
+_COMMANDS = "target|desired|des|command|commanded|cmd|goal|ref|reference|ext|external"
 _OTHER = re.compile(
-    r"(^|_)(target|desired|des|command|commanded|cmd|goal|ref|reference|control|ext|external|"
-    r"gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
+    f"(^|_)({_COMMANDS}|control|gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
 )
 #: Columns of ROS's JointState in a table: the joint's name, then the kind of signal.
 _NAMED = re.compile(
@@ -43,36 +43,45 @@ _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
 #: A joint's number, followed by the kind of signal: "joint_1_position", "J1 angle (rad)".
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
 #: A unit in brackets: "time [ms]", "angle (rad)".
-_UNIT = re.compile(r"[ _]*[\[(]\D*[\])]$")
+_UNIT = re.compile(r"[ _]*[\[(](?:\D|\^-?\d)*[\])]$")
 #: Units in names, in the form that :func:`_unit` compares, and their value in s, A or N m.
 _SECONDS = {
-    **dict.fromkeys(("nanoseconds", "nanosec", "nsec", "ns"), 1e-9),
-    **dict.fromkeys(("microseconds", "usec", "us"), 1e-6),
-    **dict.fromkeys(("milliseconds", "millis", "msec", "ms"), 1e-3),
-    **dict.fromkeys(("seconds", "secs", "sec", "s"), 1.0),
+    **dict.fromkeys(("nanoseconds", "nanosecond", "nanosec", "nsec", "ns"), 1e-9),
+    **dict.fromkeys(("microseconds", "microsecond", "usec", "us"), 1e-6),
+    **dict.fromkeys(("milliseconds", "millisecond", "millis", "msec", "ms"), 1e-3),
+    **dict.fromkeys(("seconds", "second", "secs", "sec", "s"), 1.0),
 }
 _AMPERES = {
-    **dict.fromkeys(("milliamperes", "milliamps", "ma"), 1e-3),
-    **dict.fromkeys(("amperes", "amps", "amp", "a"), 1.0),
+    **dict.fromkeys(("milliamperes", "milliampere", "milliamps", "milliamp", "ma"), 1e-3),
+    **dict.fromkeys(("amperes", "ampere", "amps", "amp", "a"), 1.0),
 }
 _NEWTON_METRES = {
     **dict.fromkeys(("mnm", "mn_m"), 1e-3),
     **dict.fromkeys(("ncm", "n_cm"), 1e-2),
     **dict.fromkeys(("nm", "n_m"), 1.0),
+    **{f"newton{a}met{b}": 1.0 for a in ("_", "") for b in ("re", "res", "er", "ers")},
 }
 #: Units of angles and of angular speeds that a map can hold, and whether they are degrees.
-_PER_SECOND = ("", "_s", "_per_s", "_sec")
+_PER_SECOND = ("", *(a + b for a in ("_", "_per_") for b in ("s", "sec", "second")))
 _ANGLES = {
     unit + per: unit.startswith("deg")
-    for unit in ("degrees", "deg", "radians", "rad")
+    for unit in ("degrees", "degree", "deg", "radians", "radian", "rad")
     for per in _PER_SECOND
 }
 _OTHER_ANGLES = ("rpm", *(u + per for u in ("mrad", "turns", "rev") for per in _PER_SECOND))
-#: Words in brackets that are no unit.
-_PLAIN_WORDS = {"measured", "actual", "filtered", "joint", "joints", "motor", "link", "side"}
 #: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
 _NAMES = "|".join((*_SECONDS, *_AMPERES, *_NEWTON_METRES, *_ANGLES, *_OTHER_ANGLES))
 _WRITTEN = re.compile(f"(?<=[a-z0-9])_({_NAMES})$")
+#: Units in brackets that no map can hold, and units of another kind of signal.
+_FOREIGN = re.compile(
+    f"(?:^|_)(?:{'|'.join(name for name in _NAMES.split('|') if len(name) > 1)}|"
+    r"(?:[kmcd]?n|k?gf?)_?[cmd]?m|kgf?|kn|kp|(?:lbf?|ozf?|ft|in)_?(?:ft|in|lbf?|ozf?)?|"
+    r"(?:pound|ounce|volt|watt|joule|newton|count|tick|step|turn|pulse|increment|bit|hour|grad|"
+    r"gradian|minute|cycle|rev|revolution)s?|feet|inch(?:es)?|hz|hertz|rps|gon|arc\w*|percent|permille|pct|"
+    r"(?:kilo|centi|deci|milli|micro)\w*)(?:_|$)"
+)
+#: Longest word in brackets that is taken for the symbol of a unit, and words that are none.
+_SYMBOL, _SHORT_WORDS = 3, {"act", "est", "arm", "abs", "avg", "raw", "rms"}
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -83,6 +92,8 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
     named: dict[str, list[str]] = {}
     for name in header:
         plain = _UNIT.sub("", name)
+        if re.search(f"(^|_)({_COMMANDS})(_|$)", _words(name[len(plain) :])):
+            continue
         if match := _NAMED.match(plain):
             named.setdefault(match.group(1) + match.group(4), []).append(name)
         elif match := _WITHIN.match(plain):
@@ -200,13 +211,9 @@ def _units(
             degrees.
     """
     angles = [*groups["q"], *groups.get("qd", ())]
-    for names, units in (
-        (angles, {**_ANGLES, **dict.fromkeys(_OTHER_ANGLES)}),
-        (groups.get("current", ()), _AMPERES),
-        (groups.get("torque", ()), _NEWTON_METRES),
-    ):
-        for name in names:
-            _refuse_unknown(name, units)
+    kinds = {"current": _AMPERES, "torque": _NEWTON_METRES}
+    for field, names in groups.items():
+        _refuse_unknown(names, kinds.get(field, {**_ANGLES, **dict.fromkeys(_OTHER_ANGLES)}))
     for name in angles:
         if _unit(name, dict.fromkeys(_OTHER_ANGLES, True)):
             raise ValueError(
@@ -238,16 +245,29 @@ def _units(
     return degrees, amperes, newton_metres or 1.0
 
 
-def _refuse_unknown(name: str, units: Mapping[str, Any]) -> None:
-    """Raise ``ValueError`` for a unit in brackets that is none of ``units``, and no plain word."""
-    written = _UNIT.search(name)
-    words = _words(written.group()) if written else ""
-    if words and words not in units and not set(words.split("_")) <= _PLAIN_WORDS:
-        raise ValueError(
-            f"column {name}: unit {words.replace('_', ' ')} is not known, expected one of "
-            f"{', '.join(unit.replace('_', ' ') for unit in units)}; convert it, or give a column "
-            "map with the scale"
-        )
+def _refuse_unknown(names: Sequence[str], units: Mapping[str, Any]) -> None:
+    """Raise ``ValueError`` for a unit in brackets that is none of ``units``.
+
+    Words that are no unit, and words that differ from joint to joint, are part of the name.
+    """
+    known = re.compile(f"(?:^|_)(?:{'|'.join(units)})$")
+    told = {name: re.findall(r"[^\[\]()]+", "".join(_UNIT.findall(name))) for name in names}
+    rest = {
+        name: [known.sub("", _words(text.replace("/", " per "))) for text in told[name]]
+        for name in names
+    }
+    differ = len(set(map(str, rest.values()))) > 1 and all(map(any, rest.values()))
+    for name in names:
+        for text, words in zip(told[name], rest[name], strict=True):
+            odd = (words or not _words(text)) and re.search(r"[/^%\d]", text)
+            short = all(len(w) <= _SYMBOL and w not in _SHORT_WORDS for w in words.split("_"))
+            if odd or _FOREIGN.search(words) or (words and short and not differ):
+                short_forms = [u for u in units if len(u) < 6 and units[u] is not None]
+                raise ValueError(
+                    f"column {name}: unit {text} is not known, expected one of "
+                    f"{', '.join(short_forms).replace('_', ' ')}; convert it, or give a column map "
+                    "with the scale"
+                )
 
 
 def _one(said: Mapping[str, Any], remedy: str) -> Any:

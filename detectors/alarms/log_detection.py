@@ -76,7 +76,8 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
             text = ", ".join(f"{name} {level:.0f} N m" for name, level in levels.items())
             notes.append(
                 f"for {seconds:.1f} s joints are faster, or accelerate more, than in the training "
-                f"logs: only torques above {text} raise an alarm there, whatever the card says"
+                f"logs: the bounds there reach {text} (90 % quantile), and lower torques may raise "
+                "no alarm"
             )
     return LogDetection(
         detection,

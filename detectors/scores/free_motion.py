@@ -198,7 +198,9 @@ class FreeMotion:
         Raises:
             ValueError: no or too little motion, or other joints.
         """
-        recordings = [r for r in map(_recording, traces) if not _has_collisions(r.trace)]
+        recordings = [
+            r for r in map(_recording, traces) if not (r.trace.truth and r.trace.truth.collisions)
+        ]
         if traces and not recordings:
             raise ValueError("no trace without collisions: this detector learns from free motion")
         check_joints([r.trace for r in recordings], arm.robot.joint_names)
@@ -217,8 +219,7 @@ class FreeMotion:
         judged = [with_load_of(part, one).judge(part.trace) for part, one in own_arms]
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
         lacking = unseen([r.trace for r in recordings])
-        fresh = learned(bound, judged)
-        return replace(prior, bound=fresh, seconds=seconds, unseen=lacking)
+        return replace(prior, bound=learned(bound, judged), seconds=seconds, unseen=lacking)
 
 
 def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotion:
@@ -273,10 +274,6 @@ def _recording(trace: Trace | Recording) -> Recording:
     if isinstance(trace, Recording):
         return trace
     return Recording(trace) if trace.truth is None else Recording(trace, None)
-
-
-def _has_collisions(trace: Trace) -> bool:
-    return trace.truth is not None and bool(trace.truth.collisions)
 
 
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
@@ -379,8 +376,7 @@ def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
         slowness = np.exp(-speed / CREEP)
         x = np.column_stack([np.ones(on.sum()), speed, qdd[on, j], hardest[on], slowness])
         weight = WORTH / EVERY * USUAL
-        y = residual[on, j] / level
-        found[j] = level * upper_quantile(x, y, QUANTILE, PRIOR, weight)
+        found[j] = level * upper_quantile(x, residual[on, j] / level, QUANTILE, PRIOR, weight)
     return found
 
 

@@ -1,5 +1,7 @@
 """What a log's columns are is told from names and numbers; copies of one state are no samples."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -160,23 +162,58 @@ def test_angles_in_other_units_are_refused(unit):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("torque_# [lbf in]", "unit lbf in is not known, expected one of mnm, .*nm, n m; convert"),
+        (
+            "torque_# [lbf in]",
+            "unit lbf in is not known, expected one of mnm, .*n m; convert",
+        ),
         (
             "current_# (counts)",
-            "unit counts is not known, expected one of milliamperes, .* a; convert",
+            "unit counts is not known, expected one of ma, .* a; convert",
         ),
-        ("torque_# (measured)", ""),
-        ("torque_#", ""),
+        ("torque_# [ft]", "unit ft is"),
+        ("torque_# (in)", "unit in is"),
+        ("torque_# [N/m]", "unit N/m is"),
+        ("torque_# [m^2]", r"unit m\^2 is"),
+        ("torque_# [dNm]", "unit dNm is"),
+        ("torque_# [kgf cm]", "unit kgf cm is"),
+        ("torque_# [%]", "unit % is"),
+        ("torque_# [milli N m]", "unit milli N m is"),
+        ("torque_# (N m, filtered)", "unit N m, filtered is"),
+        ("torque_# [amperes]", "unit amperes is"),
+        ("current_# [rpm]", "unit rpm is"),
     ],
 )
 def test_a_unit_in_brackets_that_is_not_known_is_refused(name, said):
     names = ["t", *(kind.replace("#", k) for kind in ("q#", "qd#", name) for k in "12")]
     table = np.ones((5, 7)) * np.arange(5)[:, None]
-    if not said:
-        assert recognised(names, table).torque_scale == 1.0
-        return
     with pytest.raises(ValueError, match=f"column {name[:7]}.*{said}"):
         recognised(names, table)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "scales"),
+    [
+        ("t [second],q# (radian),qd# [rad/second],tau# [newton metres]", (1.0, False, 1.0)),
+        ("t (s),q# (radians),qd# [rad/sec],tau# [Newton meter]", (1.0, False, 1.0)),
+        ("t [milliseconds],q# (degree),qd# [degrees/s],tau# (N·m)", (1e-3, True, 1.0)),
+        ("t [seconds],q# [deg],qd# (deg per second),current# [ampere]", (1.0, True, 1.0)),
+        ("t [s],q# (shoulder|elbow),qd# (shoulder|elbow),tau# (raw|tool)", (1.0, False, 1.0)),
+        ("t [s],q# (J|K),qd#,tau# (shoulder|elbow) [mNm]", (1.0, False, 1e-3)),
+        ("t [s],q# (measured),qd# (actual),tau# (estimated)", (1.0, False, 1.0)),
+        ("t [s],q# (desired),q# (measured),qd#,current# (q-axis)", (1.0, False, 1.0)),
+    ],
+)
+def test_spelled_units_and_words_that_are_no_unit_are_read(kinds, scales):
+    names = []
+    for kind in kinds.split(","):
+        for k in (0, 1) if "#" in kind else (0,):
+            word = re.sub(r"(\w+)\|(\w+)", lambda m, k=k: m.group(k + 1), kind)
+            names.append(word.replace("#", str(k + 1)))
+    found = recognised(names, np.ones((5, len(names))) * np.arange(5)[:, None])
+    assert (found.time_scale, found.degrees, found.torque_scale) == scales
+    assert found.current_scale == 1.0
+    assert len(found.q) == 2
+    assert not any("desired" in name for name in found.q)
 
 
 def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):

@@ -88,9 +88,12 @@ def command(
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
     target = _target(model)
     if twin is not None:
-        given = [robot, calibration, confidence, card, gains, payload, accept, arm]
+        given = [robot, calibration, confidence, card, gains, payload, accept, arm, folds]
         if not free or any(given):
-            raise ValueError("--twin goes with --free, --columns, --detector, --torque only")
+            raise ValueError(
+                "--twin goes with --free, --columns, --detector, --torque, "
+                "--false-alarms-per-hour, --mend and --resample only"
+            )
         from tauguard.cli.train_twin import twin_contacts
 
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
