@@ -48,7 +48,7 @@ class Rounded(Rebuilt):
         def __init__(
             self, core: Tetrahedra | Boxes | Parallelepipeds | Hulls, radius: ArrayLike
         ) -> None:
-            """Take anything that NumPy reads as these arrays."""
+            """Accept anything that NumPy reads as an array of radii."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.core, Tetrahedra | Boxes | Parallelepipeds | Hulls):

@@ -1,6 +1,6 @@
 // Bernstein polynomials on [0, 1] with integer coefficients of fixed width: their roots, and the
-// sign of one polynomial at a root of another. This is enough for queries with short coefficients
-// and simple roots, which most are; exact_polynomial.hpp has integers of any length.
+// sign of one polynomial at a root of another. They decide most queries, whose coefficients are
+// short and whose roots are simple. For the others exact_polynomial.hpp has integers of any length.
 //
 // A polynomial of degree n is sum_i c_i (1 - t)^(n - i) t^i, in the Bernstein basis without
 // binomial factors. In this form a product is a convolution, the number of sign variations of the
@@ -23,9 +23,12 @@ using geometry::FixedInt;
 constexpr int time_bits = 52;
 constexpr std::int64_t end_of_time = std::int64_t{1} << time_bits;
 
-// Coefficients have 128 bits per degree. If the coefficients of a motion (degree 1) are below
-// 2^117, those of a side of the hull (exact.cpp) are below 2^236, those of the sum of the sides
-// below 2^238, those of the cubic below 2^356, and those of the remainders below 2^834.
+// Coefficients have 128 bits per degree. Bounds, if the differences of vertices (degree 1) have
+// coefficients below 2^117:
+//   2^236  a side of the hull of the differences (exact.cpp, degree 2)
+//   2^238  the sum of the sides
+//   2^356  the coplanarity cubic
+//   2^834  remainders of polynomial division
 template <int degree>
 struct Bernstein {
   std::array<FixedInt<2 * degree>, degree + 1> c;

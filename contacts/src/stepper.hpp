@@ -13,20 +13,21 @@
 namespace tauguard::contacts {
 
 // A pair that a step brings into contact. For a flex, `time` is the earliest time and `deepest` the
-// deepest level over the flex's simplices.
+// deepest level over the flex's simplices. The shapes of each level are eroded by a larger depth
+// (verdict.hpp).
 struct PairHit {
-  int pair, deepest;  // number of the pair; deepest level (verdict.hpp) whose eroded shapes met
+  int pair, deepest;  // number of the pair; deepest level whose eroded shapes met
   bool passed;        // the eroded shapes of the last level met: the pair would have passed through
-  bool lost;          // the last shapes meet at the start, but had been apart: no longer guarded
+  bool lost;          // those of the last level meet at the start of the step: no longer guarded
   bool brushed;       // the pair touched and separated within the step; no eroded shapes met
   double time;        // first touch, as a fraction of the step; 0 if the pair touched at the start
-  double way;         // upper bound of the approach of the pair's points in the step [m]
+  double way;         // upper bound on how far the two shapes approach each other in the step [m]
   std::vector<std::int32_t> features;  // deepest simplices of the flex
   std::vector<std::int32_t> corners;   // of a pair of flexes: the vertices that crossed
 };
 
-// A sub-step that was rolled back: when the next attempt ends [s], the pair that caused it, and
-// whether its contact parameters were stiffened.
+// A sub-step that was rolled back: the end time of the next attempt [s], the pair that caused the
+// rollback, and whether the contact parameters of this pair were stiffened.
 struct Cut {
   double time;
   int pair;
@@ -55,7 +56,8 @@ class Stepper {
  public:
   // Appends the crossings of flexes with flexes in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
-  // ImpactZone(hits, qpos, length) repeats a sub-step from `qpos`, with the hits in impact zones.
+  // The pairs that impact zones stopped. ImpactZone(hits, qpos, length) repeats a sub-step of
+  // `length` [s] from `qpos` with the pairs of the hits in impact zones.
   struct Stopped {
     std::vector<int> pairs;
     double work;  // work of mocap bodies [J]

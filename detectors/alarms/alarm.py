@@ -123,7 +123,8 @@ class CollisionAlarm(Frozen):
         """Alarms of a trace, with the residual of the plain momentum observer.
 
         Raises:
-            ValueError: number of joints or sample rate differs from the training's.
+            ValueError: the trace has another number of joints than the training data, or a
+                sample rate that the detector does not accept.
         """
         score = self.scores(trace)
         samples = self.samples

@@ -284,7 +284,7 @@ def _without_lag(after: PostAlarmWindow, least: float) -> tuple[float, Array]:
 
 
 def _contact(along: Array, top: int) -> tuple[int, int]:
-    """First and last row of the contact whose torque is highest at row ``top``."""
+    """First and last sample of a contact; its torque is highest at sample ``top``."""
     weak = along < CONTACT_FRACTION * along[top]
     before, later = np.flatnonzero(weak[:top]), np.flatnonzero(weak[top:])
     first = int(before[-1]) if len(before) else 0

@@ -9,7 +9,8 @@ namespace tauguard::rigid {
 namespace {
 
 // If the radii are below this fraction of the size, the normal does not give the touching features.
-// It is along the segment between the cores, whose ends are accurate to 1e-9 of the size.
+// The normal is along the segment between the cores. The ends of this segment are accurate to 1e-9
+// of the size, so the direction of a short segment is not.
 constexpr double small_radii = 1e-6;
 
 // A common point of overlapping grown bodies, on the segment between their cores.

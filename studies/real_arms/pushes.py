@@ -101,7 +101,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def arm_tallies(arm: ArmData, turns: int, rng: np.random.Generator) -> dict[str, Tally]:
-    """Results of every detector on one arm; ``turns`` of its folds are held out."""
+    """Results of every detector on one arm, with ``turns`` folds held out one by one."""
     start, free, contact = nominal(arm), recordings(arm), touched(arm)
     tallies: dict[str, Tally] = {}
 

@@ -122,4 +122,4 @@ def test_the_trial_is_a_command():
     out = subprocess.run(command, capture_output=True, text=True)
     assert out.returncode == 0, out.stderr
     assert out.stdout.count("tauguard/") == len(ENVIRONMENTS)
-    assert "largest force against a skull" in out.stdout
+    assert "largest force on a skull" in out.stdout

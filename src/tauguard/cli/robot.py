@@ -183,7 +183,7 @@ def text(facts: Facts, rows: list[dict[str, object]], bound: float) -> str:
 
     shown = [{key: _cell(value) for key, value in row.items()} for row in rows]
     lines = [text_table(shown), ""]
-    lines.append(f"largest force against a skull, 150 N/mm: {bound:.0f} N")
+    lines.append(f"largest force on a skull of 150 N/mm stiffness: {bound:.0f} N")
     lines.append(f"tool: {facts.tool or 'origin of the last link'}")
     lines += [f"{part}: {source}" for part, source in sorted(facts.sources.items())]
     return "\n".join(lines)
