@@ -113,7 +113,7 @@ def rounded(name: str, signal: Array) -> Array:
 
 
 def table(trace: Trace, number: int, residual: Array | None, like: pa.Schema) -> pa.Table:
-    """A stored trace as the rows of a shard."""
+    """The rows of a shard for episode ``number``, as a table with the columns of ``like``."""
     truth = given(trace.truth)
     rows, joints = trace.q.shape
     wide = {name: getattr(trace, name) for name in JOINT_SIGNALS if name != "tau_ext"}

@@ -14,15 +14,15 @@ struct Cubics {
   Double4 b[4];
 };
 
-// The lanes in which all coefficients certainly have one sign, so that there is no root.
+// The lanes with certainly no root: all coefficients have the same sign.
 TAUGUARD_INLINE Mask4 one_sign(const Cubics& c, Double4 error) {
   const Double4 least = min(min(c.b[0], c.b[1]), min(c.b[2], c.b[3])),
                 most = max(max(c.b[0], c.b[1]), max(c.b[2], c.b[3]));
   return (least > error) | (most < -error);
 }
 
-// The lanes in which the coefficients certainly change their sign once, so that there is one root:
-// the first and the last one have different signs, and the sequence changes its sign only once.
+// The lanes with certainly one root: the first and the last coefficient differ in sign, and the
+// sequence changes its sign once, whatever the sign of an uncertain coefficient.
 TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
   const Double4 *b = c.b, below = -error;
   const Mask4 falls = (b[0] > error) & (b[3] < below) & ((b[1] > error) | (b[2] < below)),

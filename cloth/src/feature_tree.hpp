@@ -35,8 +35,8 @@ struct Groups {
 
 class FeatureTree {
  public:
-  // Places every feature by the centroid of its vertices at the start of the step. The upper levels
-  // of the tree divide the groups, the lower ones divide space.
+  // Places every feature by the centroid that its vertices have at the start of the step. The upper
+  // levels of the tree divide the groups, the lower ones divide space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
   // Computes the bounds of every leaf and node for this step.
   void refit(const Projection& points, int threads);

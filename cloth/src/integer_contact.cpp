@@ -1,4 +1,4 @@
-// The steps are those of exact.cpp, which explains the terms.
+// First contact in integers, by the steps of exact.cpp, which explains the terms.
 #include "integer_contact.hpp"
 
 #include <algorithm>
@@ -14,8 +14,8 @@ namespace {
 
 using Vector = std::array<Bernstein<1>, 3>;
 
-// Coordinates k of four vertices at both ends, [vertex][end], as integers in a unit for this axis;
-// false if they do not fit.
+// Coordinate k of four vertices at the start and the end of the step, out[vertex][end], as integers
+// in a common unit; false if they span more than `coordinate_bits`.
 bool on_axis(const Ends& x, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
   double values[8];
   for (int v = 0; v < 4; ++v)

@@ -1,4 +1,4 @@
-// The energy budget of a guarded step: how much kinetic energy contacts may add.
+// The energy budget of a guarded step: how much total energy contacts may add.
 #pragma once
 
 #include "mocap.hpp"

@@ -1,7 +1,7 @@
 """Impulse and peak force of a contact, with intervals from draws of the force given a residual.
 
 A mean force does not show its uncertainty: a force whose line intersects the joint axes causes no
-torque. Draws of points, scales and forces do. If the force is not identifiable, the draws are
+torque. Draws of points, scales and forces show it. If the force is not identifiable, the draws are
 spread as widely as the prior.
 """
 
@@ -227,7 +227,7 @@ class Severity:
             force = f"impulse {self.impulse.text('N s')}, {force}"
         if self.peak.identifiable:
             return force
-        return f"{self.torque.text(names)}, {force} (more if it acts where joints hardly feel it)"
+        return f"{self.torque.text(names)}, {force} (more if it acts where it causes little torque)"
 
 
 def severity(

@@ -27,7 +27,8 @@ def beside_labels(
 
     Returns:
         JSON values: numbers of ``contacts``, ``found``, ``still_up`` and ``false_alarms``; onsets
-        of ``missed`` contacts [s]; ``delays`` of found ones [s]; and ``free_seconds``.
+        of ``missed`` contacts [s]; ``delays`` of found ones [s]; and ``free_seconds``, the time in
+        which every alarm that begins is false [s].
     """
     onsets = [a for a, _ in touched]
     windows = [
@@ -60,7 +61,7 @@ def beside_labels(
 
 
 def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
-    """Results of :func:`beside_labels` in one or two lines, with times since ``since`` [s]."""
+    """The results of :func:`beside_labels` as text; times are counted from ``since`` [s]."""
     delays = found["delays"]
     when = (
         f" ({1e3 * median(delays):.0f} ms after the onset in the median, at most "
@@ -70,13 +71,11 @@ def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
     )
     text = f"labels: {found['contacts']} contacts, {found['found']} found{when}"
     if found["still_up"]:
-        text += f", {found['still_up']} while an alarm was still up"
+        text += f", {found['still_up']} began during an earlier alarm (not judged)"
     missed = [f"{onset - since:.2f}" for onset in found["missed"]]
     text += f", {len(missed)} missed"
     if missed:
         text += f" (at {', '.join(missed[:8])}{', ...' if len(missed) > 8 else ''} s)"
     count = found["false_alarms"]
-    return (
-        f"{text}; {count} alarm{'' if count == 1 else 's'} outside of them in "
-        f"{found['free_seconds']:.1f} s"
-    )
+    alarms = f"{count} false alarm{'' if count == 1 else 's'}"
+    return f"{text}; {alarms} in the {found['free_seconds']:.1f} s without contact"

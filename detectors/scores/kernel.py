@@ -1,4 +1,4 @@
-"""Support vector regression with the SRQ kernel, and its function, a weighted sum of kernels."""
+"""Support vector regression with the squared rational quadratic (SRQ) kernel."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class KernelMachine(Frozen):
     sigma: float
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError`` names what does not fit."""
+        """Check the shapes and sigma: ``ValueError`` names what does not fit."""
         if self.vectors.ndim != 2 or self.weights.shape != self.vectors.shape[:1]:
             raise ValueError(f"vectors {self.vectors.shape}, weights {self.weights.shape}: differ")
         if not (np.isfinite(self.sigma) and self.sigma > 0):
@@ -58,7 +58,7 @@ class KernelMachine(Frozen):
 
 
 def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int = 0) -> Array:
-    """``K_ij = 1 / (1 + |a_i - b_j|^2 / sigma^2)^2``.
+    """The squared rational quadratic kernel ``K_ij = 1 / (1 + |a_i - b_j|^2 / sigma^2)^2``.
 
     Args:
         a: shape (N, d).
@@ -81,7 +81,7 @@ def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int =
 
 
 class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """Epsilon-SVR with the SRQ kernel, a scikit-learn regressor.
+    """A scikit-learn regressor: epsilon-SVR with the kernel of :func:`srq_kernel`.
 
     Attributes:
         svr_: the fitted ``sklearn.svm.SVR(kernel="precomputed")``.
@@ -89,7 +89,7 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """
 
     def __init__(self, sigma: float = 3.0, C: float = 1.0, epsilon: float = 0.02) -> None:
-        """Keep the settings (sigma: kernel length; C, epsilon: as of ``sklearn.svm.SVR``)."""
+        """Keep the settings: the kernel's sigma; C and epsilon as in ``sklearn.svm.SVR``."""
         self.sigma = sigma
         self.C = C
         self.epsilon = epsilon
@@ -129,7 +129,7 @@ def reduced_set(
     Args:
         vectors: support vectors, shape (S, d).
         coefficients: coefficients of the vectors, shape (S,).
-        sigma: length of the SRQ kernel.
+        sigma: length scale of the SRQ kernel.
         count: largest number of vectors, 1 to S.
 
     Returns:

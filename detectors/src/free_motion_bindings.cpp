@@ -1,4 +1,4 @@
-// The free-motion detector on arrays; shapes are checked in Python.
+// Python bindings of the free-motion detector, which take the samples of a whole log as arrays.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -34,7 +34,7 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
   for (const auto& a : {ratio, bound, residual, qdd, rest})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
-  require(dt.shape(0) == rows, "run: one interval per row");
+  require(dt.shape(0) == rows, "run: dt must have one interval per row of q");
   nb::gil_scoped_release release;
   stream.reset();
   for (std::size_t t = 0; t < rows; ++t) {

@@ -11,7 +11,7 @@
 
 namespace tauguard::envs {
 
-// A row-major array of doubles that the plant reads or writes and does not own.
+// A row-major array of doubles that the plant reads or writes; `owner`, if given, keeps it alive.
 class Held {
  public:
   Held() = default;

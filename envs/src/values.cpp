@@ -1,5 +1,4 @@
-// Python bindings of the values that a plant is made of. The values are described where their types
-// are declared.
+// Python bindings of the structs that a plant is built from; headers describe their members.
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -19,15 +18,17 @@ void bind_joint(nb::module_& m) {
           "__init__",
           [](Joint* self, const nb::kwargs& given) {
             Joint joint;
-            std::size_t known = 0;
+            std::string known;
+            std::size_t count = 0;
             for_each_value(joint, [&](const char* name, auto& value) {
               if (!given.contains(name))
-                throw nb::type_error((std::string("Joint: no ") + name).c_str());
+                throw nb::type_error((std::string("Joint: missing keyword ") + name).c_str());
               value = nb::cast<std::decay_t<decltype(value)>>(given[name]);
-              ++known;
+              known += std::string(" ") + name;
+              ++count;
             });
-            if (given.size() != known)
-              throw nb::type_error("Joint: a keyword that it does not have");
+            if (given.size() != count)
+              throw nb::type_error(("Joint: unknown keyword; known are" + known).c_str());
             new (self) Joint(std::move(joint));
           },
           nb::sig("def __init__(self, **kwargs: object) -> None"));

@@ -307,7 +307,7 @@ def draw(rows: list[Row], figure: Any) -> None:
         errorbars(axes[0], at, (r["link_right"] for r in links), fmt="o-", label=method)
         points = [r["point_cm"] for r in mine if r["study"] == "contact"]
         axes[1].plot(at, points, "o-", label=method)
-    for axis, label in ((axes[0], "link right"), (axes[1], "point error, median [cm]")):
+    for axis, label in ((axes[0], "link accuracy (0 to 1)"), (axes[1], "median point error [cm]")):
         axis.set_xticks(range(len(names)), [name.removesuffix(" N m") for name in names])
         axis.set(xlabel="external torque [N m]", ylabel=label)
         axis.legend()

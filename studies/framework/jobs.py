@@ -55,7 +55,7 @@ class Workers:
 
 
 def build(*more: object) -> str:
-    """A hash of everything that decides a detector's answers: versions, sources, and ``more``."""
+    """A hash of versions, the Python sources of detectors and simulation, and ``more``."""
     from tauguard.datasets.code_identity import detection_sources
 
     return hashlib.sha256(repr((more, versions(), *detection_sources())).encode()).hexdigest()[:16]
@@ -63,13 +63,13 @@ def build(*more: object) -> str:
 
 @dataclass(frozen=True)
 class JobCache:
-    """Results of one part's jobs in a folder; without a folder nothing is cached."""
+    """Results of the jobs of a study's part in a folder; without one nothing is cached."""
 
     folder: Path | None
 
     @classmethod
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> JobCache:
-        """Use one folder for each seed, size and build.
+        """A cache in ``keep``, with a folder for each study, seed and :func:`build` of the size.
 
         After a change of native code or of the study itself, use another folder: such a change is
         not detected.
@@ -177,4 +177,4 @@ def read(path: Path) -> Any:
                     made.append(_type(name)(**{own: value(one) for own, one in parts.items()}))
         return value(result)
     except Exception as error:  # a damaged file can make the reader raise anything
-        raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
+        raise ValueError(f"{path}: damaged, or of other code: delete it ({error})") from error

@@ -237,7 +237,7 @@ def test_jobs_that_the_cache_holds_are_not_run_again(checkout):
     for path in checkout.folder.glob("kept/jobs-seed0-*/*.npz"):
         path.write_bytes(path.read_bytes()[:-40])
     done = checkout("bench", *flags, "--workers", "1")
-    assert "damaged, or of another build: delete it" in done.stderr
+    assert "damaged, or of other code: delete it" in done.stderr
 
 
 def test_a_cache_that_cannot_be_made_is_one_line(checkout):

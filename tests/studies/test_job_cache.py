@@ -101,4 +101,4 @@ def test_a_cached_file_of_somebody_else_is_refused_by_its_name(tmp_path):
     said = ran(REFUSED, tmp_path, *names)
     assert not (tmp_path / "ran").exists()
     for name in names:
-        assert f"{name}: damaged, or of another build: delete it" in said, name
+        assert f"{name}: damaged, or of other code: delete it" in said, name

@@ -21,12 +21,13 @@ def test_each_contact_is_found_held_or_missed() -> None:
     assert found["free_seconds"] == pytest.approx(9.0 - 0.3 - 0.5 - 1.0 - 0.5)
     assert labels_text(found, 1.0) == (
         "labels: 4 contacts, 2 found (225 ms after the onset in the median, at most 400 ms), "
-        "1 while an alarm was still up, 1 missed (at 1.00 s); 1 alarm outside of them in 6.7 s"
+        "1 began during an earlier alarm (not judged), 1 missed (at 1.00 s); "
+        "1 false alarm in the 6.7 s without contact"
     )
 
 
 def test_a_log_without_contacts_has_false_alarms_only() -> None:
     found = beside_labels([Alarm(1.0, 1.1), Alarm(2.0, 2.1)], [], 0.0, 4.0)
     assert labels_text(found) == (
-        "labels: 0 contacts, 0 found, 0 missed; 2 alarms outside of them in 4.0 s"
+        "labels: 0 contacts, 0 found, 0 missed; 2 false alarms in the 4.0 s without contact"
     )
