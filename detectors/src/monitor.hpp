@@ -45,13 +45,15 @@ class Monitor {
         last_(3 * n_),
         between_(3 * n_),
         out_((2 + motion_numbers) * n_) {
-    if (alarm_.estimator()) observer_.compare(*alarm_.estimator());
+    if (estimator()) observer_.compare(*estimator());
   }
 
   std::size_t joints() const { return n_; }
+  // The estimator of the detector; null if the detector has none.
+  const Estimator* estimator() const { return alarm_.estimator(); }
   bool settled() const { return time_ >= ready_; }
   // The detector's estimator if it has stepped with the last sample as given, else null.
-  const Estimator* fed() const { return bad_ ? nullptr : alarm_.estimator(); }
+  const Estimator* fed() const { return bad_ ? nullptr : estimator(); }
 
   const Thought& step(double t, const double* q, const double* qd, const double* current) {
     const Verdict verdict = check_.step(t, q, qd, current);
@@ -93,7 +95,7 @@ class Monitor {
 
   Verdict judge_torques(const double* q, const double* qd, const double* current, double dt) {
     observer_.step(q, qd, current, dt, out_.data(), out_.data() + n_, out_.data() + 2 * n_,
-                   alarm_.estimator());
+                   estimator());
     return torques_.step(out_.data(), current, dt);
   }
 

@@ -121,13 +121,13 @@ nb::typed<nb::tuple, int, int, double, bool> steps(Monitor& monitor, In1 t, In2 
           "estimator, last, residuals, alarms: another shape");
   std::vector<double> out((2 + motion_numbers) * n);
   Thought first;
+  if (monitor.estimator()) estimator.compare(*monitor.estimator());
   for (std::size_t i = 0; i < rows; ++i) {
     const double *a = q.data() + i * n, *b = qd.data() + i * n, *c = current.data() + i * n;
     const Thought& said = monitor.step(t.data()[i], a, b, c);
     alarms.data()[i] = said.alarm;
     if (first.why.fault == Fault::none) first = said;
     if (finite(a, n) && finite(b, n) && finite(c, n)) {
-      if (monitor.fed()) estimator.compare(*monitor.fed());
       estimator.step(a, b, c, dt, out.data(), out.data() + n, out.data() + 2 * n, monitor.fed());
       std::copy_n(out.data(), n, last.data());
     }
