@@ -1,0 +1,173 @@
+"""Units in the names of columns: read, refused, or not units at all."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tauguard.datasets.columns import ColumnMap
+from tauguard.datasets.logs import read_log
+from tauguard.datasets.recognition import described, recognised
+from tests.datasets.test_recognition import motion, written
+
+
+def test_units_may_be_the_last_words_of_names():
+    kinds = ("pos_deg", "vel_deg_s", "motor_current_mA")
+    names = ["timestamp_us", *(f"axis{k}_{kind}" for kind in kinds for k in (1, 2, 3))]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    table[:, 0], table[:, 7:] = 10_000 * np.arange(50), 800 * table[:, 7:]
+    found = recognised(names, table)
+    assert found.degrees  # by its name: no angle is beyond two turns
+    assert (found.t, found.time_scale, found.current_scale) == ("timestamp_us", 1e-6, 1e-3)
+    assert found.qd == ("axis1_vel_deg_s", "axis2_vel_deg_s", "axis3_vel_deg_s")
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "units"),
+    [
+        (
+            ("timestamp_ms", "axis#_pos_rad", "axis#_vel_rad_s", "axis#_current_mA"),
+            (0.25, 20, 30),
+            (1e-3, False, 1e-3),
+        ),
+        (
+            ("time [us]", "J# angle (rad)", "J# speed (rad/s)", "J# current [A]"),
+            (40, 20, 300),
+            (1e-6, False, 1.0),
+        ),
+        (
+            ("time (\u00b5s)", "q#_pos [\u00b0]", "q#_vel [\u00b0/s]", "q#_current [mA]"),
+            (40, 1, 3),
+            (1e-6, True, 1e-3),
+        ),
+        (("t_s", "pos_#", "vel_deg_s_#", "current_#"), (0.6, 1, 3), (1.0, True, 1.0)),
+        (("timestamp_ns", "q_#", "qd_#", "current_A_#"), (1000, 20, 300), (1e-9, True, 1.0)),
+        (("seconds", "q[#]", "qd[#]", "current[#]"), (0.6, 1, 300), (1.0, False, 1e-3)),
+    ],
+)
+def test_a_named_unit_beats_what_values_suggest(names, values, units):
+    header = [names[0], *(name.replace("#", str(k)) for name in names[1:] for k in (1, 2))]
+    table = np.ones((50, 7)) * [0, *(values[k] for k in (1, 1)), 1, 1, values[2], values[2]]
+    table[:, 0] = values[0] * np.arange(50)
+    found = recognised(header, table)
+    assert found.qd == (header[3], header[4])
+    assert (found.time_scale, found.degrees, found.current_scale) == units
+
+
+@pytest.mark.parametrize(
+    ("time", "torque", "scales"),
+    [
+        ("timestamp_msec", "tau_mNm_#", (1e-3, 1e-3)),
+        ("time_sec", "joint_#_torque [mNm]", (1.0, 1e-3)),
+        ("time_seconds", "torque_# [N\u00b7cm]", (1.0, 1e-2)),
+        ("t_usec", "effort_Nm_#", (1e-6, 1.0)),
+        ("t [ms]", "measured_torque_# [mN m]", (1e-3, -1e-3)),
+    ],
+)
+def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
+    names = [time, *(kind.replace("#", k) for kind in ("q#", "qd#", torque) for k in "12")]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    table[:, 0] = 0.7 * np.arange(50)
+    found = recognised(names, table)
+    assert (found.t, found.torque) == (time, tuple(names[5:]))
+    assert (found.time_scale, found.torque_scale) == scales
+    unit = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m", -1e-3: "mN m, opposite sign"}[scales[1]]
+    assert f"[{unit}]" in described(found)
+
+
+@pytest.mark.parametrize("parts", [("sec", "nanosec"), ("stamp_s", "stamp_ns"), ("t", "t_usec")])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_time_in_two_columns_is_refused(parts, first):
+    names = [
+        parts[first],
+        parts[1 - first],
+        *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12"),
+    ]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    t = 100 + 0.03125 * np.arange(50)
+    table[:, first] = np.floor(t)
+    table[:, 1 - first] = 1e9 * (t % 1)
+    with pytest.raises(ValueError, match=f"columns {parts[0]} and {parts[1]}: parts of one time"):
+        recognised(names, table)
+    table[:, first], table[:, 1 - first] = t, 1e9 * t  # a second clock is no part
+    assert recognised(names, table).t in parts
+
+
+@pytest.mark.parametrize("unit", ["rpm", "mrad/s", "turns", "rev_per_s"])
+def test_angles_in_other_units_are_refused(unit):
+    names = ["t", *(f"{kind}{k}" for kind in ("q", f"velocity_{unit}_", "current") for k in "12")]
+    with pytest.raises(ValueError, match=f"column velocity_{unit}_1: expected radians or degrees"):
+        recognised(names, np.ones((5, 7)) * np.arange(5)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "torque_# [lbf in]",
+            "unit lbf in is not known, expected one of mnm, .*n m; convert",
+        ),
+        (
+            "current_# (counts)",
+            "unit counts is not known, expected one of ma, .* a; convert",
+        ),
+        ("torque_# [ft]", "unit ft is"),
+        ("torque_# (in)", "unit in is"),
+        ("torque_# [N/m]", "unit N/m is"),
+        ("torque_# [m^2]", r"unit m\^2 is"),
+        ("torque_# [dNm]", "unit dNm is"),
+        ("torque_# [kgf cm]", "unit kgf cm is"),
+        ("torque_# [%]", "unit % is"),
+        ("torque_# [milli N m]", "unit milli N m is"),
+        ("torque_# (N m, filtered)", "unit N m, filtered is"),
+        ("torque_# [amperes]", "unit amperes is"),
+        ("current_# [rpm]", "unit rpm is"),
+    ],
+)
+def test_a_unit_in_brackets_that_is_not_known_is_refused(name, said):
+    names = ["t", *(kind.replace("#", k) for kind in ("q#", "qd#", name) for k in "12")]
+    table = np.ones((5, 7)) * np.arange(5)[:, None]
+    with pytest.raises(ValueError, match=f"column {name[:7]}.*{said}"):
+        recognised(names, table)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "scales"),
+    [
+        ("t [second],q# (radian),qd# [rad/second],tau# [newton metres]", (1.0, False, 1.0)),
+        ("t (s),q# (radians),qd# [rad/sec],tau# [Newton meter]", (1.0, False, 1.0)),
+        ("t [milliseconds],q# (degree),qd# [degrees/s],tau# (N·m)", (1e-3, True, 1.0)),
+        ("t [seconds],q# [deg],qd# (deg per second),current# [ampere]", (1.0, True, 1.0)),
+        ("t [s],q# (shoulder|elbow),qd# (shoulder|elbow),tau# (raw|tool)", (1.0, False, 1.0)),
+        ("t [s],q# (J|K),qd#,tau# (shoulder|elbow) [mNm]", (1.0, False, 1e-3)),
+        ("t [s],q# (measured),qd# (actual),tau# (estimated)", (1.0, False, 1.0)),
+        ("t [s],q# (desired),q# (measured),qd#,current# (q-axis)", (1.0, False, 1.0)),
+    ],
+)
+def test_spelled_units_and_words_that_are_no_unit_are_read(kinds, scales):
+    names = []
+    for kind in kinds.split(","):
+        for k in (0, 1) if "#" in kind else (0,):
+            word = re.sub(r"(\w+)\|(\w+)", lambda m, k=k: m.group(k + 1), kind)
+            names.append(word.replace("#", str(k + 1)))
+    found = recognised(names, np.ones((5, len(names))) * np.arange(5)[:, None])
+    assert (found.time_scale, found.degrees, found.torque_scale) == scales
+    assert found.current_scale == 1.0
+    assert len(found.q) == 2
+    assert not any("desired" in name for name in found.q)
+
+
+def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):
+    t, q, qd, i = motion()
+    names = ["t", *(f"axis{k}_{kind}" for kind in ("pos_rad", "vel_deg_s", "amps") for k in (1, 2))]
+    path = written(tmp_path / "log.csv", names, t, q, np.rad2deg(qd), i)
+    said = "axis1_pos_rad and axis1_vel_deg_s are in different units.*a column map without qd"
+    for columns in (None, "auto"):
+        with pytest.raises(ValueError, match=said):
+            read_log(path, columns)
+    columns = ColumnMap("t", tuple(names[1:3]), current=tuple(names[5:]))
+    np.testing.assert_allclose(read_log(path, columns).trace.qd[5:], qd[5:], atol=0.05)
+    names = ["t", "q1", "q2", "current 1 [A]", "current 2 [mA]"]
+    path = written(tmp_path / "mixed.csv", names, t, q, i)
+    with pytest.raises(ValueError, match=r"current 2 .* a current_scale for each joint"):
+        read_log(path, "auto")
