@@ -273,19 +273,7 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         gripper=file.gripper,
         sources=said.sources,
     )
-    if file.mended:
-        names = ", ".join(file.mended[:4]) + (", ..." if len(file.mended) > 4 else "")
-        said.sources["inertia"] = (
-            f"no body can have the file's of {names}: made the nearest possible"
-        )
-    if file.replaced:
-        said.sources["shapes"] = "; ".join(
-            f"{name}: {what}" for name, what in file.replaced.items()
-        )
-    if file.gripper:
-        said.sources["gripper"] = f"{robot.gripper}ed: {', '.join(file.gripper)}".replace(
-            "passiveed", "passive"
-        )
+    said.changes(file)
     return Arm(spec, file.links, facts)
 
 
@@ -305,6 +293,21 @@ class _Said:
 
     def derived(self, name: str, words: str) -> None:
         self.sources[name] = f"derived: {words}"
+
+    def changes(self, file: ArmFile) -> None:
+        """Record what of the file was changed or left out."""
+        if file.mended:
+            names = ", ".join(file.mended[:4]) + (", ..." if len(file.mended) > 4 else "")
+            self.sources["inertia"] = (
+                f"no body can have the file's of {names}: made the nearest possible"
+            )
+        if file.replaced:
+            self.sources["shapes"] = "; ".join(
+                f"{name}: {what}" for name, what in file.replaced.items()
+            )
+        if file.gripper:
+            kind = "passive" if self.robot.gripper == "passive" else f"{self.robot.gripper}ed"
+            self.sources["gripper"] = f"{kind}: {', '.join(file.gripper)}"
 
 
 def _rotor(

@@ -269,8 +269,14 @@ def test_an_untold_load_names_its_log(folder, capsys):
     [
         (("--traces", "x", "--torque"), "--torque: with --free only"),
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
+        (("--traces", "x", "--mend", "deg"), "--mend or --resample: with --free only"),
         (("--traces", "x", "--calibration", "x"), "--calibration x: the same folder as --traces"),
-        (("--free", "x", "--robot", "r", "--confidence", "0.9"), "go with --traces only"),
+        (("--free", "x", "--robot", "r", "--confidence", "0.9"), "--confidence: go with --traces"),
+        (("--free", "x", "--robot", "r", "--folds", "2"), "--folds: go with --traces only"),
+        (("--free", "x", "--twin", "t", "--card", "c.png"), "--twin goes with --free, --columns"),
+        (("--traces", "x", "--twin", "t"), "--twin goes with --free, --columns"),
+        (("--traces", "x", "--confidence", ".9"), "--confidence belongs to a guarantee"),
+        (("--folds", "2"), "give --traces (labelled recordings) or --free"),
     ],
 )
 def test_flags_of_the_other_training(capsys, arguments, message):

@@ -10,6 +10,8 @@ import tyro
 from tauguard.datasets.columns import AS_IS, Reading
 
 if TYPE_CHECKING:
+    from tauguard.arrays import Array
+    from tauguard.cli.free_logs import FreeLogs
     from tauguard.detectors.calibration.identification import Identified
 
 #: A lower torque per current unit [N m/A] suggests that the columns hold torques (about 1 then).
@@ -65,14 +67,8 @@ def command(
     """
     import numpy as np
 
-    from tauguard.cli.free_logs import explain, free_logs, hold_to
-    from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import not_shown
+    from tauguard.cli.free_logs import free_logs, hold_to
     from tauguard.detectors.calibration.arm_file import save_arm
-    from tauguard.detectors.calibration.assessment import check_loads, left_out
-    from tauguard.detectors.calibration.checks import check_order, check_weight, torque_per_ampere
-    from tauguard.detectors.calibration.identification import filtered_logs, identify
-    from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.detectors.evaluation.acceptance import check_held_out
     from tauguard.detectors.features.motion_regimes import exceeded
     from tauguard.models.robot import bodies_file
@@ -83,7 +79,38 @@ def command(
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains cannot be combined with --scale {scale}, which finds the gains")
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
-    names, recordings, arm = list(given.logs), list(given.logs.values()), given.arm
+    found, held = identified(given, accept)
+    names, recordings = list(given.logs), list(given.logs.values())
+    logs_of = (found.arm, names, recordings)
+    hold_to("error", accept, lambda: check_held_out(*logs_of, held))
+    target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
+    save_arm(found.arm, robot, target, scale=given.scale, logs=names)
+    result = summary(names, found, held, target) | {"scale": given.source}
+    speeds = [(one.trace.t, np.abs(one.trace.qd)) for one in recordings]
+    result["speed_rad_s"] = exceeded(speeds).tolist()
+    report(result, found)
+    if json is not None:
+        write_json(json, result)
+
+
+def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, list[Array]]:
+    """The calibrated arm, and the residual RMS of each log without its own calibration [N m].
+
+    Each RMS has shape (n,); there are none if too few logs are given to leave one out.
+
+    Raises:
+        ValueError: exchanged joints, other bodies than the robot file's, a wrong load, or bursts of
+            torque, unless ``accept`` names the check.
+    """
+    from tauguard.cli.free_logs import explain, hold_to
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import not_shown
+    from tauguard.detectors.calibration.assessment import check_loads, left_out
+    from tauguard.detectors.calibration.checks import check_order, check_weight, torque_per_ampere
+    from tauguard.detectors.calibration.identification import filtered_logs, identify
+    from tauguard.detectors.calibration.recording import each_can_be_left_out
+
+    arm, recordings = given.arm, list(given.logs.values())
     traces = [recording.trace for recording in recordings]
     hold_to("order", accept, lambda: check_order(arm, given.logs))
     data = filtered_logs(arm, recordings) if given.scale == "gains" else None
@@ -97,26 +124,15 @@ def command(
             f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as for joint "
             "torques: if they are in N m, add --torque"
         )
-    held = (
-        left_out(arm, recordings, scale=given.scale, data=data)
-        if each_can_be_left_out(recordings)
-        else []
-    )
-    shown = not_shown(list(given.all_traces.values()))
-    print_notes(shown)
+    held: list[Array] = []
+    if each_can_be_left_out(recordings):
+        held = left_out(arm, recordings, scale=given.scale, data=data)
+    print_notes(not_shown(list(given.all_traces.values())))
     explain(found.arm, given.logs, held, accept)
-    logs_of = (found.arm, names, recordings)
-    hold_to("error", accept, lambda: check_held_out(*logs_of, held))
-    target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
-    save_arm(found.arm, robot, target, scale=given.scale, logs=names)
-    result = summary(names, found, held, target) | {"scale": given.source}
-    result["speed_rad_s"] = exceeded([(t.t, np.abs(t.qd)) for t in traces]).tolist()
-    report(result, found)
-    if json is not None:
-        write_json(json, result)
+    return found, held
 
 
-def summary(names: list[str], found: Identified, held: list[Any], target: Path) -> dict[str, Any]:
+def summary(names: list[str], found: Identified, held: list[Array], target: Path) -> dict[str, Any]:
     """The results, as JSON values."""
     return {
         "name": "calibrate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ import tyro
 from tauguard.datasets.columns import AS_IS, Reading
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from tauguard.detectors import ArmModel, CollisionAlarm, FreeScores
     from tauguard.detectors.calibration.recording import Recording
@@ -82,51 +83,56 @@ def command(
             recordings for the threshold.
         reading: with --free, how logs are read.
     """
+    _check_flags({name for name, value in locals().items() if value != DEFAULTS[name]})
     if folds is not None and folds < 1:
         raise ValueError(f"--folds {folds}: expected 1 or more")
-    if (traces is None) == (not free):
-        raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
     target = _target(model)
-    if twin is not None:
-        given = [robot, calibration, confidence, card, gains, payload, accept, arm, folds]
-        if not free or any(given):
-            raise ValueError(
-                "--twin goes with --free, --columns, --detector, --torque, "
-                "--false-alarms-per-hour, --mend and --resample only"
-            )
-        from tauguard.cli.train_twin import twin_contacts
-
-        rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
-        twin_contacts(twin, free, target, columns, detector, rate, torque, reading)
-        return
-    if free and (calibration or confidence is not None or detector != "srq-svr"):
-        raise ValueError("--detector, --calibration and --confidence go with --traces only")
-    if calibration is None and confidence is not None:
-        raise ValueError("--confidence belongs to a guarantee: give --calibration")
+    rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
     if traces is not None:
-        own: dict[str, object] = {
-            "--robot": robot,
-            "--columns": columns,
-            "--gains": gains,
-            "--payload": payload,
-            "--torque": torque,
-            "--card": card,
-            "--accept": accept,
-        }
-        if given := [name for name, value in own.items() if value]:
-            raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
-        rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
         labelled_motion(traces, target, detector, calibration, rate, sure, arm, folds)
-        return
-    from tauguard.models.robot import bodies_file
+    elif twin is not None:
+        from tauguard.cli.train_twin import twin_contacts
 
-    if robot is None:
+        twin_contacts(twin, free, target, columns, detector, rate, torque, reading)
+    elif robot is None:
         raise ValueError("--free needs --robot")
-    rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
-    robot = bodies_file(robot)
-    args = (columns, gains, payload, torque, card, accept, rate, reading)
-    free_motion(free, robot, target, *args)
+    else:
+        from tauguard.models.robot import bodies_file
+
+        args = (columns, gains, payload, torque, card, accept, rate, reading)
+        free_motion(free, bodies_file(robot), target, *args)
+
+
+DEFAULTS = {name: one.default for name, one in inspect.signature(command).parameters.items()}
+#: Flags of a training on labelled recordings, of one on free logs, and of one with a twin.
+OF_TRACES = ("detector", "calibration", "confidence", "arm", "folds")
+OF_FREE = ("robot", "columns", "gains", "payload", "torque", "card", "accept", "reading")
+OF_TWIN = ("columns", "detector", "torque", "reading")
+
+
+def _check_flags(given: Collection[str]) -> None:
+    """Raise ``ValueError`` if flags are ``given`` that do not go together."""
+
+    def among(names: Sequence[str]) -> str:
+        found = ", ".join(f"--{name}" for name in names if name in given)
+        return found.replace("--reading", "--mend or --resample")
+
+    if ("traces" in given) == ("free" in given):
+        raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
+    twin, traces = "twin" in given, "traces" in given
+    others = [name for name in (*OF_TRACES, *OF_FREE) if name not in OF_TWIN]
+    if twin and (traces or among(others)):
+        raise ValueError(
+            "--twin goes with --free, --columns, --detector, --torque, "
+            "--false-alarms-per-hour, --mend and --resample only"
+        )
+    if not traces and not twin and (wrong := among(OF_TRACES)):
+        raise ValueError(f"{wrong}: go with --traces only")
+    if traces and (wrong := among(OF_FREE)):
+        raise ValueError(f"{wrong}: with --free only, not with --traces")
+    if "confidence" in given and "calibration" not in given:
+        raise ValueError("--confidence belongs to a guarantee: give --calibration")
 
 
 def _target(model: Path | None) -> Path:

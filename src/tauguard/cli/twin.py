@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tauguard.arrays import Array
     from tauguard.cli.free_logs import FreeLogs
     from tauguard.detectors.calibration.recording import Recording
+    from tauguard.traces import Trace
     from tauguard.twin import Likeness, Twin
 
 #: Number of parts of the logs; leaving out each in turn gives the intervals.
@@ -63,11 +64,10 @@ def command(
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.checks import check_order
-    from tauguard.detectors.calibration.recording import each_can_be_left_out, pieces
+    from tauguard.detectors.calibration.recording import each_can_be_left_out
     from tauguard.models import load_arm
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
-    from tauguard.twin import compare, with_alarms, with_intervals
     from tauguard.twin.description import write_twin
 
     if out.suffix != ".toml":
@@ -81,34 +81,17 @@ def command(
     recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
-    apart = (
-        left_out(given.arm, recordings, scale=given.scale)
-        if each_can_be_left_out(recordings)
-        else []
-    )
+    apart = []
+    if each_can_be_left_out(recordings):
+        apart = left_out(given.arm, recordings, scale=given.scale)
     seen = explain(twin.arm, given.logs, apart, accept)
-    parts = pieces(recordings, PARTS)
-    rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
-    others, lacking = _made_of_each(given, rest, limit)
-    twin = with_intervals(twin, others)
-    own = [*twin.notes, *(f"intervals lack a part of the logs: {why}" for why in lacking)]
+    twin, own = sure_of(twin, given, limit)
     print_notes(own)
+    tried = read_logs(judge, columns, robot, torque, reading).traces if judge else None
+    likeness, compared, reasons = judged(twin, given, limit, tried)
     notes = (*left, *seen, *own)
-    held: list[int] = []
-    if judge:
-        tried = read_logs(judge, columns, robot, torque, reading).traces
-    else:
-        held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
-        tried = {names[k]: recordings[k].trace for k in held}
-    used = [r for k, r in enumerate(recordings) if k not in held]
-    judged, reasons = _made_of_each(given, [used], limit) if held else ([twin], [])
-    likeness = None
-    if judged and tried:
-        bare = [r.trace for r in used if _unloaded(r)]
-        likeness = compare(judged[0].arm, judged[0].drive, list(tried.values()), own=bare)
-        likeness = with_alarms(likeness, used, given.arm, list(tried.values()))
     written = write_twin(replace(twin, notes=notes), robot, out, names, given.source)
-    rows = report(twin.arm.robot.joint_names, likeness, list(tried), reasons)
+    rows = report(twin.arm.robot.joint_names, likeness, compared, reasons)
     if figure is not None and likeness is not None:
         from tauguard.twin.figure import draw
 
@@ -117,7 +100,7 @@ def command(
     print(f"{', '.join(map(str, (out, *written)))}: written")
     if json is not None:
         result = {"name": "twin", "twin": str(out), "scale": given.source, "notes": list(notes)}
-        write_json(json, result | {"judged_on": list(tried), "rows": rows})
+        write_json(json, result | {"judged_on": compared, "rows": rows})
 
 
 def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
@@ -156,6 +139,48 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
         raise ValueError("all logs carry a load: a twin needs at least one without")
     twin = identify_twin(found.arm, bare, limit / abs(found.arm.drive_gain))
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
+
+
+def sure_of(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]:
+    """The twin with intervals from twins that lack a part of the logs, and its notes."""
+    from tauguard.detectors.calibration.recording import pieces
+    from tauguard.twin import with_intervals
+
+    parts = pieces(list(given.logs.values()), PARTS)
+    rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
+    others, lacking = _made_of_each(given, rest, limit)
+    twin = with_intervals(twin, others)
+    return twin, [*twin.notes, *(f"intervals lack a part of the logs: {why}" for why in lacking)]
+
+
+def judged(
+    twin: Twin, given: FreeLogs, limit: Array, tried: dict[str, Trace] | None
+) -> tuple[Likeness | None, list[str], list[str]]:
+    """The likeness of twin and arm in other motion.
+
+    Args:
+        twin: identified from all logs.
+        given: the logs.
+        limit: the arm's largest torques [N m], shape (n,).
+        tried: logs of other motion; None: every third log, compared with a twin of the others.
+
+    Returns:
+        The likeness or None, the names of the compared logs, and why there is no likeness.
+    """
+    from tauguard.twin import compare, with_alarms
+
+    names, recordings = list(given.logs), list(given.logs.values())
+    held: list[int] = []
+    if tried is None:
+        held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
+        tried = {names[k]: recordings[k].trace for k in held}
+    used = [r for k, r in enumerate(recordings) if k not in held]
+    twins, reasons = _made_of_each(given, [used], limit) if held else ([twin], [])
+    if not twins or not tried:
+        return None, list(tried), reasons
+    bare, others = [r.trace for r in used if _unloaded(r)], list(tried.values())
+    likeness = compare(twins[0].arm, twins[0].drive, others, own=bare)
+    return with_alarms(likeness, used, given.arm, others), list(tried), reasons
 
 
 def _made_of_each(
