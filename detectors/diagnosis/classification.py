@@ -1,9 +1,12 @@
-"""The kind of event behind an alarm: an impact, a clamping, an intended push or a payload change.
+"""The kind of event behind an alarm: transient contact, clamping, intended push or payload change.
 
 Three questions, each with a measure that has a physical meaning:
 
-* Does it last? An impact is over when a clamping, a push or a payload is still there. The measure
-is the part of the residual that is left at the end of the window, in the direction of its peak.
+* Does it last? A transient contact, such as an impact or a short push, is over at the end of the
+window, when a clamping, a push or a payload is still there. The measure is the part of the residual
+that is left at the end of the window, in the direction of its peak. The window ends 0.3 s after the
+alarm (at 100 Hz: 0.5 s). ISO/TS 15066:2016 has limits for transient contact up to 0.5 s, then those
+for quasi-static contact.
 * Is it a load? An unknown payload pulls down at the flange: the fraction of the residual
   that one constant mass and first moment at the last link explain, over all joints and samples.
 * Is it intended? A hand pushes more slowly than an arm runs into things (Golz et al. 2015,
@@ -22,7 +25,7 @@ from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 
 #: The kinds of events. A payload change is no collision; a push is an intended contact.
-KINDS = ("impact", "clamp", "push", "payload")
+KINDS = ("transient", "clamp", "push", "payload")
 #: An event lasts if this fraction of its peak residual remains at the end of the window. The second
 #: number is the width of the logistic function of the decision.
 LASTS, LASTS_WIDTH = 0.5, 0.05
@@ -104,7 +107,7 @@ def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
 def load(after: PostAlarmWindow) -> tuple[float, float, float]:
     """Fraction of the residual that a constant payload explains, its mass [kg] and distance [m].
 
-    Weighted least squares for mass and first moment over the samples once the impact is over.
+    Weighted least squares for mass and first moment over the samples once a transient is over.
     """
     rows = after.t >= min(SETTLING + SETTLING_LAGS * after.lag, 0.5 * float(after.t[-1]))
     weight = 1 / after.deviation[rows]

@@ -214,7 +214,7 @@ class Severity:
     torque: ContactTorque  #: torques, which do not depend on the point of contact
 
     def text(self, kind: str, names: Sequence[str]) -> str:
-        """The severity in a few words, with the impulse of an impact.
+        """The severity in a few words, with the impulse of a transient contact.
 
         If the force has no useful upper bound, the joint torque, which is measured, comes first.
 
@@ -223,7 +223,7 @@ class Severity:
             names: names of the joints.
         """
         force = f"peak force {self.peak.text('N')}"
-        if kind == "impact":
+        if kind == "transient":
             force = f"impulse {self.impulse.text('N s')}, {force}"
         if self.peak.identifiable:
             return force

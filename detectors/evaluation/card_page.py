@@ -107,7 +107,7 @@ def _lines(card: ThresholdCard) -> list[str]:
         "force found at the tool: in half (in 95 %) of all poses and directions",
         *(f"  {_force(card, name)} {said}" for name, said in TOOL.items()),
         "a contact has to last 0.1 s: an alarm needs 24 ms above a bound at rest and 40 ms in "
-        "motion, so a shorter impact has to be harder",
+        "motion, so a shorter contact has to be harder",
         _alarms(card),
     ]
     speeds = zip(card.joints, card.fast, card.twice, strict=True)

@@ -119,10 +119,10 @@ def first_alarm(alarms: Sequence[Alarm], collision: Collision) -> Alarm | None:
 
 
 def contact_kind(trace: Trace, collision: Collision, alarm: Alarm | None) -> str:
-    """The kind of a contact: a clamp still presses at the end of the window, an impact does not."""
+    """The kind of a contact: a clamp still presses at the end of the window."""
     if collision.kind != "clamp" or alarm is None or trace.truth is None:
-        return "impact"
+        return "transient"
     end = alarm.start + AFTER
     rows = slice(*np.searchsorted(trace.t, (end - END, end)))
     force = trace.truth.contact_force[rows]
-    return "clamp" if len(force) and force.min() > 0 else "impact"
+    return "clamp" if len(force) and force.min() > 0 else "transient"

@@ -221,7 +221,7 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     assert 3 <= len(result["events"]) <= 6
     assert all(sum(event["links"]) == pytest.approx(1.0) for event in result["events"])
     kinds = [event["kind"] for event in result["events"]]
-    assert set(kinds) <= {"impact", "clamp", "push"}
+    assert set(kinds) <= {"transient", "clamp", "push"}
     out = capsys.readouterr().out
     assert f"{kinds[0]}, " in out
     assert "peak force " in out

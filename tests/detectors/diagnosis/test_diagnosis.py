@@ -56,8 +56,8 @@ FORCE = 80 * WITH
 @pytest.mark.parametrize(
     ("shape", "velocity", "kind"),
     [
-        (np.exp(-(((TIME - 0.005) / 0.006) ** 2)), AGAINST, "impact"),
-        (np.sin(np.pi * np.clip(TIME / 0.15, 0, 1)), WITH, "impact"),
+        (np.exp(-(((TIME - 0.005) / 0.006) ** 2)), AGAINST, "transient"),
+        (np.sin(np.pi * np.clip(TIME / 0.15, 0, 1)), WITH, "transient"),
         (1 - np.exp(-np.clip(TIME, 0, None) / 0.01), AGAINST, "clamp"),
         (np.sin(np.pi * np.clip((TIME + 0.02) / 1.4, 0, 1)), WITH, "push"),
     ],
@@ -108,7 +108,7 @@ def test_simulated_contacts_and_payload(trace):
     found = Diagnoser(ARM, link_surface(XML)).diagnose(trace, alarms(trace))
     assert len(found) == 3
     for diagnosis, collision in zip(found, trace.truth.collisions, strict=False):
-        assert diagnosis.kind == "impact"
+        assert diagnosis.kind == "transient"
         assert diagnosis.collision
         assert diagnosis.link == collision.link
         assert diagnosis.links.sum() == pytest.approx(1.0)
@@ -192,4 +192,4 @@ def test_alarms_anywhere_and_at_any_rate_are_explained(trace, stride):
         assert sum(one.kinds.values()) == pytest.approx(1.0)
     if stride < 42:  # at 24 Hz the observer lags by 0.2 s: a pulse of 0.1 s is not seen to end
         assert found[-1].kind == "payload"
-        assert {one.kind for one in found[5:7]} <= {"impact", "clamp"}
+        assert {one.kind for one in found[5:7]} <= {"transient", "clamp"}

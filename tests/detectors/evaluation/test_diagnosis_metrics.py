@@ -32,7 +32,7 @@ def make(collisions):
     return Trace(("j",), T, zero, zero, zero, truth=truth)
 
 
-def said(start, link, kind="impact"):
+def said(start, link, kind="transient"):
     force, point = np.array([0, 30.0, 0]), np.array([0.1, 0.2, 0.4])
     alarm = Alarm(start, start + 0.1)
     return Diagnosis(
