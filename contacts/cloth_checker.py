@@ -12,6 +12,7 @@ from tauguard.contacts._contacts import simplices
 from tauguard.contacts.checker import Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs
+from tauguard.models.cloth import flex_elements
 
 
 class ClothChecker:
@@ -129,11 +130,9 @@ class _Flex:
                 f"cloth: flex {name!r} has dimension {dim}; this checker handles 2 "
                 '(contype="0" conaffinity="0" excludes the flex)'
             )
-        start, count = int(model.flex_elemdataadr[number]), int(model.flex_elemnum[number])
-        local = model.flex_elem[start : start + 3 * count].reshape(-1, 3)
         self.number = number
         self.radius = float(model.flex_radius[number])
-        self.elements: Index = (local + model.flex_vertadr[number]).astype(np.int32)
+        self.elements: Index = flex_elements(model, number)
         self.bodies = model.flex_vertbodyid[self.elements]
 
     def hangs_on(self, body: int) -> NDArray[np.bool_]:

@@ -105,6 +105,17 @@ def add_sheet(
     spec.attach(part, frame=spec.worldbody.add_frame(), prefix=f"{name}_")
 
 
+def flex_elements(model: Any, flex: int) -> NDArray[np.int32]:
+    """The simplices of a flex of a compiled model, shape (E, corners).
+
+    They are indices into the vertices of all flexes.
+    """
+    corners = int(model.flex_dim[flex]) + 1
+    start, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
+    local = model.flex_elem[start : start + corners * count].reshape(-1, corners)
+    return np.ascontiguousarray(local + model.flex_vertadr[flex], dtype=np.int32)
+
+
 def _numbers(values: NDArray[Any]) -> str:
     return " ".join(map(repr, values.ravel().tolist()))
 

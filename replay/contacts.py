@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.models.cloth import flex_elements
 from tauguard.replay.robot import Motion, bodies, quats_wxyz
 from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, lay_out, log_pose, times
 
@@ -143,8 +144,7 @@ def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
         if model.flex_dim[flex] != 2:
             continue
         first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
-        start = int(model.flex_elemdataadr[flex])
-        faces = model.flex_elem[start : start + 3 * int(model.flex_elemnum[flex])].reshape(-1, 3)
+        faces = flex_elements(model, flex) - first
         place = entity("scene", f"flex {flex}")
         for row, when in enumerate(t):
             recording.set_time(TIMELINE, duration=float(when))

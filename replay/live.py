@@ -15,6 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.models.cloth import flex_elements
 from tauguard.replay.estimates import arrow
 from tauguard.replay.robot import bodies
 from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, drawn, entity
@@ -99,11 +100,9 @@ class LiveView:
         if model.flex_dim[flex] != 2:
             return
         first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
-        element, elements = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
-        triangles = model.flex_elem[element : element + 3 * elements].reshape(-1, 3)
         sheet = rr.Mesh3D(
             vertex_positions=data.flexvert_xpos[first : first + count].astype(np.float32),
-            triangle_indices=triangles,
+            triangle_indices=flex_elements(model, flex) - first,
             albedo_factor=CLOTH,
         )
         self._recording.log(f"scene/cloth_{flex}", sheet)

@@ -14,6 +14,7 @@ from tauguard.contacts.ground_truth import triangles
 from tauguard.contacts.ground_truth.motion import Step
 from tauguard.contacts.ground_truth.pairs import Index, flex_geoms, geom_pairs
 from tauguard.contacts.ground_truth.search import Found, search
+from tauguard.models.cloth import flex_elements
 
 #: A pair that never penetrates deeper than this is not scored [m].
 TOLERANCE = 1e-5
@@ -144,9 +145,8 @@ class GroundTruth:
     def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
         """The row of a flex and a geom: first touch and largest depth over all elements."""
         model = self.model
-        begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
-        elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)
-        elements = elements + int(model.flex_vertadr[flex])
+        elements = flex_elements(model, flex)
+        count = len(elements)
         corners, travel = step.vertices[elements], step.travel[elements]
         geoms = np.full(count, geom)
         bound = np.linalg.norm(travel - step.shift[geom], axis=2).max(axis=1)

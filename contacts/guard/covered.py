@@ -11,8 +11,8 @@ from tauguard.contacts.checker import geom_kinds
 from tauguard.contacts.geoms import CONVEX
 from tauguard.contacts.guard.eroded_shapes import ErodedShapes
 from tauguard.contacts.guard.report import Pair, Partner
-from tauguard.contacts.guard.tunnelling import elements
 from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
+from tauguard.models.cloth import flex_elements
 
 #: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes of
 #: the last level never meet, no part of one partner has passed through the other.
@@ -85,7 +85,7 @@ class Covered:
             near = min(thick, NEAR_FLEX * radius)
             layers = [0.0, 0.5 * near, *(level * thick for level in LEVELS[1:])]
             radii = [radius * (1 - level) for level in (0.0, 0.5, *LEVELS[1:])]
-            simplices = elements(model, flex)
+            simplices = flex_elements(model, flex)
             bodies = model.flex_vertbodyid[simplices]
             hangs = (bodies == int(model.geom_bodyid[geom])).any(axis=1).astype(np.uint8)
             levels = np.array([self._eroded.add(geom, layer) for layer in layers], dtype=np.int32)

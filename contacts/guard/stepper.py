@@ -26,7 +26,8 @@ from tauguard.contacts.guard.followed_fields import (
 from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
-from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
+from tauguard.contacts.guard.tunnelling import TunnellingEvents
+from tauguard.models.cloth import flex_elements
 from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
 #: Settings of the native part; "held" pairs are those whose approach the solver stops.
@@ -118,7 +119,7 @@ class GuardedStepper:
             self._guard.sheet(sheet)
         self._guard.spins(_turning(model))
         self._guard.pulled(pulled(model))
-        self._elements = [elements(model, flex) for flex in range(model.nflex)]
+        self._elements = [flex_elements(model, flex) for flex in range(model.nflex)]
         self._tunnelling = None
         if covered.sheets:
             first = len(covered.pairs) - len(covered.sheets)

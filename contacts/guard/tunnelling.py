@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.cloth import Groups, MeshCCD
+from tauguard.models.cloth import flex_elements
 
 
 class TunnellingEvents:
@@ -25,7 +25,7 @@ class TunnellingEvents:
         for a, b in pairs:
             meets[a, b] = meets[b, a] = True
         chosen = np.flatnonzero(meets.any(axis=1))
-        faces = np.concatenate([elements(model, int(f)) for f in chosen])
+        faces = np.concatenate([flex_elements(model, int(f)) for f in chosen])
         self._flex = np.repeat(np.arange(model.nflex), model.flex_vertnum)
         self._mesh = MeshCCD(faces, groups=Groups(self._flex, meets))
         self._number = {pair: first + k for k, pair in enumerate(pairs)}
@@ -49,11 +49,3 @@ class TunnellingEvents:
     def _pair(self, corners: Sequence[int]) -> int:
         first, second = sorted((int(self._flex[corners[0]]), int(self._flex[corners[-1]])))
         return self._number[first, second]
-
-
-def elements(model: Any, flex: int) -> NDArray[np.int32]:
-    """The simplices of a flex, as indices into the vertices of all flexes. Shape (E, corners)."""
-    corners = int(model.flex_dim[flex]) + 1
-    start, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
-    local = model.flex_elem[start : start + corners * count].reshape(-1, corners)
-    return np.ascontiguousarray(local + model.flex_vertadr[flex], dtype=np.int32)
