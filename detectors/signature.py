@@ -19,14 +19,11 @@ def key_of_user() -> bytes | None:
     Raises:
         ValueError: the file cannot be read, or is shorter than 16 bytes.
     """
-    name = os.environ.get(KEY_FILE)
-    return None if not name else read_key(Path(name))
-
-
-def read_key(path: Path) -> bytes:
-    """The key in a file; errors as for :func:`key_of_user`."""
+    path = os.environ.get(KEY_FILE)
+    if not path:
+        return None
     try:
-        key = path.read_bytes()
+        key = Path(path).read_bytes()
     except OSError as error:
         raise ValueError(f"{path}: the key cannot be read ({error.strerror})") from None
     if len(key) < SHORTEST:

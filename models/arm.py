@@ -152,17 +152,15 @@ def load_arm(source: str | Robot) -> Arm:
     path, sources = Path(robot.file), dict[str, str]()
     if not path.is_file():
         robot, path, sources = _by_name(robot)
-    files = [path, *(Path(f) for f in (_left_over(robot),) if f and Path(f).is_file())]
+    sensors = robot.drive.sensors
+    beside = Path(sensors.left_over) if sensors and sensors.left_over else path
+    files = [path, beside] if beside.is_file() else [path]
     try:
         modified = max(file.stat().st_mtime_ns for file in files)
         arm = _from_file(robot, path, modified, tuple(sources.items()))
     except ValueError as error:
         raise ValueError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
     return replace(arm, spec=arm.spec.copy())
-
-
-def _left_over(robot: Robot) -> str | None:
-    return None if robot.drive.sensors is None else robot.drive.sensors.left_over
 
 
 @functools.lru_cache(maxsize=4)
@@ -241,7 +239,8 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
     for name, inertia in zip(joints, armature, strict=True):
         spec.joint(name).armature = inertia
         model.dof_armature[model.joint(name).dofadr[0]] = inertia
-    dofs = model.jnt_dofadr[derive.joint_ids(model, joints)]
+    ids = derive.joint_ids(model, joints)
+    dofs, slides = model.jnt_dofadr[ids], model.jnt_type[ids] == mujoco.mjtJoint.mjJNT_SLIDE
     speed = np.where(np.isfinite(file.max_speed), file.max_speed, derive.DEFAULT_SPEED)
     words = (
         "the file's limits" if np.isfinite(file.max_speed).all() else "none in the file: 2 rad/s"
@@ -252,7 +251,6 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
     if robot.drive.like is not None:
         lossy = (model.dof_damping[dofs] > 0) | (model.dof_frictionloss[dofs] > 0)
         drive = like_cura6(drive, speed, lossy)
-    inertia = derive.servo_inertia(model, joints)
     facts = Facts(
         name=Path(robot.file).stem,
         joints=joints,
@@ -265,9 +263,9 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         max_acceleration=said.row(
             "max_acceleration", np.full(n, derive.DEFAULT_ACCELERATION), "default"
         ),
-        spread=_spread(model, joints),
-        servo_inertia=inertia,
-        bandwidth=_bandwidth(robot, model, joints, inertia, said),
+        spread=np.where(slides, 0.3, 0.8),
+        servo_inertia=derive.servo_inertia(model, joints),
+        bandwidth=said.row("bandwidth", np.full(n, derive.BANDWIDTH), "default"),
         compensation=robot.friction_compensation,
         tool=_tool(robot, spec, file, said),
         gripper=file.gripper,
@@ -351,21 +349,6 @@ def _home(
         return np.clip(file.home, low, high)
     said.derived("home", "in front of the base, clear of singular poses and of the joints' ends")
     return derive.home_pose(model, joints, tip)
-
-
-def _spread(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    slides = model.jnt_type[derive.joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_SLIDE
-    return np.where(slides, 0.3, 0.8)
-
-
-def _bandwidth(
-    robot: Robot, model: mujoco.MjModel, joints: tuple[str, ...], inertia: Array, said: _Said
-) -> Array:
-    n = len(joints)
-    if robot.bandwidth is not None:
-        return said.row("bandwidth", np.zeros(n), "")
-    said.sources["bandwidth"] = "default"
-    return np.full(n, derive.BANDWIDTH)
 
 
 def _tool(robot: Robot, spec: mujoco.MjSpec, file: ArmFile, said: _Said) -> str | None:

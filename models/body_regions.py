@@ -22,21 +22,12 @@ class BodyRegion:
     stiffness: float  #: k, stiffness of the contact [N/m]
     mass: float  #: m_H, effective mass [kg]
     transient: bool = True  #: False: no transient contact is allowed (skull, face)
-    force_confirmed: bool = False  #: whether an open source confirmed F_QS
-    stiffness_confirmed: bool = False  #: whether an open source confirmed k
-    mass_confirmed: bool = False  #: whether an open source confirmed m_H
+    unconfirmed: tuple[str, ...] = ()  #: fields to show with :data:`UNCONFIRMED`
 
     @property
     def transient_force(self) -> float:
         """F_T, largest force of an impact [N]: twice F_QS, and 0 where no impact is allowed."""
         return 2 * self.quasi_static_force if self.transient else 0.0
-
-    @property
-    def unconfirmed(self) -> tuple[str, ...]:
-        """Fields to show with :data:`UNCONFIRMED`."""
-        fields = ("quasi_static_force", "stiffness", "mass")
-        known = (self.force_confirmed, self.stiffness_confirmed, self.mass_confirmed)
-        return tuple(name for name, sure in zip(fields, known, strict=True) if not sure)
 
     def peak_force(self, speed: float, robot_mass: float) -> float:
         """Peak force [N] of an impact in the standard's model of two masses and a spring.
@@ -59,20 +50,21 @@ class BodyRegion:
         return self.mass * robot_mass / (self.mass + robot_mass)
 
 
-# name, F_QS [N], k [N/mm], m_H [kg], F_QS confirmed, k confirmed; no m_H is confirmed.
-_TABLE = (
-    ("skull", 130, 150, 4.4, False, True),
-    ("face", 65, 75, 4.4, False, True),
-    ("neck", 150, 50, 1.2, False, True),
-    ("back", 210, 35, 40, True, True),
-    ("chest", 140, 25, 40, True, True),
-    ("abdomen", 110, 10, 40, True, True),
-    ("pelvis", 180, 25, 40, True, False),
-    ("upper_arm", 150, 30, 3, True, False),
-    ("lower_arm", 160, 40, 2, True, False),
-    ("hand", 140, 75, 0.6, True, False),
-    ("thigh", 220, 50, 75, False, False),
-    ("lower_leg", 130, 60, 75, False, False),
+_FORCE, _STIFFNESS = ("quasi_static_force",), ("stiffness",)
+# name, F_QS [N], k [N/mm], m_H [kg], unconfirmed fields besides m_H, which is never confirmed.
+_TABLE: tuple[tuple[str, float, float, float, tuple[str, ...]], ...] = (
+    ("skull", 130, 150, 4.4, _FORCE),
+    ("face", 65, 75, 4.4, _FORCE),
+    ("neck", 150, 50, 1.2, _FORCE),
+    ("back", 210, 35, 40, ()),
+    ("chest", 140, 25, 40, ()),
+    ("abdomen", 110, 10, 40, ()),
+    ("pelvis", 180, 25, 40, _STIFFNESS),
+    ("upper_arm", 150, 30, 3, _STIFFNESS),
+    ("lower_arm", 160, 40, 2, _STIFFNESS),
+    ("hand", 140, 75, 0.6, _STIFFNESS),
+    ("thigh", 220, 50, 75, _FORCE + _STIFFNESS),
+    ("lower_leg", 130, 60, 75, _FORCE + _STIFFNESS),
 )
 
 #: The regions by name; ``back`` is back and shoulders.
@@ -83,10 +75,9 @@ BODY_REGIONS = {
         1e3 * stiffness,
         float(mass),
         transient=name not in ("skull", "face"),
-        force_confirmed=force_known,
-        stiffness_confirmed=stiffness_known,
+        unconfirmed=(*open_, "mass"),
     )
-    for name, force, stiffness, mass, force_known, stiffness_known in _TABLE
+    for name, force, stiffness, mass, open_ in _TABLE
 }
 
 

@@ -1,6 +1,7 @@
 """Argument checks that name what is wrong and what would work."""
 
 import dataclasses
+import functools
 from collections.abc import Iterable
 from typing import Any
 
@@ -8,20 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def above_zero(owner: object, *names: str) -> None:
-    """Raise ``ValueError`` unless every number of the named fields is finite and above 0."""
+def above_zero(owner: object, *names: str, zero: bool = False) -> None:
+    """Raise ``ValueError`` unless every number of the named fields is finite and above 0.
+
+    If ``zero``, 0 is allowed.
+    """
     for name in names:
         value = np.asarray(getattr(owner, name), dtype=float)
-        if not (np.isfinite(value) & (value > 0)).all():
-            raise ValueError(f"{type(owner).__name__}.{name} {value}: expected above 0")
+        if not (np.isfinite(value) & ((value >= 0) if zero else (value > 0))).all():
+            wanted = "0 or more" if zero else "above 0"
+            raise ValueError(f"{type(owner).__name__}.{name} {value}: expected {wanted}")
 
 
-def not_negative(owner: object, *names: str) -> None:
-    """Raise ``ValueError`` unless every number of the named fields is finite and 0 or more."""
-    for name in names:
-        value = np.asarray(getattr(owner, name), dtype=float)
-        if not (np.isfinite(value) & (value >= 0)).all():
-            raise ValueError(f"{type(owner).__name__}.{name} {value}: expected 0 or more")
+not_negative = functools.partial(above_zero, zero=True)
 
 
 def vector(owner: object, name: str, size: int) -> tuple[float, ...]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.models.checks import rigid_pose
 from tauguard.models.robot_check import checked_robot, checked_text
+from tauguard.models.urdf import is_urdf, xml_root
 from tauguard.untrusted_input import read_text
 
 #: Deepest nesting of elements in a robot file.
@@ -44,16 +45,11 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
         path = Path(text)
         if not path.is_file():
             raise FileNotFoundError(f"{path}: no such robot file")
-        if path.suffix.lower() == ".urdf" or "<robot" in _beginning(path):
+        if is_urdf(path):
             return _compiled_urdf(read_text(path))
         return mujoco.MjModel.from_xml_path(str(checked_robot(path)))
     except ValueError as error:
         raise ValueError(f"robot: {' '.join(str(error).split())}") from None
-
-
-def _beginning(path: Path) -> str:
-    with open(path, "rb") as stream:
-        return stream.read(4000).decode(errors="replace")
 
 
 def _compiled_urdf(text: str) -> mujoco.MjModel:
@@ -69,10 +65,7 @@ def _compiled_urdf(text: str) -> mujoco.MjModel:
 
 def _without_shapes(urdf: str, compiler: Mapping[str, str] = MappingProxyType({})) -> str:
     """A URDF without visual and collision elements, fixed joints kept."""
-    try:
-        root = ElementTree.fromstring(urdf)
-    except ElementTree.ParseError as error:
-        raise ValueError(f"not well-formed XML ({error})") from None
+    root = xml_root(urdf)
     _check_depth(root)
     for link in root.findall("link"):
         for kind in ("visual", "collision"):

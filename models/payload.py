@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.models.obstacles import pair_weights
 
 #: Distance of the payload's centre of mass from the flange [m].
@@ -39,10 +40,22 @@ def load_body(model: mujoco.MjModel, body: int, mass: float) -> None:
     model.body_inertia[body] = max(load * 0.4 * _RADIUS**2, _NO_INERTIA)
 
 
+def keep_stiffness(model: mujoco.MjModel, before: Array, solref: Array) -> None:
+    """After a change of masses, update derived constants; contact pairs keep their stiffness.
+
+    Args:
+        model: the changed model.
+        before: its :func:`pair_weights` before the change.
+        solref: its ``pair_solref`` before the change.
+    """
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    direct = solref[:, 0] < 0
+    ratio = pair_weights(model)[direct] / before[direct]
+    model.pair_solref[direct] = solref[direct] * ratio[:, None]
+
+
 def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:
     """Set the mass [kg] of the payload body, a compact load in front of the flange.
-
-    The model's derived constants are updated, and contact pairs keep their stated stiffness.
 
     Args:
         model: model of the scene; changed.
@@ -57,9 +70,6 @@ def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: flo
         raise ValueError("the scene has no payload: compose it with SceneSpec(payload=True)")
     if not (np.isfinite(mass) and mass >= 0):
         raise ValueError(f"payload {mass} kg: expected 0 or more")
-    before = pair_weights(model)
+    before, solref = pair_weights(model), model.pair_solref.copy()
     load_body(model, body, mass)
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    direct = model.pair_solref[:, 0] < 0
-    ratio = pair_weights(model)[direct] / before[direct]
-    model.pair_solref[direct] *= ratio[:, None]
+    keep_stiffness(model, before, solref)

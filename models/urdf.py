@@ -42,7 +42,10 @@ class UrdfFile:
 
 def is_urdf(path: Path) -> bool:
     """Whether a file is a URDF, by its extension or its first lines."""
-    return path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]
+    if path.suffix.lower() == ".urdf":
+        return True
+    with open(path, errors="replace") as stream:
+        return "<robot" in stream.read(4000)
 
 
 def xml_root(text: str) -> ElementTree.Element:

@@ -1,6 +1,5 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
-from tauguard.rigid.impact import time_of_impact
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.plane_cache import PlaneCache
@@ -8,7 +7,7 @@ from tauguard.rigid.queries import sweep
 from tauguard.rigid.results import Distances, Impacts, MeshDistances, MeshImpacts, Overlap, Witness
 from tauguard.rigid.rounded import Capsules, Rounded, Spheres
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
-from tauguard.rigid.solids_and_meshes import distance, overlap
+from tauguard.rigid.solids_and_meshes import distance, overlap, time_of_impact
 
 __all__ = [
     "Boxes", "Capsules", "Distances", "Hulls", "Impacts", "MeshContacts", "MeshDistances",

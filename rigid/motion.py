@@ -1,7 +1,6 @@
 """Checked rigid poses and motions."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,16 +61,12 @@ class Motion(Rebuilt):
     linear: NDArray[np.float64]
     angular: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, pose_t0: ArrayLike, linear: ArrayLike, angular: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        pose = poses("pose_t0", self.pose_t0)
+    def __init__(self, pose_t0: ArrayLike, linear: ArrayLike, angular: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        pose = poses("pose_t0", pose_t0)
         object.__setattr__(self, "pose_t0", pose)
-        for name in ("linear", "angular"):
-            value = np.asarray(getattr(self, name))
+        for name, given in (("linear", linear), ("angular", angular)):
+            value = np.asarray(given)
             value = np.broadcast_to(value, (len(pose), 3)) if value.shape == (3,) else value
             object.__setattr__(self, name, frozen_finite(name, value, (len(pose), 3)))
         fast = np.abs(self.angular).max(axis=1, initial=0) > MOST_TURN

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
 from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
+
+Spatial = Tetrahedra | Boxes | Parallelepipeds | Hulls
 
 #: Largest coordinate and radius; products of larger ones would overflow.
 MOST_COORDINATE = 1e100
@@ -40,20 +41,15 @@ class Rounded(Rebuilt):
             that is not finite, or a negative radius (named with its row).
     """
 
-    core: Tetrahedra | Boxes | Parallelepipeds | Hulls
+    core: Spatial
     radius: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self, core: Tetrahedra | Boxes | Parallelepipeds | Hulls, radius: ArrayLike
-        ) -> None:
-            """Accept anything that NumPy reads as an array of radii."""
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
-            raise ValueError(f"core: {type(self.core).__name__}, expected convex bodies in space")
-        object.__setattr__(self, "radius", _radius(self.radius, len(self.core)))
+    def __init__(self, core: Spatial, radius: ArrayLike) -> None:
+        """Check the core, and copy the radii."""
+        if not isinstance(core, Spatial):
+            raise ValueError(f"core: {type(core).__name__}, expected convex bodies in space")
+        object.__setattr__(self, "core", core)
+        object.__setattr__(self, "radius", _radius(radius, len(core)))
 
     def __len__(self) -> int:
         return len(self.core)
@@ -74,14 +70,10 @@ class Spheres(Rebuilt):
     center: NDArray[np.float64]
     radius: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, center: ArrayLike, radius: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_finite("center", self.center, (None, 3)))
-        object.__setattr__(self, "radius", _radius(self.radius, len(self.center)))
+    def __init__(self, center: ArrayLike, radius: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        object.__setattr__(self, "center", frozen_finite("center", center, (None, 3)))
+        object.__setattr__(self, "radius", _radius(radius, len(self.center)))
 
     def __len__(self) -> int:
         return len(self.center)
@@ -109,15 +101,11 @@ class Capsules(Rebuilt):
     end: NDArray[np.float64]
     radius: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, start: ArrayLike, end: ArrayLike, radius: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start", frozen_finite("start", self.start, (None, 3)))
-        object.__setattr__(self, "end", frozen_finite("end", self.end, (len(self.start), 3)))
-        object.__setattr__(self, "radius", _radius(self.radius, len(self.start)))
+    def __init__(self, start: ArrayLike, end: ArrayLike, radius: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        object.__setattr__(self, "start", frozen_finite("start", start, (None, 3)))
+        object.__setattr__(self, "end", frozen_finite("end", end, (len(self.start), 3)))
+        object.__setattr__(self, "radius", _radius(radius, len(self.start)))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -153,7 +141,7 @@ def solid_parts(
         raise ValueError(
             f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
         )
-    if not isinstance(core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
+    if not isinstance(core, Spatial):
         kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
         triangles = hasattr(core, "vertices") and hasattr(core, "faces")
         way = "; a mesh is MeshTree(mesh.vertices, mesh.faces)" if triangles else ""

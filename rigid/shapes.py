@@ -7,7 +7,7 @@ A batch has its own immutable copy of its arrays.
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,13 +46,9 @@ class Tetrahedra(_Batch):
 
     vertices: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, vertices: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 4, 3)))
+    def __init__(self, vertices: ArrayLike) -> None:
+        """Check and copy the array."""
+        object.__setattr__(self, "vertices", frozen_finite("vertices", vertices, (None, 4, 3)))
 
     def __len__(self) -> int:
         return len(self.vertices)
@@ -86,15 +82,11 @@ class Boxes(_Batch):
     #: The largest entry of ``|R^T R - I|`` over the batch, rounded up.
     skew: float = field(init=False, repr=False)
 
-    if TYPE_CHECKING:
-
-        def __init__(self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        center = frozen_finite("center", self.center, (None, 3))
-        half_extents = frozen_finite("half_extents", self.half_extents, (len(center), 3))
-        rotation = frozen_finite("rotation", self.rotation, (len(center), 3, 3))
+    def __init__(self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        center = frozen_finite("center", center, (None, 3))
+        half_extents = frozen_finite("half_extents", half_extents, (len(center), 3))
+        rotation = frozen_finite("rotation", rotation, (len(center), 3, 3))
         if (half_extents < 0).any():
             row, axis = np.argwhere(half_extents < 0)[0]
             raise ValueError(
@@ -149,16 +141,10 @@ class Parallelepipeds(_Batch):
     origin: NDArray[np.float64]
     edges: NDArray[np.float64]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, origin: ArrayLike, edges: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "origin", frozen_finite("origin", self.origin, (None, 3)))
-        object.__setattr__(
-            self, "edges", frozen_finite("edges", self.edges, (len(self.origin), 3, 3))
-        )
+    def __init__(self, origin: ArrayLike, edges: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        object.__setattr__(self, "origin", frozen_finite("origin", origin, (None, 3)))
+        object.__setattr__(self, "edges", frozen_finite("edges", edges, (len(self.origin), 3, 3)))
 
     def __len__(self) -> int:
         return len(self.origin)
@@ -179,15 +165,11 @@ class PointSets(_Batch):
 
     dimensions: ClassVar[int]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
-            """Take anything that NumPy reads as these arrays."""
-
-    def __post_init__(self) -> None:
-        vertices = frozen_finite("vertices", self.vertices, (None, self.dimensions))
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
+    def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
+        """Check and copy the arrays."""
+        points = frozen_finite("vertices", vertices, (None, self.dimensions))
+        object.__setattr__(self, "vertices", points)
+        object.__setattr__(self, "offsets", _partition(offsets, len(points)))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -225,7 +207,7 @@ class Polygons(PointSets):
     dimensions = 2
 
 
-def _partition(given: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def _partition(given: ArrayLike, count: int) -> NDArray[np.int64]:
     array = np.asarray(given)
     if array.ndim != 1 or len(array) == 0 or not np.issubdtype(array.dtype, np.integer):
         raise ValueError(

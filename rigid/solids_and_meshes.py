@@ -1,16 +1,31 @@
-"""Overlap and distance of convex bodies, and of meshes with convex bodies."""
+"""Queries of convex bodies with radii, and of meshes with convex bodies."""
 
 from typing import Literal, cast, get_args, overload
 
-from tauguard.rigid import mesh_bodies
-from tauguard.rigid.mesh import MeshOverlap, MeshTree
-from tauguard.rigid.queries import check_method, sharp_overlap
-from tauguard.rigid.results import Distances, MeshDistances, Overlap
-from tauguard.rigid.rounded import Solid
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.geometry import thread_count
+from tauguard.rigid import _rigid_mesh
+from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
+from tauguard.rigid.motion import Motion, bounded, common_length
+from tauguard.rigid.queries import check_method, find_witness, native, rows, sharp_overlap
+from tauguard.rigid.results import (
+    Distances,
+    Impacts,
+    MeshDistances,
+    MeshImpacts,
+    Overlap,
+    Witness,
+)
+from tauguard.rigid.rounded import Solid, solid_parts
 from tauguard.rigid.shapes import Bodies
-from tauguard.rigid.solid_queries import rounded_overlap, solid_distances
 
 OverlapMethod = Literal["abfme", "sat", "auto"]
+#: Largest coordinate and radius of bodies in a query with a mesh; meshes have the same limit.
+MOST_COORDINATE = 1e30
+
+Native = tuple[int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 
 
 @overload
@@ -55,9 +70,37 @@ def overlap(
         )
     if not special:
         return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
-    if beside := mesh_bodies.mesh_beside(a, b):
-        return mesh_bodies.overlap(*beside, threads)
-    return rounded_overlap(cast(Solid, a), cast(Solid, b), threads)
+    if beside := _mesh_beside(a, b):
+        mesh, bodies, count, swapped = beside
+        face = np.empty(count, dtype=np.int32)
+        mesh._mesh.meets(*bodies, face, thread_count(threads))
+        return MeshOverlap(face >= 0, _faces_of(face, swapped))
+    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
+    hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
+    _rigid_mesh.meets(
+        *native(core_a), radius_a, *native(core_b), radius_b, hit, thread_count(threads)
+    )
+    met = hit.view(np.bool_)
+    return Overlap(met, lambda: _rounded_witness(cast(Solid, a), cast(Solid, b), met, threads))
+
+
+def _rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
+    """A common point or a separating plane of each row, up to rounding."""
+    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
+    cores = distance(core_a, core_b, threads)
+    # Cores that overlap have a common point. Otherwise the point is on the segment between them.
+    point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
+    gap = np.maximum(cores.distance, 0.0)
+    along = 0.5 * (np.maximum(gap - radius_b, 0.0) + np.minimum(gap, radius_a))
+    between = cores.point_a + along[:, None] * cores.normal
+    point = np.where((cores.distance > 0)[:, None], between, point)
+    middle = cores.point_a + 0.5 * (gap + radius_a - radius_b)[:, None] * cores.normal
+    offset = np.einsum("ij,ij->i", cores.normal, middle)
+    return Witness(
+        np.where(hit[:, None], point, np.nan),
+        np.where(hit[:, None], np.nan, cores.normal),
+        np.where(hit, np.nan, offset),
+    )
 
 
 @overload
@@ -88,6 +131,119 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Dist
         ValueError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
             (with a mesh: a coordinate of the bodies beyond 1e30).
     """
-    if beside := mesh_bodies.mesh_beside(a, b):
-        return mesh_bodies.distance(*beside, threads)
-    return solid_distances(cast(Solid, a), cast(Solid, b), threads)
+    if beside := _mesh_beside(a, b):
+        mesh, bodies, count, swapped = beside
+        out, face = np.empty((count, 10)), np.empty(count, dtype=np.int32)
+        mesh._mesh.distances(*bodies, out, face, thread_count(threads))
+        first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
+        if swapped:
+            first, second, normal = second, first, -normal
+        return MeshDistances(out[:, 0], first, second, normal, face)
+    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
+    out = np.empty((rows(core_a, core_b), 10))
+    _rigid_mesh.distances(
+        *native(core_a), radius_a, *native(core_b), radius_b, out, thread_count(threads)
+    )
+    return Distances(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10])
+
+
+@overload
+def time_of_impact(
+    a: Solid, b: Solid, motion_a: Motion, motion_b: Motion, threads: int = 1
+) -> Impacts: ...
+@overload
+def time_of_impact(
+    a: MeshTree, b: MeshTree | Solid, motion_a: Motion, motion_b: Motion, threads: int = 1
+) -> MeshImpacts: ...
+@overload
+def time_of_impact(
+    a: Solid, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
+) -> MeshImpacts: ...
+def time_of_impact(
+    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
+) -> Impacts:
+    """The first contact of moving bodies, t in [0, 1].
+
+    The coordinates of a body are relative to its own frame, which the motion moves. The answer is
+    conservative, also under rounding: at every time before ``time_of_impact`` the bodies are apart.
+    The method is advancement along separating directions (Mirtich 1996; Zhang, Lee and Kim 2006)
+    with a bound on the second derivative: it converges quadratically, from below.
+
+    Args:
+        a: N convex bodies of one kind, with or without radii, or one body. Or a mesh: its surface
+            is tested, not its inside.
+        b: As ``a``. Two meshes may have different bounding volumes.
+        motion_a: N motions, or one.
+        motion_b: N motions, or one.
+        threads: 0 means all processors; the answer does not depend on it.
+
+    Returns:
+        ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b); with a
+        mesh also ``faces``. If two bodies overlap at t = 0, the time is 0, the normal is NaN and
+        the point is in both bodies.
+
+    Raises:
+        ValueError: lengths that do not match, a motion that is not a ``Motion``, polygons, or a
+            coordinate beyond 1e100, whose products would overflow (with a mesh: a coordinate of
+            the bodies beyond 1e30).
+    """
+    for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
+        if not isinstance(motion, Motion):
+            raise ValueError(f"{name}: a {type(motion).__name__}, expected a Motion")
+        bounded(name, motion)
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        return first_touch(a, b, motion_a, motion_b, threads)
+    lengths = {"motion_a": len(motion_a), "motion_b": len(motion_b)}
+    if beside := _mesh_beside(a, b):
+        mesh, bodies, count, swapped = beside
+        of_mesh, of_bodies = (motion_b, motion_a) if swapped else (motion_a, motion_b)
+        count = common_length({"bodies": count} | lengths)
+        out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
+        mesh._mesh.time_of_impact_of_bodies(
+            *bodies, *of_mesh.packed, *of_bodies.packed, out, face, thread_count(threads)
+        )
+        normal = -out[:, 4:7] if swapped else out[:, 4:7]
+        found = np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], normal
+        return MeshImpacts(*found, _faces_of(face, swapped))
+    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
+    out = np.empty((common_length({"bodies": rows(core_a, core_b)} | lengths), 7))
+    _rigid_mesh.time_of_impact(
+        *(*native(core_a), radius_a, *native(core_b), radius_b),
+        *(*motion_a.packed, *motion_b.packed, out, thread_count(threads)),
+    )
+    return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
+
+
+def _both(
+    a: Solid | MeshTree, b: Solid | MeshTree
+) -> tuple[tuple[Bodies, NDArray[np.float64]], tuple[Bodies, NDArray[np.float64]]]:
+    """Core and radii of both sides."""
+    return solid_parts("a", cast(Solid, a)), solid_parts("b", cast(Solid, b))
+
+
+def _mesh_beside(
+    a: Solid | MeshTree, b: Solid | MeshTree
+) -> tuple[MeshTree, Native, int, bool] | None:
+    """The mesh, the native form of the bodies (kind, packed rows, offsets, radii), their number,
+    and whether the mesh is ``b``; ``None`` if there is no mesh.
+
+    Raises:
+        ValueError: both are meshes.
+    """
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        raise ValueError(
+            "a, b: both are meshes; MeshTree.overlap, contacts and sweep work on two meshes, and "
+            "distance on a mesh and convex bodies, such as Hulls of the vertices"
+        )
+    swapped = isinstance(b, MeshTree)
+    mesh, solid = (b, a) if swapped else (a, b)
+    if not isinstance(mesh, MeshTree):
+        return None
+    core, radius = solid_parts("a" if swapped else "b", cast(Solid, solid), MOST_COORDINATE)
+    return mesh, (*native(core), radius), len(core), swapped
+
+
+def _faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:
+    """Faces of a and of b; -1 for the side of the bodies. Shape (N, 2)."""
+    none = np.full_like(face, -1)
+    return np.stack([none, face] if swapped else [face, none], axis=1)

@@ -1,5 +1,6 @@
 """A scene: faces, groups, and the position of every vertex at any time."""
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from tauguard.cloth.groups import Groups
 
 Points = NDArray[np.float64]
+#: Faces, groups, and the function from a time to positions.
+Parts = tuple[NDArray[np.int32], Groups | None, Callable[[float], Points]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,34 @@ class Scene:
         for i in range(count):
             start, end = end, self.positions((i + 1) / count)
             yield start, end
+
+
+#: Builders by name: ``SCENES[name](triangles, seed)``.
+SCENES: dict[str, Callable[[int, int], Scene]] = {}
+
+
+def scene(parts: Callable[[int, np.random.Generator], Parts]) -> Callable[[int, int], Scene]:
+    """Make the scene of these parts a builder in :data:`SCENES`, under the function's name."""
+    name = parts.__name__
+
+    @functools.wraps(parts)
+    def build(triangles: int = 20_000, seed: int = 0) -> Scene:
+        faces, groups, positions = parts(triangles, np.random.default_rng(seed))
+        return Scene(name, faces.astype(np.int32), groups, positions, frames_for(triangles))
+
+    SCENES[name] = build
+    return build
+
+
+def on_body(cloth: int, body: int) -> Groups:
+    """Group 0 of ``cloth`` vertices, and group 1, which is not tested against itself."""
+    return Groups(np.repeat([0, 1], [cloth, body]), [[True, True], [True, False]])
+
+
+def square(rows: int, columns: int) -> tuple[Points, Points]:
+    """Coordinates of the vertices of a sheet, from -1 to 1."""
+    u, v = np.meshgrid(np.linspace(-1, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    return u.ravel(), v.ravel()
 
 
 def sheet(rows: int, columns: int, closed: bool = False) -> NDArray[np.int32]:

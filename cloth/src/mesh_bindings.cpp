@@ -93,14 +93,11 @@ std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind, st
   return pairs;
 }
 
-nb::dict counts_of(const BroadCounts& c) {
-  nb::dict d;
-  d["node_tests"] = c.node_tests;
-  d["front"] = c.front;
-  d["leaf_pairs"] = c.leaf_pairs;
-  d["adjacent"] = c.adjacent;
-  d["kept_apart"] = c.kept_apart;
-  d["candidates"] = c.candidates;
+// Adds the counts to a dictionary, by their names.
+template <class Counts>
+nb::dict with_counts(nb::dict d, Counts counts) {
+  tauguard::geometry::for_each_field(
+      counts, [&](const std::string& name, std::uint64_t count) { d[name.c_str()] = count; });
   return d;
 }
 
@@ -110,8 +107,8 @@ nb::dict stats_of(const BroadStats& s, std::size_t bytes) {
   seconds["build"] = s.build_s;
   seconds["refit"] = s.refit_s;
   seconds["traverse"] = s.traverse_s;
-  d["vf"] = counts_of(s.vf);
-  d["ee"] = counts_of(s.ee);
+  d["vf"] = with_counts({}, s.vf);
+  d["ee"] = with_counts({}, s.ee);
   d["seconds"] = seconds;
   d["builds"] = s.builds;
   d["bytes"] = bytes;
@@ -137,25 +134,12 @@ nb::typed<nb::tuple, Pairs, Pairs, Named> candidates(Mesh& mesh, Positions x_t0,
                         array_of<Pairs>(std::move(ee), {n_ee, 2}), stats_of(broad, bytes));
 }
 
-void add_counts(nb::dict& d, const Stats& s) {
-  d["axes"] = s.axes;
-  d["cubic_sign"] = s.cubic_sign;
-  d["roots"] = s.roots;
-  d["at_start"] = s.at_start;
-  d["sliding"] = s.sliding;
-  d["resolved"] = s.resolved;
-  d["intervals"] = s.intervals;
-  d["exact"] = s.exact;
-  d["long_exact"] = s.long_exact;
-}
-
 // The arrays "pairs", "toi", "point", "normal" and "weights", and "counts" of the search.
 nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
   using Scalars = nb::ndarray<nb::numpy, double, nb::shape<-1>, nb::c_contig>;
   using Rows = nb::ndarray<nb::numpy, double, nb::shape<-1, -1>, nb::c_contig>;
   const std::size_t n = c.size();
-  nb::dict counts = counts_of(broad), d;
-  add_counts(counts, c.stats);
+  nb::dict counts = with_counts(with_counts({}, broad), c.stats), d;
   counts["hits"] = n;
   d["counts"] = counts;
   d["pairs"] = array_of<Pairs>(std::move(c.pairs), {n, 2});
@@ -233,9 +217,7 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
       (vf ? compare_vf : compare_ee)(ends, rows.data(), n, Comparator(method - first_comparator),
                                      hit.data(), impacts, stats);
   }
-  Named counts;
-  add_counts(counts, stats);
-  return counts;
+  return with_counts({}, stats);
 }
 
 Named update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {

@@ -13,6 +13,7 @@
 #include "front.hpp"
 #include "k_dop.hpp"
 #include "spare_memory.hpp"
+#include "tauguard/geometry/fields.hpp"
 #include "topology.hpp"
 
 namespace tauguard::cloth {
@@ -21,6 +22,7 @@ namespace tauguard::cloth {
 struct BroadCounts {
   std::uint64_t node_tests = 0, front = 0, leaf_pairs = 0, candidates = 0, adjacent = 0,
                 kept_apart = 0;
+  TAUGUARD_FIELDS(node_tests, front, leaf_pairs, adjacent, kept_apart, candidates)
 };
 
 struct BroadStats {

@@ -7,6 +7,7 @@
 #include "ends.hpp"
 #include "impact.hpp"
 #include "k_dop.hpp"
+#include "tauguard/geometry/fields.hpp"
 
 namespace tauguard::cloth {
 
@@ -25,16 +26,10 @@ struct Stats {
   std::uint64_t intervals = 0;   // number of intervals of time that `resolved` queries needed
   std::uint64_t exact = 0;       // decided in exact arithmetic
   std::uint64_t long_exact = 0;  // of `exact`: with integers of any length
+  TAUGUARD_FIELDS(axes, cubic_sign, roots, at_start, sliding, resolved, intervals, exact,
+                  long_exact)
   Stats& operator+=(const Stats& o) {
-    axes += o.axes;
-    cubic_sign += o.cubic_sign;
-    roots += o.roots;
-    at_start += o.at_start;
-    sliding += o.sliding;
-    resolved += o.resolved;
-    intervals += o.intervals;
-    exact += o.exact;
-    long_exact += o.long_exact;
+    geometry::add_fields(*this, o);
     return *this;
   }
 };

@@ -25,7 +25,6 @@ class Found:
 
     time: Array  #: first touch (fraction of the step), late by less than resolution / L; or inf
     depth: Array  #: largest depth found [m]; 0 without penetration
-    near: NDArray[np.bool_]  #: nearer than the resolution, but never deeper than the tolerance
 
 
 def search(
@@ -42,7 +41,6 @@ def search(
     n = len(bound)
     rows = np.arange(n)
     first, deepest = np.full(n, np.inf), np.full(n, np.inf)
-    near = np.zeros(n, dtype=bool)
 
     def sample(pairs: NDArray[Any], s: Array) -> Array:
         d = distance(pairs, s)
@@ -60,7 +58,6 @@ def search(
         settled = known & (a >= first[rows])
         open_ = (da + db <= length) & ~settled
         short = open_ & (length <= resolution)
-        near[rows[short]] = True
         np.minimum.at(first, rows[short], b[short])
         keep = open_ & ~short
         rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
@@ -73,8 +70,7 @@ def search(
         a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
         da, db = np.concatenate([da, dm]), np.concatenate([dm, db])
     _polish(distance, first, bound, resolution)
-    depth = np.maximum(-deepest, 0.0)
-    return Found(first, depth, near & (depth <= tolerance))
+    return Found(first, np.maximum(-deepest, 0.0))
 
 
 def _polish(distance: Distance, first: Array, bound: Array, resolution: float) -> None:

@@ -6,7 +6,6 @@ from tauguard.contacts.scenes.arms import arm_boxes, two_arms
 from tauguard.contacts.scenes.fabrics import arm_cloth, garment_chest, sleeve_arm
 from tauguard.contacts.scenes.impacts import ball_cloth, sphere_plate
 from tauguard.contacts.scenes.scene import ContactScene, Control
-from tauguard.contacts.scenes.table import bunny_table
 
 #: Scene builders by name; each builder has defaults for all its arguments.
 SCENES: dict[str, Callable[..., ContactScene]] = {
@@ -19,11 +18,10 @@ SCENES: dict[str, Callable[..., ContactScene]] = {
         sphere_plate,
         arm_boxes,
         two_arms,
-        bunny_table,
     )
 }
 
 __all__ = [
-    "SCENES", "ContactScene", "Control", "arm_boxes", "arm_cloth", "ball_cloth", "bunny_table",
-    "garment_chest", "sleeve_arm", "sphere_plate", "two_arms",
+    "SCENES", "ContactScene", "Control", "arm_boxes", "arm_cloth", "ball_cloth", "garment_chest",
+    "sleeve_arm", "sphere_plate", "two_arms",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ force counts less, and so does one that could have explained any residual.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -100,10 +100,6 @@ class ContactBelief:
     probability: Array  #: probability that the contact is at the point, sums to 1, shape (K,)
     force: Array  #: mean force on the arm if the contact is there, world frame [N], shape (K, 3)
     prior: Array  #: probability of the point without the residual, shape (K,)
-
-    def weighted(self, probability: Array) -> ContactBelief:
-        """The same points and forces with another probability of each point, shape (K,)."""
-        return replace(self, probability=probability)
 
     def links(self, count: int) -> Array:
         """Probability of each link, shape (count,)."""

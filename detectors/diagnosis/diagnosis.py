@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -180,7 +180,7 @@ class Diagnoser:
         at_peak = contact_belief(
             robot, self.surface, after.q[peak], after.residual[peak], self._noise(after)[peak]
         )
-        force, point = at_peak.weighted(belief.probability).on(link)
+        force, point = replace(at_peak, probability=belief.probability).on(link)
         if self.at_tool:
             sized, force = tool_severity(self.arm, whole, self.surface)
             point = link_poses(robot, after.q[peak]).origin[-1]

@@ -12,7 +12,6 @@ from tauguard.detectors.features.free_bound import ANYWHERE
 from tauguard.detectors.features.motion_regimes import unseen_text
 
 if TYPE_CHECKING:
-    from tauguard.arrays import Array
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
@@ -23,6 +22,13 @@ SHORTEST, SHORT = 300.0, 1800.0
 CLOCK = 1e6
 #: Largest number of alarms of a log whose times are listed.
 LISTED = 6
+#: Field of the card in each column of table and picture, and its regime in ``card.unseen``.
+COLUMNS = {
+    "standing": ("standing", "standing for 2 s"),
+    "just stopped": ("stopped", "just stopped"),
+    "moving": ("moving", ""),
+    "starting": ("starting", "starting"),
+}
 #: The condition of each force at the tool.
 TOOL = {
     "standing": "standing for some seconds, pushed within 0.1 s",
@@ -37,29 +43,10 @@ def text(card: ThresholdCard) -> str:
     from tauguard.report import table
 
     rows = [
-        {"found from [N m]": joint} | {name: _torque(card, name, j) for name in _levels(card)}
+        {"found from [N m]": joint} | {name: _torque(card, name, j) for name in COLUMNS}
         for j, joint in enumerate(card.joints)
     ]
     return "\n".join([table(rows), *(line for part in _lines(card) for line in _wrapped(part))])
-
-
-def _levels(card: ThresholdCard) -> dict[str, Array]:
-    """Least torques that are found, by their names, in the order of table and picture."""
-    return {
-        "standing": card.standing,
-        "just stopped": card.stopped,
-        "moving": card.moving,
-        "starting": card.starting,
-    }
-
-
-#: The regime in :attr:`ThresholdCard.unseen` of each column.
-REGIMES = {
-    "standing": "standing for 2 s",
-    "just stopped": "just stopped",
-    "moving": "",
-    "starting": "starting",
-}
 
 
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
@@ -67,10 +54,11 @@ def _torque(card: ThresholdCard, name: str, j: int) -> str:
 
     It comes from other arms if the regime, or the joint's motion while others move, is in no log.
     """
-    value, moving = _levels(card)[name][j], card.moving
+    level, regime = COLUMNS[name]
+    value, moving = getattr(card, level)[j], card.moving
     if value != value:
         return "-"
-    shown = card.joints[j] not in card.unseen.get(REGIMES[name], ())
+    shown = card.joints[j] not in card.unseen.get(regime, ())
     shown &= moving[j] == moving[j] or not (moving == moving).any()
     return f"{value:.1f}" if shown else f"({value:.1f})"
 
@@ -105,7 +93,11 @@ def _wrapped(line: str) -> list[str]:
 def _lines(card: ThresholdCard) -> list[str]:
     lines = [
         "force found at the tool: in half (in 95 %) of all poses and directions",
-        *(f"  {_force(card, name)} {said}" for name, said in TOOL.items()),
+        *(
+            f"  {half.rjust(4)} ({most})".ljust(18) + f" {said}"
+            for name, said in TOOL.items()
+            for half, most in [map(_newton, card.tool[name])]
+        ),
         "a contact has to last 0.1 s: an alarm needs 24 ms above a bound at rest and 40 ms in "
         "motion, so a shorter contact has to be harder",
         _alarms(card),
@@ -156,11 +148,6 @@ def _lines(card: ThresholdCard) -> list[str]:
     return lines
 
 
-def _force(card: ThresholdCard, name: str) -> str:
-    half, most = map(_newton, card.tool[name])
-    return f"{half.rjust(4)} ({most})".ljust(16)
-
-
 def _newton(force: float) -> str:
     """A force as text; "none" if none is found in enough poses and directions."""
     if not force < float("inf"):
@@ -204,8 +191,8 @@ def draw(target: Path, card: ThresholdCard) -> None:
         2, 1, figsize=(9, sum(sizes)), height_ratios=sizes, layout="constrained"
     )
     place = np.arange(len(card.joints))
-    for k, (name, values) in enumerate(_levels(card).items()):
-        drawn = bars.bar(place + 0.2 * (k - 1.5), values, 0.2, label=name)
+    for k, (name, (level, _)) in enumerate(COLUMNS.items()):
+        drawn = bars.bar(place + 0.2 * (k - 1.5), getattr(card, level), 0.2, label=name)
         bars.bar_label(drawn, fmt="%.1f", fontsize=6, padding=1)
     bars.set_xticks(place, card.joints, rotation=20, ha="right")
     bars.set_ylabel("torque that is found [N m]")

@@ -13,7 +13,7 @@ from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.diagnosis import Diagnosis
 from tauguard.detectors.events import detection_window
 from tauguard.report import rate as wilson
-from tauguard.traces.trace import Collision, Trace
+from tauguard.traces.trace import Collision, Trace, Truth
 
 #: An estimate lags, so it is compared with the largest true force in this time before it [s].
 LAG = 0.015
@@ -28,14 +28,19 @@ def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, 
     Raises:
         ValueError: the trace has no truth.
     """
-    if trace.truth is None:
-        raise ValueError("trace has no truth to match a diagnosis with")
+    truth = _truth(trace)
     first, last = np.searchsorted(trace.t, (time - LAG, time))
-    forces = trace.truth.contact_vector[first : last + 1]
+    forces = truth.contact_vector[first : last + 1]
     if not forces.any():
         return collision.force, collision.point
     row = int(np.linalg.norm(forces, axis=1).argmax())
-    return forces[row], trace.truth.contact_point[first + row]
+    return forces[row], truth.contact_point[first + row]
+
+
+def _truth(trace: Trace) -> Truth:
+    if trace.truth is None:
+        raise ValueError("trace has no truth to match a diagnosis with")
+    return trace.truth
 
 
 @dataclass(frozen=True)
@@ -75,10 +80,8 @@ class TrueSeverity:
         Raises:
             ValueError: the trace has no truth.
         """
-        if trace.truth is None:
-            raise ValueError("trace has no truth to match a diagnosis with")
         first, last = np.searchsorted(trace.t, (collision.onset, min(collision.end, until)))
-        force = trace.truth.contact_vector[first : max(last, first + 1)]
+        force = _truth(trace).contact_vector[first : max(last, first + 1)]
         size = np.linalg.norm(force, axis=1)
         return cls(float(np.linalg.norm(force.sum(axis=0)) * trace.dt), float(size.max()))
 
@@ -102,12 +105,11 @@ def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Matche
     Raises:
         ValueError: the trace has no truth.
     """
-    if trace.truth is None:
-        raise ValueError("trace has no truth to match a diagnosis with")
+    collisions = _truth(trace).collisions
     matched, used = [], set()
     for diagnosis in diagnoses:
         start = diagnosis.alarm.start
-        windows = [(c, detection_window(c)) for c in trace.truth.collisions]
+        windows = [(c, detection_window(c)) for c in collisions]
         about = [c for c, (low, high) in windows if low <= start <= high]
         if not about:
             matched.append(MatchedDiagnosis(diagnosis, None, None))

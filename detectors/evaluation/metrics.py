@@ -55,7 +55,8 @@ def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
     alarms = sum(len(m.false_alarms) for m in several)
     hours = sum(m.free_seconds for m in several) / 3600
     names = [stratum(peak) for peak, _ in pairs]
-    order = sorted(set(names) | {stratum(low) for low, _ in STRATA}, key=_lower_edge)
+    every = set(names) | {stratum(low) for low, _ in STRATA}
+    order = sorted(every, key=lambda name: float(name.split("-")[0]))
     return {
         "confusion": {"tp": tp, "fn": fn, "fp": fp, "tn": tn},
         "sensitivity": wilson(tp, tp + fn),
@@ -70,7 +71,3 @@ def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
         },
         "headline": _severity([p for p in pairs if p[0] >= HEADLINE]),
     }
-
-
-def _lower_edge(name: str) -> float:
-    return float(name.split("-")[0])

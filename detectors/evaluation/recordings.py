@@ -11,8 +11,10 @@ from tauguard.detectors.diagnosis.diagnosis import diagnose
 from tauguard.detectors.evaluation.diagnosis_metrics import MatchedDiagnosis, match_diagnoses
 from tauguard.detectors.evaluation.matching import Matching, match_detection
 from tauguard.detectors.samples import check_interval
-from tauguard.models import LinkSurface, link_surface
+from tauguard.models import link_surface
 from tauguard.traces.trace import Detection, Trace
+
+_surface = functools.cache(link_surface)
 
 
 class JudgedRecording(NamedTuple):
@@ -50,9 +52,3 @@ def judged_recordings(
             )
         found = alarm.detect(trace)
         yield JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))
-
-
-@functools.cache
-def _surface(arm: str) -> LinkSurface:
-    """Points on the links of an arm, from its MJCF text."""
-    return link_surface(arm)

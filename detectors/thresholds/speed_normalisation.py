@@ -89,7 +89,8 @@ class SpeedNormalisation:
             )
         if not (np.isfinite(value).all() and np.isfinite(speed).all()):
             raise ValueError("peaks, speeds: expected finite numbers only")
-        parts = np.array_split(np.argsort(speed, kind="stable"), _bins(len(value)))
+        bins = int(np.clip(len(value) // FEWEST, 1, BINS))
+        parts = np.array_split(np.argsort(speed, kind="stable"), bins)
         base = [float(np.quantile(value[part], 1 - TAIL)) for part in parts]
         unit = [_mean_excess(value[part], low) for part, low in zip(parts, base, strict=True)]
         middle = np.array([np.median(speed[part]) for part in parts])
@@ -108,10 +109,6 @@ class SpeedNormalisation:
         unit = np.interp(at, self.speed, self.unit)
         normalised: Array = (np.asarray(score, dtype=np.float64) - base) / unit
         return normalised
-
-
-def _bins(blocks: int) -> int:
-    return int(np.clip(blocks // FEWEST, 1, BINS))
 
 
 def _mean_excess(peaks: Array, base: float) -> float:

@@ -1,1 +1,1 @@
-"""Wrappers of environments, and interfaces for users of other libraries."""
+"""Wrappers of environments."""

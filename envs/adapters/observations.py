@@ -12,8 +12,6 @@ from tauguard.envs.gym.base import arm_env
 from tauguard.envs.gym.rendering import Camera
 from tauguard.envs.gym.settings import DETECTORS, one_of
 
-Pictures = dict[str, Any]
-
 #: Bound of the residual in the observation [N m].
 RESIDUAL_BOUND = 1e4
 #: Largest depth of a picture [m].
@@ -21,7 +19,7 @@ FARTHEST = 10.0
 MODES = ("rgb", "depth", "rgbd")
 
 
-class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+class CameraObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConstructorArgs):
     """The observation becomes a dictionary of ``state``, ``rgb`` and ``depth``.
 
     | key | shape | type | unit |
@@ -54,7 +52,7 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
             RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         RecordConstructorArgs.__init__(self, mode=mode, height=height, width=width)
-        gymnasium.Wrapper.__init__(self, env)
+        gymnasium.ObservationWrapper.__init__(self, env)
         one_of("mode", mode, MODES)
         if min(height, width) < 1:
             raise ValueError(f"height {height}, width {width}: expected 1 or more pixels")
@@ -69,35 +67,24 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
             parts["depth"] = spaces.Box(0.0, FARTHEST, (height, width, 1), np.float32)
         self.observation_space = spaces.Dict(parts)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Pictures, dict[str, Any]]:
-        """Begin an episode."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        return self._seen(observation), info
-
-    def step(self, action: Array) -> tuple[Pictures, Any, bool, bool, dict[str, Any]]:
-        """Apply the action."""
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._seen(observation), reward, terminated, truncated, info
-
     def close(self) -> None:
         """Close the camera."""
         self._camera.close()
         super().close()
 
-    def _seen(self, observation: Array) -> Pictures:
-        seen: Pictures = {"state": observation}
+    def observation(self, observation: Array) -> dict[str, Any]:
+        """The observation with the pictures of the present state."""
+        seen: dict[str, Any] = {"state": observation}
         target = self._arm.batch.target[0]
         if self._mode != "depth":
-            seen["rgb"] = self._camera.colours(target)
+            seen["rgb"] = self._camera.show(target)
         if self._mode != "rgb":
             depth = np.clip(self._camera.depths(target), 0.0, FARTHEST)
             seen["depth"] = depth[..., None].astype(np.float32)
         return seen
 
 
-class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+class DetectorObservation(gymnasium.ObservationWrapper[Array, Array, Array], RecordConstructorArgs):
     """Appends the detector's residual [N m], shape (n,), and its alarm (0 or 1).
 
     ``info["residual"]`` and ``info["alarm"]`` come from the same detector.
@@ -114,8 +101,8 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
             ValueError: there is no detector, or it was trained on another arm or sample rate.
         """
         RecordConstructorArgs.__init__(self, detector=detector)
-        gymnasium.Wrapper.__init__(self, env)
-        inner = arm_env(env)
+        gymnasium.ObservationWrapper.__init__(self, env)
+        self._arm = inner = arm_env(env)
         if detector is not None:
             inner.batch.attach(detector)
         elif inner.compiled.settings.detector is None:
@@ -133,18 +120,8 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
             dtype=np.float64,
         )
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        return self._joined(observation, info), info
-
-    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Apply the action."""
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._joined(observation, info), reward, terminated, truncated, info
-
-    def _joined(self, observation: Array, info: dict[str, Any]) -> Array:
-        residual = np.clip(info["residual"], -RESIDUAL_BOUND, RESIDUAL_BOUND)
-        return np.concatenate([observation, residual, [float(info["alarm"])]])
+    def observation(self, observation: Array) -> Array:
+        """The observation with residual and alarm of the last action."""
+        batch = self._arm.batch
+        residual = np.clip(batch.residual[0], -RESIDUAL_BOUND, RESIDUAL_BOUND)
+        return np.concatenate([observation, residual, [float(batch.alarm[0])]])

@@ -13,7 +13,7 @@ from tauguard.arrays import Array
 from tauguard.envs.gym.batch import TOUCHES, Batch, StepMetrics
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.randomization import check_options
-from tauguard.envs.gym.rendering import Picture
+from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
 from tauguard.envs.gym.task import Task, build
 from tauguard.models import Scene
@@ -87,7 +87,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._seen, self._row = self.batch.observation[0], self.batch.numbers[0]
         self._arrays = {name: rows[0] for name, rows in shown_arrays(self.batch).items()}
         self._reward_keys = {name: f"reward_{name}" for name in self.task.terms}
-        self._picture: Picture | None = None
+        self._picture: Any = None
         self._no_reward = dict.fromkeys(self.task.terms, 0.0)
         self._begun = False
 
@@ -245,8 +245,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             gymnasium.logger.warn("render_mode was not given to make: nothing to render")
             return None
         if self._picture is None:
-            self._picture = Picture(self.compiled, self.batch.datas[0], self.render_mode)
-        return self._picture.show(self.batch.target[0])
+            self._picture = open_view(self.compiled, self.batch.datas[0], self.render_mode)
+        shown: NDArray[np.uint8] | None = self._picture.show(self.batch.target[0])
+        return shown
 
     def close(self) -> None:
         """Close the window or the renderer."""

@@ -357,7 +357,9 @@ class Batch:
             contact=_numbers(self.contact, i),
             region=_numbers(self.region, i),
             tau_peak=self.tau_peak[i],
-            **{name: getattr(self, name)[i] for name in TOUCHES},
+            touched=_plant.Touched(
+                **{name.removeprefix("region_"): getattr(self, name)[i] for name in TOUCHES}
+            ),
             reaches=self.reaches[i],
             walks=self.walks[i],
         )

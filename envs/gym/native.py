@@ -5,7 +5,6 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.gym.actions import Entry, action_scale
 from tauguard.envs.gym.compiled import CompiledScene
@@ -55,8 +54,7 @@ def surroundings(
     ]
     labels, barriers = scene.spec.labels, things_around(scene, model) if people else []
     return _plant.Surroundings(
-        links=links,
-        gravity=model.opt.gravity.tolist(),
+        arms=_plant.Kinematics(links=links, gravity=model.opt.gravity.tolist()),
         tools=[
             _plant.Tool(site=site, body=body, first=first) for site, body, first in compiled.tools
         ],
@@ -68,16 +66,15 @@ def surroundings(
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],
         people_geoms=[int(model.geom(part.name).id) for part in people_parts(scene.spec)],
-        barriers=barriers,
-        boxes=_boxes(model, barriers),
+        barriers=[_barrier(model, geom) for geom in barriers],
     )
 
 
-def _boxes(model: mujoco.MjModel, geoms: list[int]) -> Array:
-    """Centre and half extents of geoms in their own frames [m], (k, 6); a plane is infinite."""
-    boxes: Array = model.geom_aabb[geoms].reshape(-1, 6)
-    boxes[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_PLANE, 3:] = np.inf
-    return boxes
+def _barrier(model: mujoco.MjModel, geom: int) -> _plant.Barrier:
+    plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+    centre, half = model.geom_aabb[geom].reshape(2, 3)
+    half = np.full(3, np.inf) if plane else half
+    return _plant.Barrier(geom=geom, centre=centre.tolist(), half=half.tolist())
 
 
 def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:

@@ -13,7 +13,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.models import Drive, Person, Scene
 from tauguard.models.obstacles import pair_weights
-from tauguard.models.payload import load_body
+from tauguard.models.payload import keep_stiffness, load_body
 
 if TYPE_CHECKING:
     from tauguard.envs.gym.compiled import CompiledScene
@@ -242,10 +242,7 @@ def _weigh(
     model.body_inertia[bodies] = base.body_inertia[bodies] * scale[:, None]
     if "payload_g" in drawn:
         load_body(model, scene.payload_body, float(drawn["payload_g"][0]) / 1000)
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    direct = base.pair_solref[:, 0] < 0
-    ratio = pair_weights(model)[direct] / pair_weights(base)[direct]
-    model.pair_solref[direct] = base.pair_solref[direct] * ratio[:, None]
+    keep_stiffness(model, pair_weights(base), base.pair_solref)
 
 
 def _resize(model: mujoco.MjModel, person: Person, number: int) -> None:

@@ -27,16 +27,16 @@ class RegionInfo:
 
     name: str
     body: int
-    joint: int  #: -1: held in place
     quasi_static: float  #: limit [N]
     transient: float  #: limit [N]; 0: no impact is allowed
-    mocap: int  #: mocap index of the frame that moves a person's region; -1: not of a person
     held: bool  #: the region cannot move away, so its limit is the quasi-static one
     stiffness: float  #: stiffness of the region's contact [N/m]
     radius: float  #: [m]
-    span: float  #: distance from the middle of its line at which the region turns back [m]
-    speed: float  #: along its line or path [m/s]
-    unconfirmed: tuple[str, ...]  #: values that no open source confirmed
+    joint: int = -1  #: -1: held in place
+    mocap: int = -1  #: mocap index of the frame that moves a person's region; -1: not of a person
+    span: float = 0.0  #: distance from the middle of its line at which the region turns back [m]
+    speed: float = 0.0  #: along its line or path [m/s]
+    unconfirmed: tuple[str, ...] = ()  #: values that no open source confirmed
 
     @property
     def least_pressure(self) -> float:
@@ -71,15 +71,12 @@ def _segment(scene: Scene, part: PersonPart) -> RegionInfo:
     return RegionInfo(
         name=part.name,
         body=int(scene.model.body(part.name).id),
-        joint=-1,
         quasi_static=limits.quasi_static_force,
         transient=limits.transient_force,
         mocap=int(scene.model.body(f"{part.name}_motion").mocapid[0]),
         held=part.held,
         stiffness=limits.stiffness,
         radius=part.radius,
-        span=0.0,
-        speed=0.0,
         unconfirmed=limits.unconfirmed,
     )
 
@@ -93,7 +90,6 @@ def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
         joint=-1 if proxy.clamped else int(scene.model.joint(proxy.region).id),
         quasi_static=limits.quasi_static_force,
         transient=limits.transient_force,
-        mocap=-1,
         held=proxy.clamped,
         stiffness=limits.stiffness,
         radius=proxy.radius,
@@ -108,16 +104,12 @@ def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
     return RegionInfo(
         name=obj.name,
         body=int(body.id),
-        joint=-1,
         quasi_static=math.inf if obj.quasi_static_limit is None else obj.quasi_static_limit,
         transient=math.inf if obj.transient_limit is None else obj.transient_limit,
-        mocap=-1,
         held=obj.motion == "fixed",
         stiffness=obj.stiffness,
         radius=math.inf,  # pressure is estimated only on people
-        span=0.0,
         speed=_path_speed(obj),
-        unconfirmed=(),
     )
 
 

@@ -106,7 +106,7 @@ class Camera(Stage):
         with opengl():
             self._renderer = mujoco.Renderer(self.model, height, width)
 
-    def colours(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Draw the state and a ball at each target, shape (arms, 3).
 
         Returns:
@@ -168,24 +168,6 @@ class Window(Stage):
         self._window.close()
 
 
-class Picture:
-    """The view behind ``render``: an image for each call, or a window that is updated."""
-
-    def __init__(self, compiled: CompiledScene, data: mujoco.MjData, mode: str) -> None:
-        """Open the camera, or the window if ``mode`` is "human".
-
-        Raises:
-            RuntimeError: there is no display, or OpenGL cannot start.
-        """
-        self._view = Window(compiled, data) if mode == "human" else Camera(compiled, data)
-
-    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
-        """Draw the state and a ball at each target, shape (arms, 3)."""
-        if isinstance(self._view, Camera):
-            return self._view.colours(targets)
-        self._view.show(targets)
-        return None
-
-    def close(self) -> None:
-        """Close window or renderer."""
-        self._view.close()
+def open_view(compiled: CompiledScene, data: mujoco.MjData, mode: str) -> Any:
+    """The view behind ``render``: a window if ``mode`` is "human", else a camera."""
+    return (Window if mode == "human" else Camera)(compiled, data)

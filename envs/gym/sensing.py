@@ -54,10 +54,6 @@ class Listener(Protocol):
         """The fault found in the samples of the last :meth:`steps`; "" if none was found."""
 
     @property
-    def settle(self) -> float:
-        """Time after a reset in which no alarm is given [s]."""
-
-    @property
     def bounds(self) -> Array:
         """Largest residual without contact [N m], shape (n,)."""
 
@@ -84,7 +80,7 @@ class ObserverListener:
     stop. In that time a collision is detected only if another joint's residual shows it.
     """
 
-    name, settle, fault = "observer", 0.0, ""
+    name, fault = "observer", ""
 
     def __init__(
         self,
@@ -145,7 +141,7 @@ class AlarmListener:
     def __init__(self, alarm: CollisionAlarm) -> None:
         """Start before the first sample."""
         arm = alarm.detector.arm
-        self.name, self.settle = alarm.detector.name, alarm.settle
+        self.name = alarm.detector.name
         self.bounds: Array = SIGMAS * np.asarray(arm.noise)
         self._dt, self._count = alarm.detector.dt, 0
         #: For a model that checks its input: finds faults, and runs the detector itself.
@@ -196,8 +192,7 @@ class PerArm:
     def __init__(self, parts: Sequence[Listener]) -> None:
         """Take the listeners of the arms, in order."""
         self._parts = parts
-        self.name, self.settle = parts[0].name, max(part.settle for part in parts)
-        self.fault = ""
+        self.name, self.fault = parts[0].name, ""
         self.bounds: Array = np.concatenate([part.bounds for part in parts])
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
@@ -314,11 +309,6 @@ class Sensing:
         """Begin a new episode."""
         self._player = None
         self.detector = self._make() if self._make else None
-
-    @property
-    def settle(self) -> float:
-        """Time after a reset in which the detector gives no alarm [s]."""
-        return self.detector.settle if self.detector else 0.0
 
     @property
     def fault(self) -> str:

@@ -23,7 +23,7 @@ from tauguard.envs.gym.base import (
 )
 from tauguard.envs.gym.batch import StepMetrics
 from tauguard.envs.gym.randomization import check_options
-from tauguard.envs.gym.rendering import Picture
+from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
 from tauguard.envs.gym.task import Task, build
 
@@ -76,7 +76,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: list[np.random.Generator] = [seeding.np_random(None)[0]] * num_envs
         self._seeded = False
-        self._picture: Picture | None = None
+        self._picture: Any = None
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -234,7 +234,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         if self.render_mode is None:
             return None
         if self._picture is None:
-            self._picture = Picture(self.compiled, self.batch.datas[0], self.render_mode)
+            self._picture = open_view(self.compiled, self.batch.datas[0], self.render_mode)
         picture = self._picture.show(self.batch.target[0])
         return None if picture is None else (picture,)
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "tauguard/geometry/fields.hpp"
 #include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::envs {
@@ -27,6 +28,9 @@ struct Anatomy {
   double floor, facing, hand_speed, walk_speed, reaction_time;
   double step_back;  // distance of the step back after a touch [m]
   bool seated, hanging, reacts;
+  TAUGUARD_FIELDS(hip_height, trunk, shoulder, hip_half, neck, head, upper_arm, lower_arm, hand,
+                  grip, thigh, shank, floor, facing, hand_speed, walk_speed, reaction_time,
+                  step_back, seated, hanging, reacts)
 };
 
 // The script of a person, which is repeated. A row of `reaches` is one reach of a hand: wait [s],

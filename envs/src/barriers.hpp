@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics.hpp"
+#include "tauguard/geometry/fields.hpp"
 #include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::envs {
@@ -28,6 +29,7 @@ struct Gap {
 struct Barrier {
   int geom = -1;
   Vec3 centre, half;
+  TAUGUARD_FIELDS(geom, centre, half)
 };
 
 class Barriers {

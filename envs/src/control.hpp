@@ -52,6 +52,7 @@ struct Controls {
   std::vector<double> override_speed;  // [rad/s]
   Command command;
   Table table;
+  TAUGUARD_FIELDS(mode, period, scale, centre, max_speed, torque_limit, low, high, moving, driven)
 
   // Removes an override; the joint positions q become the reference.
   void reset(const std::vector<double>& q) {

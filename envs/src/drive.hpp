@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tauguard/geometry/fields.hpp"
+
 namespace tauguard::envs {
 
 // One joint: its addresses in MuJoCo's arrays, its drive and its servo. A bristle stiffness of 0
@@ -28,35 +30,11 @@ struct Joint {
   std::vector<double> cycles, amplitude, phase;     // ripple: per motor revolution; A; rad
   std::vector<double> slope,
       slope_velocity;  // rises of the friction level [N m], their speed scales
+  TAUGUARD_FIELDS(qpos, dof, gain, nominal_gain, current_limit, gear, coulomb, breakaway,
+                  stribeck_velocity, viscous, bristle_stiffness, load, kp, kd, rated_speed,
+                  no_load_speed, known_coulomb, known_viscous, cycles, amplitude, phase, slope,
+                  slope_velocity)
 };
-
-// Calls set(name, value) for each number, so that Python can give them by name.
-template <class Set>
-void for_each_value(Joint& j, const Set& set) {
-  set("qpos", j.qpos);
-  set("dof", j.dof);
-  set("gain", j.gain);
-  set("nominal_gain", j.nominal_gain);
-  set("current_limit", j.current_limit);
-  set("gear", j.gear);
-  set("coulomb", j.coulomb);
-  set("breakaway", j.breakaway);
-  set("stribeck_velocity", j.stribeck_velocity);
-  set("viscous", j.viscous);
-  set("bristle_stiffness", j.bristle_stiffness);
-  set("load", j.load);
-  set("kp", j.kp);
-  set("kd", j.kd);
-  set("rated_speed", j.rated_speed);
-  set("no_load_speed", j.no_load_speed);
-  set("known_coulomb", j.known_coulomb);
-  set("known_viscous", j.known_viscous);
-  set("cycles", j.cycles);
-  set("amplitude", j.amplitude);
-  set("phase", j.phase);
-  set("slope", j.slope);
-  set("slope_velocity", j.slope_velocity);
-}
 
 struct JointState {
   double current = 0.0;  // A

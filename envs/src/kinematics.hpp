@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "physics.hpp"
+#include "tauguard/geometry/fields.hpp"
 #include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::envs {
@@ -20,6 +21,7 @@ using geometry::Vec3;
 // joint.
 struct Tool {
   int site = -1, body = -1, first = 0;
+  TAUGUARD_FIELDS(site, body, first)
 };
 
 // Joint i moves link i; the joints of one arm are consecutive, base to tip.
@@ -29,12 +31,14 @@ struct Link {
   bool slide = false;         // prismatic
   double mass = 0;            // nominal [kg]
   Vec3 com;                   // nominal, in the link's frame [m]
+  TAUGUARD_FIELDS(joint, body, first, slide, mass, com)
 };
 
 struct Kinematics {
   const Physics* physics = nullptr;
   std::vector<Link> links;
   Vec3 gravity;  // [m/s^2]
+  TAUGUARD_FIELDS(links, gravity)
 
   std::size_t size() const { return links.size(); }
   Vec3 axis(std::size_t i) const { return load(physics->axis(links[i].joint)); }

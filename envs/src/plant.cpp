@@ -173,7 +173,11 @@ void bind_plant(nb::module_& m) {
           "surround",
           [](Plant& p, const Surroundings& around, const Controls& controls, const Rows& rows,
              int substeps) {
+            if (!around.people.empty() && !around.barriers.all.empty() &&
+                around.people_geoms.size() != around.people.size() * person_segments)
+              throw nb::value_error("people_geoms: expected one geom per capsule");
             p.controls = controls;
+            p.controls.override_speed.assign(p.joints(), 0.0);
             p.substeps = substeps;
             p.surround(around, rows);
           },

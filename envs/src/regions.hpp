@@ -28,6 +28,8 @@ struct Region {
   double touching = 0;        // duration of the present contact [s]
   double force = 0;           // at the last physics step [N]
   double advance = 0;         // advance of the arm into it during that contact [m]
+  TAUGUARD_FIELDS(body, joint, qpos, dof, mocap, held, sensor, quasi_static, transient, span, speed,
+                  area, least_pressure, stiffness)
 };
 
 // Turns back a region that has left its span, so that it moves to and fro like a hand.
@@ -41,6 +43,7 @@ inline void turn_back(const Region& r, const Physics& physics) {
 // direction of the force on it.
 struct Touched {
   Held force, pressure, point, direction;
+  TAUGUARD_FIELDS(force, pressure, point, direction)
 
   void clear() const {
     for (const Held* h : {&force, &pressure, &point, &direction})

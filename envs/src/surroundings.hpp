@@ -30,6 +30,8 @@ struct Surroundings {
   int arms_sensor = -1;           // sensor of the force between two arms; -1: none
   std::vector<int> people_geoms;  // geoms of the people's capsules, person after person
   Barriers barriers;              // obstacles that people's arms avoid
+  TAUGUARD_FIELDS(arms, tools, regions, people_begin, people, low, high, sensor_begin, arms_sensor,
+                  people_geoms, barriers)
 };
 
 // Output rows of an environment, in arrays that Python owns.
@@ -40,6 +42,8 @@ struct Rows {
   Held tau_peak;             // joints
   Touched touched;           // peak contact of each region
   Held reaches, walks;       // the people's scripts: hands x rows x reach_width, rows x walk_width
+  TAUGUARD_FIELDS(observation, metrics, tau_ext, target, q, qd, current, tau, contact, region,
+                  tau_peak, touched, reaches, walks)
 
   Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }
 };
@@ -53,6 +57,7 @@ struct Track {
   // Force [N] and torque about the centre of mass [N m] on a body, rows x 6; body 0: none.
   const double* wrench = nullptr;
   int wrench_body = 0;
+  TAUGUARD_FIELDS(q, qd, current, sensors, poses, bodies, sensor_begin)
 };
 
 }  // namespace tauguard::envs

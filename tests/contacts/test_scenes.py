@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tauguard.contacts.scenes import SCENES, ball_cloth, bunny_table, sphere_plate
+from tauguard.contacts.scenes import SCENES, ball_cloth, sphere_plate
 from tauguard.contacts.scenes.fabrics import tube
 from tauguard.models import Cloth, SceneSpec
 
@@ -17,7 +17,6 @@ TOUCHES = {
     "sphere_plate": [("plate", "ball")],
     "arm_boxes": [("link6", "loose"), ("box0", "link5")],
     "two_arms": [("link6", "table"), ("link5", "other_link5")],
-    "bunny_table": [("table", "thing")],
 }
 
 
@@ -105,17 +104,3 @@ def test_a_tube_is_closed_around_and_open_at_both_ends():
 def test_bad_input_is_named(build, message):
     with pytest.raises(ValueError, match=message):
         build()
-
-
-def test_a_missing_mesh_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"gone\.obj"):
-        bunny_table(tmp_path / "gone.obj")
-
-
-@pytest.mark.data
-def test_the_bunny_lands_on_the_table(data_dir):
-    scene = bunny_table(data_dir / "meshes" / "stanford-bunny.obj")
-    model, data = scene.start(1e-3)
-    assert np.ptp(model.mesh_vert, axis=0).max() <= 0.15 * 3**0.5
-    mujoco.mj_step(model, data, 300)
-    assert data.ncon > 0

@@ -169,7 +169,7 @@ def test_the_entity_in_an_arena_beside_something_else():
 
 
 def test_the_repair_is_still_needed():
-    """Fails when dm_control has caught up with MuJoCo: then drop envs/dm/compatibility.py."""
+    """Fails when dm_control has caught up with MuJoCo: then drop the loop in envs/dm.py."""
     from importlib.metadata import version
 
     assert (version("dm-control"), version("mujoco").split(".")[0]) == ("1.0.50", "4")
