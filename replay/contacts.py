@@ -1,20 +1,28 @@
 """Write a run of a MuJoCo scene with the contacts that checkers reported as a rerun recording."""
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
-from tauguard.models.cloth import flex_elements
-from tauguard.replay.robot import Motion, bodies, quats_wxyz
-from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, lay_out, log_pose, times
+from tauguard.replay.robot import bodies, sheets
+from tauguard.replay.rrd import (
+    COLOURS,
+    TIMELINE,
+    entity,
+    lay_out,
+    log_lines,
+    log_marks,
+    log_pose,
+    log_shapes,
+    written,
+)
 
 #: Contacts of one checker: their times [s], shape (K,), points [m] and normals, shape (K, 3).
 Marks = tuple[Array, Array, Array]
@@ -63,26 +71,22 @@ def write_contacts_rrd(
             raise ValueError(f"{name}: shape {np.shape(value)}, expected {shape}")
     if len(t) == 0:
         raise ValueError("t: empty, nothing to show")
-    with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-        draft = Path(folder) / "draft.rrd"
-        recording = rr.RecordingStream("tauguard_contacts", recording_id=path.stem)
-        recording.save(draft)
+    with written(path, "tauguard_contacts") as recording:
         lay_out(recording, _blueprint(_eye(marks or {}, positions, vertices)))
-        recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        _log_bodies(recording, model, t, positions, rotations)
+        shown = bodies(model)
+        log_shapes(recording, shown)
+        quats = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat().reshape(len(t), -1, 4)
+        for k, body in enumerate(shown):
+            if body.shapes:
+                still = not body.moves
+                log_pose(recording, body.name, t, positions[:, k], quats[:, k], still)
         if vertices is not None:
             _log_cloth(recording, model, t, vertices)
         for number, (name, seen) in enumerate((marks or {}).items()):
             _log_marks(recording, name, COLOURS[number % len(COLOURS)], t, seen)
-        if not notes:
-            recording.set_time(TIMELINE, duration=float(t[0]))
-            recording.log("notes", rr.TextLog("no disagreements"))
-        for moment, text in notes:
+        for moment, text in notes or [(float(t[0]), "no disagreements")]:
             recording.set_time(TIMELINE, duration=moment)
             recording.log("notes", rr.TextLog(text))
-        recording.flush()
-        recording.disconnect()
-        os.replace(draft, path)
 
 
 def _eye(
@@ -127,33 +131,14 @@ def _blueprint(eye: rrb.EyeControls3D | None) -> rrb.Blueprint:
     )
 
 
-def _log_bodies(recording: Any, model: Any, t: Array, positions: Array, rotations: Array) -> None:
-    quats = quats_wxyz(rotations.reshape(-1, 3, 3)).reshape(len(t), -1, 4)
-    moved = Motion(positions, quats)
-    for index, body in enumerate(bodies(model)):
-        if not body.shapes:
-            continue
-        place = entity("scene", body.name)
-        for number, piece in enumerate(body.shapes):
-            recording.log(f"{place}/shape_{number}", drawn(piece), static=True)
-        log_pose(recording, place, body, index, t, moved)
-
-
 def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
-    for flex in range(model.nflex):
-        if model.flex_dim[flex] != 2:
-            continue
-        first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
-        faces = flex_elements(model, flex) - first
-        place = entity("scene", f"flex {flex}")
+    for flex, rows, faces in sheets(model):
         for row, when in enumerate(t):
             recording.set_time(TIMELINE, duration=float(when))
             mesh = rr.Mesh3D(
-                vertex_positions=vertices[row, first : first + count],
-                triangle_indices=faces,
-                albedo_factor=CLOTH,
+                vertex_positions=vertices[row, rows], triangle_indices=faces, albedo_factor=CLOTH
             )
-            recording.log(place, mesh)
+            recording.log(entity("scene", f"flex {flex}"), mesh)
 
 
 def _log_marks(
@@ -165,25 +150,12 @@ def _log_marks(
     known = np.flatnonzero((row < len(t)) & np.isfinite(points).all(axis=1))
     order = known[np.argsort(row[known], kind="stable")]
     counts = np.bincount(row[order], minlength=len(t))
-    _log_count(recording, name, colour, t, counts)
+    seen = counts.astype(np.float64)[:, None]
+    log_lines(recording, entity("seen", name), t, seen, [name], [colour], 2)
     points, normals = points[order], np.nan_to_num(normals[order])
-    dots = rr.Points3D.columns(positions=points)
-    arrows = rr.Arrows3D.columns(origins=points - NORMAL * normals, vectors=2 * NORMAL * normals)
-    for part, columns, style in (
-        ("point", dots, rr.Points3D.from_fields(radii=POINT, colors=[colour])),
-        ("normal", arrows, rr.Arrows3D.from_fields(radii=0.2 * POINT, colors=[colour])),
-    ):
-        place = f"{entity('contacts', name)}/{part}"
-        recording.log(place, style, static=True)
-        parted = [column.partition(counts) for column in columns]
-        rr.send_columns(place, times(t), parted, recording=recording)
-
-
-def _log_count(
-    recording: Any, name: str, colour: NDArray[np.uint8], t: Array, counts: NDArray[np.int64]
-) -> None:
-    """The number of contacts in each interval, as a line over time."""
-    place = entity("seen", name)
-    recording.log(place, rr.SeriesLines(names=[name], colors=[colour], widths=[2]), static=True)
-    columns = rr.Scalars.columns(scalars=counts.astype(np.float64))
-    rr.send_columns(place, times(t), columns, recording=recording)
+    place = entity("contacts", name)
+    dot = rr.Points3D.from_fields(radii=POINT, colors=[colour])
+    log_marks(recording, f"{place}/point", t, counts, dot, positions=points)
+    line = rr.Arrows3D.from_fields(radii=0.2 * POINT, colors=[colour])
+    arrows = {"origins": points - NORMAL * normals, "vectors": 2 * NORMAL * normals}
+    log_marks(recording, f"{place}/normal", t, counts, line, **arrows)

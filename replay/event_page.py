@@ -89,7 +89,7 @@ def _open(row: Mapping[str, Any]) -> str:
 
 def _figure(row: Mapping[str, Any]) -> str:
     stem = str(row["file"]).removesuffix(".rrd")
-    text = f"{stem}: score, threshold and speed"
+    text = f"{stem}: position, current, torque, score and threshold"
     return (
         f'<figure><img loading="lazy" alt="{escape(text)}" src="{quote(stem)}.png">'
         f'<figcaption><a href="{escape(_open(row))}">{escape(str(row["file"]))}</a></figcaption>'
@@ -123,8 +123,7 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
             "largest score": f"largest value that the score kept throughout the {time}, in the "
             "collision's window or during the false alarm.",
             "peak torque": "largest external torque of the collision over joints 1 to 4.",
-            "speed": "planned, in percent of the joints' largest; the pictures show the "
-            "measured speed of the fastest joint.",
+            "speed": "planned, in percent of the joints' largest.",
             "payload": "mass carried at the event; it is not given to the detector.",
             "recording": "the file, or SPLIT/NUMBER of a dataset as tauguard inspect --episode "
             "takes it. A number alone is a test motion's. Numbers count from 0.",

@@ -133,7 +133,7 @@ class EventFolder:
                 stem = f"{event.kind.replace(' ', '-')}-{self._found[event.kind]:03d}"
                 row = {"file": f"{stem}.rrd", "recording": name}
                 row |= row_of(event, trace, detection.threshold, held)
-                self._write(event, row, of, held)
+                self._write(event, row, of)
                 self._rows.append(row)
 
     def _held(self, trace: Trace, detection: Detection) -> Array:
@@ -144,12 +144,10 @@ class EventFolder:
             return detection.score
         return sustained(detection.score, confirmation_samples(self._alarm.confirmation, trace.dt))
 
-    def _write(
-        self, event: Event, row: dict[str, Any], of: tuple[Trace, Detection], held: Array
-    ) -> None:
+    def _write(self, event: Event, row: dict[str, Any], of: tuple[Trace, Detection]) -> None:
         """The recording and the picture of one event."""
-        from tauguard.replay import write_rrd
-        from tauguard.replay.event_figure import draw_event
+        from tauguard.atomic_write import atomic_file
+        from tauguard.replay import plot, write_rrd
         from tauguard.replay.event_page import facts
         from tauguard.replay.story import cut
 
@@ -159,9 +157,10 @@ class EventFolder:
         assert found is not None
         known, file = facts(row), self._folder / row["file"]
         write_rrd(file, part, found, whole=True, about=f"{event.text}; {known}")
-        first = int((trace.t < part.t[0]).sum())
-        shown = held[first : first + len(part.t)]
-        draw_event(file.with_suffix(".png"), part, found, shown, f"{event.text}\n{known}")
+        figure = plot(part, found)
+        figure.suptitle(f"{event.text}\n{known}", parse_math=False)  # names may have dollar signs
+        with atomic_file(file.with_suffix(".png")) as stream:
+            figure.savefig(stream, dpi=80, format="png")
 
     def finish(self) -> Path:
         """Write the page; returns its path."""

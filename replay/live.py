@@ -15,10 +15,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.models.cloth import flex_elements
 from tauguard.replay.estimates import arrow
-from tauguard.replay.robot import bodies
-from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, drawn, entity
+from tauguard.replay.robot import bodies, sheets
+from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, entity, log_shapes
 
 #: The only address that the viewer listens on; the longest wait for it [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
@@ -53,11 +52,7 @@ class LiveView:
         else:
             self._viewer = open_viewer(port)
             self._recording.connect_grpc(f"rerun+http://{HOST}:{port}/proxy")
-        self._recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        for body in self._bodies:
-            for number, piece in enumerate(body.shapes):
-                place = f"{entity('scene', body.name)}/shape_{number}"
-                self._recording.log(place, drawn(piece), static=True)
+        log_shapes(self._recording, self._bodies)
         self._named: set[str] = set()
 
     def layout(self, charts: Mapping[str, str]) -> None:
@@ -92,20 +87,12 @@ class LiveView:
         marks = np.asarray(targets, dtype=float).reshape(-1, 3)
         balls = rr.Points3D(marks, radii=MARK, colors=[GREEN] * len(marks))
         self._recording.log("scene/targets", balls)
-        for flex in range(self._model.nflex):
-            self._cloth(data, flex)
-
-    def _cloth(self, data: Any, flex: int) -> None:
-        model = self._model
-        if model.flex_dim[flex] != 2:
-            return
-        first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
-        sheet = rr.Mesh3D(
-            vertex_positions=data.flexvert_xpos[first : first + count].astype(np.float32),
-            triangle_indices=flex_elements(model, flex) - first,
-            albedo_factor=CLOTH,
-        )
-        self._recording.log(f"scene/cloth_{flex}", sheet)
+        for flex, rows, triangles in sheets(self._model):
+            places = data.flexvert_xpos[rows].astype(np.float32)
+            sheet = rr.Mesh3D(
+                vertex_positions=places, triangle_indices=triangles, albedo_factor=CLOTH
+            )
+            self._recording.log(f"scene/cloth_{flex}", sheet)
 
     def contact(self, point: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Show an arrow at ``point`` [m] along ``force`` [N]; a zero force removes it."""

@@ -12,6 +12,9 @@ from tauguard.traces import Detection, Trace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Upper end of a chart of the score in thresholds, so that both are visible.
+SCORE_TOP = 8.0
+
 
 def plot(trace: Trace, detection: Detection | None = None) -> Figure:
     """The recording as a matplotlib figure; collisions are shaded, alarms are lines.
@@ -49,6 +52,10 @@ def plot(trace: Trace, detection: Detection | None = None) -> Figure:
             panel.axvline(alarm.start, color="black", linewidth=0.8, linestyle="--")
     if detection is not None:
         panels[-1].axhline(detection.threshold, color="tab:gray", linewidth=0.8)
-    panels[0].legend(ncol=len(trace.joint_names), fontsize="small", loc="upper right")
+        if detection.score.max() > SCORE_TOP * detection.threshold > 0:
+            panels[-1].set_ylim(top=SCORE_TOP * detection.threshold)
+    legend = panels[0].legend(ncol=len(trace.joint_names), fontsize="small", loc="upper right")
+    for text in legend.get_texts():
+        text.set_parse_math(False)  # a name may have dollar signs
     panels[-1].set_xlabel("time [s]")
     return figure

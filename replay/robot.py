@@ -1,31 +1,21 @@
 """Shapes and poses of the bodies of a MuJoCo model."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
+from tauguard.models.cloth import flex_elements
 
 LARGEST_SHOWN_GROUP = 2  # in MuJoCo's viewer and the menagerie, group 3 holds collision geoms
 STICK_RADIUS = 0.02  # [m] radius of the capsules in place of links without geometry
-
-
-@dataclass(frozen=True)
-class Shape:
-    """One geom in the frame of its body."""
-
-    kind: str  #: "sphere", "ellipsoid", "capsule", "cylinder", "box" or "mesh"
-    size: Array  #: MuJoCo's sizes: radius, half-lengths [m], shape (3,)
-    position: Array  #: [m], shape (3,)
-    quat_wxyz: Array  #: shape (4,)
-    rgba: Array  #: in [0, 1], shape (4,)
-    vertices: NDArray[np.float32] | None = None  #: vertices of a mesh [m], shape (V, 3)
-    normals: NDArray[np.float32] | None = None  #: one per vertex, shape (V, 3)
-    triangles: NDArray[np.int32] | None = None  #: vertex indices, shape (F, 3)
+STICK_COLOUR = (191, 196, 204)
 
 
 @dataclass(frozen=True)
@@ -33,7 +23,7 @@ class Body:
     """A body of the scene with its shapes."""
 
     name: str
-    shapes: tuple[Shape, ...]
+    shapes: tuple[Any, ...]  #: rerun archetypes in the frame of the body
     moves: bool  #: False for a body fixed to the world
 
 
@@ -42,7 +32,7 @@ class Motion:
     """Poses of bodies: rows are samples, columns bodies."""
 
     positions: Array  #: world [m], shape (T, bodies, 3)
-    quats_wxyz: Array  #: world, shape (T, bodies, 4)
+    quats: Array  #: unit quaternions, scalar last, shape (T, bodies, 4)
 
 
 def load_model(source: Any) -> Any:
@@ -91,7 +81,7 @@ def bodies(model: Any) -> list[Body]:
     for index in range(model.nbody):
         body = model.body(index)
         first, count = int(model.body_geomadr[index]), int(model.body_geomnum[index])
-        shapes = [shape(model, geom) for geom in range(first, first + count)]
+        shapes = [drawn(model, geom) for geom in range(first, first + count)]
         moves = bool(model.body_weldid[index]) or model.body_mocapid[index] >= 0
         found.append(
             Body(body.name or f"body {index}", tuple(s for s in shapes if s is not None), moves)
@@ -104,49 +94,69 @@ def bodies(model: Any) -> list[Body]:
     return found
 
 
-def shape(model: Any, geom: int) -> Shape | None:
-    """Convert a geom to a shape; None if it is hidden, a plane or a height field."""
+def drawn(model: Any, geom: int) -> Any:
+    """A geom as a rerun archetype; None if it is hidden, a plane or a height field."""
     import mujoco
 
-    kinds = {
-        mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-        mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-        mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-        mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-        mujoco.mjtGeom.mjGEOM_BOX: "box",
-        mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-    }
-    kind = kinds.get(mujoco.mjtGeom(int(model.geom_type[geom])))
+    kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-    if kind is None or model.geom_group[geom] > LARGEST_SHOWN_GROUP or rgba[3] == 0:
+    if model.geom_group[geom] > LARGEST_SHOWN_GROUP or rgba[3] == 0:
         return None
-    faces: dict[str, Any] = {}
-    if kind == "mesh":
-        mesh = int(model.geom_dataid[geom])
-        vertex, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
-        corners = slice(face, face + int(model.mesh_facenum[mesh]))
-        points = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[mesh])]
-        triangles = model.mesh_face[corners]
-        first = int(model.mesh_normaladr[mesh])
-        normals = model.mesh_normal[first : first + int(model.mesh_normalnum[mesh])]
-        corner_normals = normals[model.mesh_facenormal[corners]]
-        faces = {
-            "vertices": points[triangles].reshape(-1, 3).copy(),
-            "normals": corner_normals.reshape(-1, 3).copy(),
-            "triangles": np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3),
-        }
-    return Shape(
-        kind=kind,
-        size=model.geom_size[geom].copy(),
-        position=model.geom_pos[geom].copy(),
-        quat_wxyz=model.geom_quat[geom].copy(),
-        rgba=np.asarray(rgba, float).copy(),
-        **faces,
+    colour = np.round(255 * np.clip(rgba, 0, 1)).astype(np.uint8)
+    place, quat = model.geom_pos[geom].copy(), model.geom_quat[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return capsule(place, quat, size[0], size[1], colour)
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        return mesh(model, int(model.geom_dataid[geom]), place, matrix(quat), colour)
+    common = {"quaternions": [np.roll(quat, -1)], "colors": [colour], "fill_mode": "solid"}
+    common["centers"] = [place]
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return rr.Cylinders3D(lengths=[2 * size[1]], radii=[size[0]], **common)
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return rr.Boxes3D(half_sizes=[size], **common)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], **common)
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return rr.Ellipsoids3D(half_sizes=[size], **common)
+    return None
+
+
+def capsule(center: Array, quat_wxyz: Array, radius: float, half: float, colour: Any) -> Any:
+    """A capsule as a rerun archetype, which begins at its origin and extends along z."""
+    start = center - matrix(quat_wxyz) @ np.array([0.0, 0.0, half])
+    return rr.Capsules3D(
+        lengths=[2 * half],
+        radii=[radius],
+        translations=[start],
+        quaternions=[np.roll(quat_wxyz, -1)],
+        colors=[colour],
+        fill_mode="solid",
     )
 
 
-def sticks(model: Any, index: int) -> list[Shape]:
+def mesh(model: Any, number: int, center: Array, rotation: Array, colour: Any) -> Any:
+    """A mesh as a rerun archetype; each triangle has its own vertices, with its normals."""
+    vertex, face = int(model.mesh_vertadr[number]), int(model.mesh_faceadr[number])
+    corners = slice(face, face + int(model.mesh_facenum[number]))
+    points = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[number])]
+    first = int(model.mesh_normaladr[number])
+    normals = model.mesh_normal[first : first + int(model.mesh_normalnum[number])]
+    vertices = points[model.mesh_face[corners]].reshape(-1, 3)
+    return rr.Mesh3D(
+        vertex_positions=vertices @ rotation.T + center,
+        vertex_normals=normals[model.mesh_facenormal[corners]].reshape(-1, 3) @ rotation.T,
+        triangle_indices=np.arange(len(vertices), dtype=np.int32).reshape(-1, 3),
+        albedo_factor=colour,
+    )
+
+
+def matrix(quat_wxyz: Array) -> Array:
+    """Rotation matrix of a unit quaternion, shape (3, 3)."""
+    return np.asarray(Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix(), np.float64)
+
+
+def sticks(model: Any, index: int) -> list[Any]:
     """Capsules from a body's origin to the origins of its children."""
     import mujoco
 
@@ -158,10 +168,16 @@ def sticks(model: Any, index: int) -> list[Shape]:
             continue
         quat = np.empty(4)
         mujoco.mju_quatZ2Vec(quat, end / length)
-        grey = np.array([0.75, 0.77, 0.8, 1.0])
-        size = np.array([STICK_RADIUS, length / 2, 0.0])
-        found.append(Shape("capsule", size, end / 2, quat, grey))
+        found.append(capsule(end / 2, quat, STICK_RADIUS, length / 2, STICK_COLOUR))
     return found
+
+
+def sheets(model: Any) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
+    """Each cloth of the model: its flex, its rows of ``flexvert_xpos``, and its triangles."""
+    for flex in np.flatnonzero(np.asarray(model.flex_dim) == 2).tolist():
+        first = int(model.flex_vertadr[flex])
+        rows = slice(first, first + int(model.flex_vertnum[flex]))
+        yield flex, rows, flex_elements(model, flex) - first
 
 
 def motion(model: Any, joint_names: Sequence[str], q: Array) -> Motion:
@@ -193,12 +209,4 @@ def motion(model: Any, joint_names: Sequence[str], q: Array) -> Motion:
         data.qpos[address] = value
         mujoco.mj_kinematics(model, data)
         positions[row], quats[row] = data.xpos, data.xquat
-    return Motion(positions, quats)
-
-
-def quats_wxyz(rotations: Array) -> Array:
-    """Unit quaternions (w first) of rotation matrices, shape (..., 3, 3) to (..., 4)."""
-    from scipy.spatial.transform import Rotation
-
-    flat = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    return np.asarray(flat, np.float64).reshape(*rotations.shape[:-2], 4)
+    return Motion(positions, np.roll(quats, -1, axis=-1))

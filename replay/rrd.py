@@ -1,9 +1,10 @@
-"""Write a trace as a rerun recording (``.rrd``). Only this module and :mod:`.live` import rerun."""
+"""Write a trace as a rerun recording (``.rrd``)."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,10 +13,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.replay.estimates import Explained, arrow, arrows, during
-from tauguard.replay.robot import Body, Motion, Shape, bodies, load_model, motion, quats_wxyz
+from tauguard.replay.plot import SCORE_TOP
+from tauguard.replay.robot import Body, Motion, bodies, load_model, motion
 from tauguard.replay.story import cut, first_moment, page
 from tauguard.traces.trace import Detection, Trace
 
@@ -24,7 +27,6 @@ FRAME_RATE = 60.0  # [Hz] rate of body poses
 SERIES_RATE = 200.0  # [Hz] rate of charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
-SCORE_TOP = 8.0  # upper end of the score's chart in thresholds, so that both are visible
 NORMAL = 0.06  # [m], length of a checked contact's normal
 COLOURS = np.array(
     [
@@ -80,10 +82,7 @@ def write_rrd(
             raise ValueError("the trace has no attached MJCF: give the robot's model (--robot)")
         model = attached[0]
     scene = load_model(model)
-    with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-        draft = Path(folder) / "draft.rrd"
-        recording = rr.RecordingStream("tauguard", recording_id=path.stem)
-        recording.save(draft)
+    with written(path, "tauguard") as recording:
         text = page(trace, detection, explained, about)
         if not whole:
             trace, detection = cut(trace, detection, first_moment(trace, detection))
@@ -92,12 +91,21 @@ def write_rrd(
         moved = motion(scene, trace.joint_names, trace.q[frames])
         lay_out(recording, blueprint(trace, detection, *seen(trace, shown, moved)))
         log_scene(recording, trace, frames, shown, moved)
-        log_checked(recording, trace)
-        log_explained(recording, trace, explained)
+        log_checked(recording, trace, frames)
+        log_explained(recording, trace.t[frames], explained)
         log_series(recording, trace, detection)
         log_states(recording, trace, detection)
-        page_text = rr.TextDocument(text, media_type="text/markdown")
-        recording.log("about", page_text, static=True)
+        recording.log("about", rr.TextDocument(text, media_type="text/markdown"), static=True)
+
+
+@contextmanager
+def written(path: Path, application: str) -> Iterator[Any]:
+    """A recording that becomes the file ``path`` if the block ends without an error."""
+    with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        draft = Path(folder) / "draft.rrd"
+        recording = rr.RecordingStream(application, recording_id=path.stem)
+        recording.save(draft)
+        yield recording
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)
@@ -150,35 +158,42 @@ def log_scene(
     recording: Any, trace: Trace, frames: NDArray[np.int64], shown: Sequence[Body], moved: Motion
 ) -> None:
     """The bodies, obstacles and contacts at these rows of the trace."""
-    recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     t, truth = trace.t[frames], trace.truth
     names = truth.obstacle_names if truth is not None else ()
+    log_shapes(recording, shown)
     for index, body in enumerate(shown):
-        place = entity("scene", body.name)
-        for number, piece in enumerate(body.shapes):
-            recording.log(f"{place}/shape_{number}", drawn(piece), static=True)
         if body.shapes and body.name not in names:
-            log_pose(recording, place, body, index, t, moved)
+            still = not body.moves
+            log_pose(
+                recording, body.name, t, moved.positions[:, index], moved.quats[:, index], still
+            )
     if truth is None:
         return
     for number, name in enumerate(names):
-        place = entity("scene", name)
         if not any(body.name == name and body.shapes for body in shown):
             ball = rr.Ellipsoids3D(radii=[0.05], colors=[GREY], fill_mode="solid")
-            recording.log(f"{place}/shape_0", ball, static=True)
+            recording.log(f"{entity('scene', name)}/shape_0", ball, static=True)
         poses = truth.obstacle_poses[frames, number]
-        columns = rr.Transform3D.columns(
-            translation=poses[:, :3, 3],
-            quaternion=np.roll(quats_wxyz(poses[:, :3, :3]), -1, axis=1),
-        )
-        rr.send_columns(place, times(t), columns, recording=recording)
+        turned = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+        log_pose(recording, name, t, poses[:, :3, 3], turned)
     log_contacts(recording, trace, frames)
 
 
-def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved: Motion) -> None:
-    """Log a body's pose: once if it is fixed, otherwise at every frame."""
-    positions, quats = moved.positions[:, index], np.roll(moved.quats_wxyz[:, index], -1, axis=1)
-    if not body.moves or (np.ptp(positions, axis=0) + np.ptp(quats, axis=0)[:3] == 0).all():
+def log_shapes(recording: Any, shown: Sequence[Body]) -> None:
+    """The shapes of all bodies, and the direction of the vertical."""
+    recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    for body in shown:
+        for number, piece in enumerate(body.shapes):
+            place = f"{entity('scene', body.name)}/shape_{number}"
+            recording.log(place, piece, static=True)
+
+
+def log_pose(
+    recording: Any, name: str, t: Array, positions: Array, quats: Array, still: bool = False
+) -> None:
+    """Log a body's pose at every time, or once if it is ``still`` or its pose does not change."""
+    place = entity("scene", name)
+    if still or not (np.ptp(positions, axis=0).any() or np.ptp(quats, axis=0).any()):
         pose = rr.Transform3D(translation=positions[0], quaternion=quats[0])
         recording.log(place, pose, static=True)
         return
@@ -186,39 +201,43 @@ def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved
     rr.send_columns(place, times(t), columns, recording=recording)
 
 
-def drawn(piece: Shape) -> Any:
-    """Convert a shape to a rerun archetype."""
-    quat = [np.roll(piece.quat_wxyz, -1)]
-    colour = [np.round(255 * np.clip(piece.rgba, 0, 1)).astype(np.uint8)]
-    common = {"quaternions": quat, "colors": colour, "fill_mode": "solid"}
-    radius, half = float(piece.size[0]), float(piece.size[1])
-    if piece.kind == "mesh":
-        assert piece.vertices is not None
-        assert piece.normals is not None
-        rotation = matrix(piece.quat_wxyz)
-        return rr.Mesh3D(
-            vertex_positions=piece.vertices @ rotation.T + piece.position,
-            vertex_normals=piece.normals @ rotation.T,
-            triangle_indices=piece.triangles,
-            albedo_factor=colour[0],
-        )
-    if piece.kind == "capsule":  # rerun's capsule begins at its origin and extends along z
-        start = piece.position - matrix(piece.quat_wxyz) @ np.array([0.0, 0.0, half])
-        return rr.Capsules3D(lengths=[2 * half], radii=[radius], translations=[start], **common)
-    centres = [piece.position]
-    if piece.kind == "cylinder":
-        return rr.Cylinders3D(lengths=[2 * half], radii=[radius], centers=centres, **common)
-    if piece.kind == "box":
-        return rr.Boxes3D(half_sizes=[piece.size], centers=centres, **common)
-    sizes = [radius] * 3 if piece.kind == "sphere" else piece.size
-    return rr.Ellipsoids3D(half_sizes=[sizes], centers=centres, **common)
+def log_marks(
+    recording: Any,
+    place: str,
+    t: Array,
+    counts: NDArray[np.int64],
+    style: Any,
+    **values: Any,
+) -> None:
+    """Log marks, such as points and arrows: ``counts[k]`` of them are shown at time ``t[k]``.
+
+    Args:
+        recording: the recording.
+        place: the entity's path.
+        t: times [s], shape (T,).
+        counts: number of marks at each time, shape (T,).
+        style: a rerun archetype whose fields are the same for all marks.
+        values: the other fields of this archetype, one row per mark.
+    """
+    recording.log(place, style, static=True)
+    parted = [column.partition(counts) for column in type(style).columns(**values)]
+    rr.send_columns(place, times(t), parted, recording=recording)
 
 
-def matrix(quat_wxyz: Array) -> Array:
-    """Rotation matrix of a unit quaternion, shape (3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix(), np.float64)
+def log_lines(
+    recording: Any,
+    place: str,
+    t: Array,
+    values: Array,
+    names: list[str],
+    colours: Any,
+    width: float,
+) -> None:
+    """Log a chart with one line for each column of ``values``, shape (T, lines)."""
+    lines = rr.SeriesLines(names=names, colors=colours, widths=[width] * len(names))
+    recording.log(place, lines, static=True)
+    columns = rr.Scalars.columns(scalars=values)
+    rr.send_columns(place, times(t), columns, recording=recording)
 
 
 def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> None:
@@ -229,70 +248,50 @@ def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> Non
     ends = np.append(starts[1:], len(trace.t))
     rows = np.array([a + np.argmax(size[a:b]) for a, b in zip(starts, ends, strict=True)])
     there = (size[rows] > 0) & np.isfinite(truth.contact_point[rows]).all(axis=1)
-    points, forces = truth.contact_point[rows][there], truth.contact_vector[rows][there]
-    vectors = arrow(forces)
+    points, vectors = truth.contact_point[rows][there], arrow(truth.contact_vector[rows][there])
     labels = [f"{value:.0f} N" for value in size[rows][there]]
-    when, lengths = times(trace.t[starts]), there.astype(int)
-    columns = [
-        *rr.Arrows3D.columns(vectors=vectors, origins=points - vectors, labels=labels),
-    ]
-    styles = rr.Arrows3D.from_fields(radii=0.012, colors=RED, show_labels=True)
-    recording.log("scene/contact_force", styles, static=True)
-    parted = [column.partition(lengths) for column in columns]
-    rr.send_columns("scene/contact_force", when, parted, recording=recording)
-    recording.log(
-        "scene/contact_point", rr.Points3D.from_fields(radii=0.02, colors=RED), static=True
-    )
-    parted = [c.partition(lengths) for c in rr.Points3D.columns(positions=points)]
-    rr.send_columns("scene/contact_point", when, parted, recording=recording)
+    t, counts = trace.t[starts], there.astype(int)
+    style = rr.Arrows3D.from_fields(radii=0.012, colors=RED, show_labels=True)
+    force = {"vectors": vectors, "origins": points - vectors, "labels": labels}
+    log_marks(recording, "scene/contact_force", t, counts, style, **force)
+    style = rr.Points3D.from_fields(radii=0.02, colors=RED)
+    log_marks(recording, "scene/contact_point", t, counts, style, positions=points)
 
 
-def log_checked(recording: Any, trace: Trace) -> None:
+def log_checked(recording: Any, trace: Trace, frames: NDArray[np.int64]) -> None:
     """Show what each contact checker reported as dots with a normal, for the length of a frame."""
-    frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
+    t = trace.t[frames]
     for number, contacts in enumerate(trace.contacts):
         place = f"scene/{entity('checked', contacts.checker)}"
         colour = COLOURS[number % len(COLOURS)]
         known = np.isfinite(contacts.point).all(axis=1)
-        frame = np.searchsorted(frames, contacts.t[known], side="right") - 1
-        lengths = np.bincount(np.maximum(frame, 0), minlength=len(frames))
+        frame = np.searchsorted(t, contacts.t[known], side="right") - 1
+        counts = np.bincount(np.maximum(frame, 0), minlength=len(t))
         points, normals = contacts.point[known], np.nan_to_num(contacts.normal[known])
         names = [" - ".join(contacts.partners[i] for i in pair) for pair in contacts.pair[known]]
-        dots = rr.Points3D.columns(positions=points, labels=names)
-        arrows = rr.Arrows3D.columns(vectors=NORMAL * normals, origins=points)
-        for part, columns, style in (
-            ("point", dots, rr.Points3D.from_fields(radii=0.01, colors=colour, show_labels=False)),
-            ("normal", arrows, rr.Arrows3D.from_fields(radii=0.003, colors=colour)),
-        ):
-            recording.log(f"{place}/{part}", style, static=True)
-            parted = [column.partition(lengths) for column in columns]
-            rr.send_columns(f"{place}/{part}", times(frames), parted, recording=recording)
+        dot = rr.Points3D.from_fields(radii=0.01, colors=colour, show_labels=False)
+        log_marks(recording, f"{place}/point", t, counts, dot, positions=points, labels=names)
+        line = rr.Arrows3D.from_fields(radii=0.003, colors=colour)
+        arrows = {"vectors": NORMAL * normals, "origins": points}
+        log_marks(recording, f"{place}/normal", t, counts, line, **arrows)
 
 
-def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) -> None:
-    """Show the estimated contacts as arrows, from the alarm on."""
-    if not explained:
-        return
-    frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
-    drawn_arrows = arrows(during(explained, frames))
-    lengths = drawn_arrows.pop("lengths")
-    place = "scene/estimated_force"
-    styles = rr.Arrows3D.from_fields(radii=0.012, colors=BLUE, show_labels=True)
-    recording.log(place, styles, static=True)
-    parted = [column.partition(lengths) for column in rr.Arrows3D.columns(**drawn_arrows)]
-    rr.send_columns(place, times(frames), parted, recording=recording)
+def log_explained(recording: Any, t: Array, explained: Sequence[Explained]) -> None:
+    """Show the estimated contacts as arrows at the frames' times ``t``, from the alarm on."""
+    if explained:
+        style = rr.Arrows3D.from_fields(radii=0.012, colors=BLUE, show_labels=True)
+        values = arrows(during(explained, t))
+        counts = values.pop("lengths")
+        log_marks(recording, "scene/estimated_force", t, counts, style, **values)
 
 
 def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:
     """Log the charts: currents, velocities, residuals, score and threshold, force."""
     starts = thin(trace.t, SERIES_RATE, MOST_POINTS)
-    when = times(trace.t[starts])
 
     def series(place: str, values: Array, names: list[str], colours: Any, width: float) -> None:
-        lines = rr.SeriesLines(names=names, colors=colours, widths=[width] * len(names))
-        recording.log(place, lines, static=True)
-        values = extremes(values, starts).reshape(len(starts), -1)
-        rr.send_columns(place, when, rr.Scalars.columns(scalars=values), recording=recording)
+        shown = extremes(values, starts).reshape(len(starts), -1)
+        log_lines(recording, place, trace.t[starts], shown, names, colours, width)
 
     names = list(trace.joint_names)
     colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))]

@@ -1,22 +1,21 @@
 """Guidance for the viewer of a recording: the first detection, and a page of text."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
+from tauguard.detectors.events import detection_window
 from tauguard.replay.estimates import Explained
 from tauguard.traces import Alarm, Collision, Detection, Trace
 
-ALARM_WINDOW = 0.5  # [s] after onset in which an alarm detects a collision (a clamp: until its end)
 LISTED = 20  # collisions in the table of the page
 
 
 def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
-    """The first alarm that starts between the collision's onset and the end of its window."""
-    onset = collision.onset
-    last = collision.end if collision.kind == "clamp" else onset + ALARM_WINDOW
+    """The first alarm that starts in the collision's detection window."""
+    onset, last = detection_window(collision)
     if any(a.start < onset <= a.end for a in alarms):
         return None  # the alarm was on before, so it detects nothing
     return next((a for a in alarms if onset <= a.start <= last), None)
@@ -40,27 +39,23 @@ def cut(
 ) -> tuple[Trace, Detection | None]:
     """Cut out the samples and events between ``start`` and ``end`` [s]."""
     first, last = np.searchsorted(trace.t, [start - 1e-9, end + 1e-9])
-    rows = slice(int(first), int(last))
+    samples = len(trace.t)
 
-    def rest(value: Any, *names: str) -> dict[str, Any]:
-        arrays = {name: getattr(value, name) for name in names}
-        return {name: array[rows] for name, array in arrays.items() if array is not None}
+    def rest(value: Any) -> dict[str, Any]:
+        """The arrays of a dataclass that have a row per sample, without the other rows."""
+        arrays = {f.name: getattr(value, f.name) for f in fields(value)}
+        found = {n: a for n, a in arrays.items() if isinstance(a, np.ndarray)}
+        return {n: a[first:last] for n, a in found.items() if len(a) == samples}
 
     truth = trace.truth
     if truth is not None:
-        arrays = rest(truth, "tau_ext", "contact_force", "payload", "contact_link")
-        arrays |= rest(truth, "contact_point", "contact_vector", "obstacle_poses")
         kept = tuple(c for c in truth.collisions if c.end >= start and c.onset <= end)
-        truth = replace(truth, collisions=kept, **arrays)
-    commands = rest(trace, "q_des", "qd_des", "qdd_des")
-    signals = rest(trace, "t", "q", "qd", "current")
-    contacts = tuple(one.between(start, end) for one in trace.contacts)
-    trace = replace(trace, truth=truth, contacts=contacts, **signals, **commands)
+        truth = replace(truth, collisions=kept, **rest(truth))
     if detection is not None:
         alarms = tuple(a for a in detection.alarms if a.end >= start and a.start <= end)
-        said = rest(detection, "t", "residual", "score", "alarm")
-        detection = replace(detection, alarms=alarms, **said)
-    return trace, detection
+        detection = replace(detection, alarms=alarms, **rest(detection))
+    contacts = tuple(one.between(start, end) for one in trace.contacts)
+    return replace(trace, truth=truth, contacts=contacts, **rest(trace)), detection
 
 
 def page(

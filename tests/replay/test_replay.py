@@ -179,20 +179,22 @@ def test_estimated_forces_are_drawn_from_the_alarm_on_and_told(tmp_path):
 
 def test_collision_geometry_is_hidden_and_every_kind_drawn():
     shown = {body.name: body for body in bodies(load_model(arm.ARM))}
-    assert [s.kind for s in shown["link1"].shapes] == ["cylinder"]
-    assert [s.kind for s in shown["link3"].shapes] == ["box", "mesh", "ellipsoid"]
+    kinds = {name: [type(s).__name__ for s in body.shapes] for name, body in shown.items()}
+    assert kinds["link1"] == ["Cylinders3D"]
+    assert kinds["link3"] == ["Boxes3D", "Mesh3D", "Ellipsoids3D"]
     assert not shown["base"].moves
     mesh = shown["link3"].shapes[1]
-    assert mesh.vertices.shape == (12, 3)
-    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-6)
+    assert len(mesh.vertex_positions.as_arrow_array()) == 12
+    normals = np.array(mesh.vertex_normals.as_arrow_array().to_pylist())
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
 
 
 def test_a_urdf_without_its_meshes_becomes_sticks(tmp_path):
     (tmp_path / "two.urdf").write_text(URDF)
     model = load_model(tmp_path / "two.urdf")
     sticks = [shape for body in bodies(model) for shape in body.shapes]
-    assert {shape.kind for shape in sticks} == {"capsule"}
-    assert 0.25 in [shape.size[1] for shape in sticks]  # half of 0.5 m
+    assert {type(shape).__name__ for shape in sticks} == {"Capsules3D"}
+    assert [0.5] in [shape.lengths.as_arrow_array().to_pylist() for shape in sticks]
     trace, detection = arm.make(seconds=0.5, joints=("a", "b"))
     write_rrd(tmp_path / "a.rrd", trace, detection, model)
     assert (tmp_path / "a.rrd").stat().st_size > 10_000
