@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,13 +31,7 @@ class Packets:
 
     def rows(self, chosen: Rows) -> Packets:
         """Some of the packets."""
-        return Packets(
-            self.due[chosen],
-            self.t[chosen],
-            self.q[chosen],
-            self.qd[chosen],
-            self.current[chosen],
-        )
+        return Packets(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -50,16 +43,9 @@ class Fault:
     duration: float = 1.0  #: [s]
 
     def __post_init__(self) -> None:
-        """Check the name and the times.
-
-        Raises:
-            ValueError: an unknown name (the message lists the known ones), or a number out of
-                range.
-        """
+        """Raise ``ValueError`` for an unknown name, or a number out of range."""
         if self.name not in FAULTS:
-            near = difflib.get_close_matches(self.name, FAULTS, n=1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise ValueError(f"no fault {self.name!r}: {hint}there are {', '.join(FAULTS)}")
+            raise ValueError(f"no fault {self.name!r}: there are {', '.join(FAULTS)}")
         if not (np.isfinite(self.start) and self.start >= 0):
             raise ValueError(f"fault {self.name}: start {self.start} s, expected 0 or more")
         if not self.duration > 0:
@@ -91,116 +77,75 @@ class Fault:
         return FAULTS[self.name](packets, rows) if rows.size else packets
 
 
-def _frozen(packets: Packets, rows: Rows) -> Packets:
-    """The time stamps continue; every signal keeps its last value."""
-    return _held(packets, rows, ("q", "qd", "current"))
+Change = Callable[[Packets, Rows], Packets]
 
 
-def _stale(packets: Packets, rows: Rows) -> Packets:
-    """The last packet is sent again and again, with its old time stamp."""
-    return _held(packets, rows, ("t", "q", "qd", "current"))
+def _set(name: str, values: Callable[[Array, Rows], Array]) -> Change:
+    """A fault of one signal: its values in the rows are ``values(signal, rows)``."""
+
+    def change(packets: Packets, rows: Rows) -> Packets:
+        signal = getattr(packets, name).copy()
+        signal[rows] = values(signal, rows)
+        return replace(packets, **{name: signal})
+
+    return change
 
 
-def _held(packets: Packets, rows: Rows, names: tuple[str, ...]) -> Packets:
-    held = {name: getattr(packets, name).copy() for name in names}
-    for value in held.values():
-        value[rows] = value[max(rows[0] - 1, 0)]
-    return replace(packets, **held)
+def _held(*names: str) -> Change:
+    """A fault in which signals keep their last value before it."""
+
+    def change(packets: Packets, rows: Rows) -> Packets:
+        for name in names:
+            packets = _set(name, _last)(packets, rows)
+        return packets
+
+    return change
 
 
-def _busiest(values: Array) -> int:
-    """The column that changes most."""
-    return int(np.argmax(np.ptp(values, axis=0)))
+def _last(signal: Array, rows: Rows) -> Array:
+    return np.asarray(signal[max(rows[0] - 1, 0)])
 
 
-def _encoder(packets: Packets, rows: Rows) -> Packets:
-    """The position of the joint that moves most stays constant; velocity and current go on."""
-    joint = _busiest(packets.q[rows])
-    q = packets.q.copy()
-    q[rows, joint] = q[max(rows[0] - 1, 0), joint]
-    return replace(packets, q=q)
+def _sent(chosen: Callable[[Rows, Rows], Rows]) -> Change:
+    """A fault in which only the packets ``chosen(all, rows)`` are sent."""
+    return lambda packets, rows: packets.rows(chosen(np.arange(len(packets.due)), rows))
 
 
-def _missing(packets: Packets, rows: Rows) -> Packets:
-    """No packets are sent."""
-    return packets.rows(np.setdiff1d(np.arange(len(packets.due)), rows))
+def _stuck(q: Array, rows: Rows) -> Array:
+    """Positions whose joint that moves most stays where it was."""
+    held = q[rows]
+    joint = int(np.argmax(np.ptp(held, axis=0)))
+    held[:, joint] = _last(q, rows)[joint]
+    return held
 
 
-def _late(packets: Packets, rows: Rows) -> Packets:
-    """All packets are sent in one burst at the end of the fault."""
-    due = packets.due.copy()
-    due[rows] = due[rows[-1]]
-    return replace(packets, due=due)
+def _plus(joint: int, amount: float) -> Callable[[Array, Rows], Array]:
+    """Values of a signal with an amount added to one joint, or to the only one."""
+    return lambda x, rows: x[rows] + amount * (np.arange(x.shape[1]) == min(joint, x.shape[1] - 1))
 
 
-def _repeated(packets: Packets, rows: Rows) -> Packets:
-    """Every packet is sent twice."""
-    return packets.rows(np.sort(np.concatenate([np.arange(len(packets.due)), rows])))
+def _clipped(current: Array, rows: Rows) -> Array:
+    most = np.abs(current).max(axis=0) / 2
+    return np.clip(current[rows], -most, most)
 
 
-def _rate(packets: Packets, rows: Rows) -> Packets:
-    """Only every second packet is sent."""
-    return packets.rows(np.setdiff1d(np.arange(len(packets.due)), rows[1::2]))
+def _exchanged(current: Array, rows: Rows) -> Array:
+    return np.hstack([current[rows, 1:2], current[rows, :1], current[rows, 2:]])
 
 
-def _jump(packets: Packets, rows: Rows) -> Packets:
-    """The position of joint 1 reads 0.2 rad too much."""
-    return _added(packets, rows, "q", 0, 0.2)
-
-
-def _bias(packets: Packets, rows: Rows) -> Packets:
-    """The current of joint 2 (or of the only joint) reads 2 A too much."""
-    return _added(packets, rows, "current", min(1, packets.q.shape[1] - 1), 2.0)
-
-
-def _added(packets: Packets, rows: Rows, name: str, joint: int, amount: float) -> Packets:
-    value = getattr(packets, name).copy()
-    value[rows, joint] += amount
-    return replace(packets, **{name: value})
-
-
-def _saturated(packets: Packets, rows: Rows) -> Packets:
-    """Each current is clipped at half of its largest value."""
-    current = packets.current.copy()
-    most = np.abs(packets.current).max(axis=0) / 2
-    current[rows] = np.clip(current[rows], -most, most)
-    return replace(packets, current=current)
-
-
-def _swapped(packets: Packets, rows: Rows) -> Packets:
-    """The currents of the first two joints are exchanged."""
-    current = packets.current.copy()
-    current[rows, :2] = current[rows, 1::-1] if current.shape[1] > 1 else current[rows, :2]
-    return replace(packets, current=current)
-
-
-def _sign(packets: Packets, rows: Rows) -> Packets:
-    """All currents have the opposite sign."""
-    current = packets.current.copy()
-    current[rows] *= -1
-    return replace(packets, current=current)
-
-
-def _nan(packets: Packets, rows: Rows) -> Packets:
-    """The currents are NaN."""
-    current = packets.current.copy()
-    current[rows] = np.nan
-    return replace(packets, current=current)
-
-
-#: Faults by name, each described by its function's docstring.
-FAULTS: dict[str, Callable[[Packets, Rows], Packets]] = {
-    "frozen": _frozen,
-    "stale": _stale,
-    "encoder": _encoder,
-    "missing": _missing,
-    "late": _late,
-    "repeated": _repeated,
-    "rate": _rate,
-    "jump": _jump,
-    "bias": _bias,
-    "saturated": _saturated,
-    "swapped": _swapped,
-    "sign": _sign,
-    "nan": _nan,
+#: Faults by name.
+FAULTS: dict[str, Change] = {
+    "frozen": _held("q", "qd", "current"),  # the time stamps continue
+    "stale": _held("t", "q", "qd", "current"),  # one packet is sent again and again
+    "encoder": _set("q", _stuck),  # velocity and current go on
+    "missing": _sent(np.setdiff1d),
+    "late": _set("due", lambda due, rows: due[rows[-1]]),  # one burst at the end of the fault
+    "repeated": _sent(lambda every, rows: np.sort(np.append(every, rows))),  # each is sent twice
+    "rate": _sent(lambda every, rows: np.setdiff1d(every, rows[1::2])),  # every second is sent
+    "jump": _set("q", _plus(0, 0.2)),  # joint 1 reads 0.2 rad too much
+    "bias": _set("current", _plus(1, 2.0)),  # joint 2 reads 2 A too much
+    "saturated": _set("current", _clipped),  # at half of each joint's largest current
+    "swapped": _set("current", _exchanged),  # the first two joints
+    "sign": _set("current", lambda current, rows: -current[rows]),
+    "nan": _set("current", lambda current, rows: np.full_like(current[rows], np.nan)),
 }

@@ -7,10 +7,7 @@ a payload; all numbers are big-endian. This module implements protocol version 2
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 PORT = 30004
 VERSION = 2
@@ -40,8 +37,7 @@ FORMATS = {
 }
 
 
-@dataclass(frozen=True)
-class Packet:
+class Packet(NamedTuple):
     """One packet: its type and its payload."""
 
     kind: int
@@ -90,9 +86,8 @@ class PacketReader:
         return Packet(kind, payload)
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """Types of a data packet's variables, in the requested order."""
+class Recipe(NamedTuple):
+    """Number of a data packet's layout, and types of its variables in the requested order."""
 
     number: int
     types: tuple[str, ...]
@@ -105,11 +100,6 @@ class Recipe:
     def pack(self, values: Sequence[float]) -> bytes:
         """Encode a data packet; ``values`` has one number for each element, in order."""
         return packet(DATA_PACKAGE, self.layout.pack(self.number, *values))
-
-
-def read_doubles(payload: bytes) -> NDArray[np.float64]:
-    """The numbers of a data packet that holds only doubles and vectors of doubles."""
-    return np.frombuffer(payload, ">f8", offset=1).astype(np.float64)
 
 
 def text_message(source: str, message: str, level: int) -> bytes:

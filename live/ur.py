@@ -240,7 +240,7 @@ class _Connection:
                 f"{self._recipe}"
             )
         self.data_due = time.monotonic() + NO_DATA
-        return rtde.read_doubles(payload)
+        return np.frombuffer(payload, ">f8", offset=1).astype(np.float64)
 
     def close(self) -> None:
         """Close the socket."""

@@ -1,26 +1,24 @@
 """Write a trace as an MCAP file of ROS 2 messages, and read it back with equal bits.
 
-Topics: ``/joint_states`` (``sensor_msgs/msg/JointState``), ``/motor_currents``, ``/joint_command``,
-``/truth/contact``, ``/truth/obstacles``, ``/truth/collisions``, ``/detection``,
-``/detection/alarms`` and ``/contacts/CHECKER`` (package ``tauguard_msgs``). The metadata record
-``tauguard.meta`` contains :attr:`Trace.meta`; :attr:`Trace.attachments` are MCAP attachments. Log
-times are the times of the trace. Equal traces give equal bytes: the file does not depend on when or
-where it was written.
+Topics: those of :data:`SAMPLES` with one message per sample, those of :data:`EVENTS`, and
+``/contacts/CHECKER``. The metadata record ``tauguard.meta`` contains :attr:`Trace.meta`;
+:attr:`Trace.attachments` are MCAP attachments. Log times are the times of the trace. Equal traces
+give equal bytes: the file does not depend on when or where it was written.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.atomic_write import atomic_file
-from tauguard.traces import mcap_contacts
-from tauguard.traces.mcap_cdr import Anything, Layout
+from tauguard.traces.contacts import CheckedContacts
+from tauguard.traces.mcap_cdr import Anything, Layout, nanoseconds, stamp
 from tauguard.traces.mcap_container import Contents, Group, Topic
-from tauguard.traces.mcap_schemas import SCHEMAS
-from tauguard.traces.mcap_time import nanoseconds, stamp
+from tauguard.traces.mcap_schemas import layout
 from tauguard.traces.mcap_writer import Writer
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 from tauguard.untrusted_input import reading
@@ -28,6 +26,36 @@ from tauguard.untrusted_input import reading
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"
 MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "application/toml"}
+#: Fields of a trace that may be missing.
+COMMANDED = ("q_des", "qd_des", "qdd_des")
+#: Fields of the truth with a row per sample, apart from the poses of obstacles.
+TRUTH = "tau_ext", "contact_force", "payload", "contact_link", "contact_point", "contact_vector"
+#: Topics with one message per sample: type, and fields of trace, truth or detection.
+SAMPLES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "/joint_states": ("sensor_msgs/msg/JointState", ("q", "qd", "effort")),
+    "/motor_currents": ("tauguard_msgs/msg/MotorCurrents", ("time", "current")),
+    "/joint_command": ("tauguard_msgs/msg/JointCommand", COMMANDED),
+    "/truth/contact": ("tauguard_msgs/msg/ContactTruth", TRUTH),
+    "/truth/obstacles": ("tauguard_msgs/msg/Obstacles", ("obstacle_poses",)),
+    "/detection": (
+        "tauguard_msgs/msg/Detection",
+        ("time", "residual", "score", "threshold", "alarm"),
+    ),
+}
+#: Topics with one message per event: type, and fields of :class:`Collision` or :class:`Alarm`. The
+#: first field is the time of the message.
+EVENTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "/truth/collisions": (
+        "tauguard_msgs/msg/Collision",
+        ("onset", "end", "peak_tau", "link", "point", "force", "kind"),
+    ),
+    "/detection/alarms": ("tauguard_msgs/msg/Alarm", ("start", "end")),
+}
+#: The type of checked contacts, and its fields.
+CHECKED = (
+    "tauguard_msgs/msg/CheckedContact",
+    ("time", "first", "second", "point", "normal", "distance"),
+)
 
 
 def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = None) -> None:
@@ -44,20 +72,21 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     path = Path(path)
     detection = trace.detection if detection is None else detection
     groups = [Group(nanoseconds(trace.t), sample_topics(trace, detection))]
-    if trace.truth is not None and trace.truth.collisions:
-        groups.append(collision_group(trace.truth.collisions))
-    if detection is not None and detection.alarms:
-        groups.append(alarm_group(detection.alarms))
-    groups += [mcap_contacts.group(one) for one in trace.contacts if len(one)]
+    if trace.truth is not None:
+        groups.append(event_group("/truth/collisions", trace.truth.collisions))
+    if detection is not None:
+        groups.append(event_group("/detection/alarms", detection.alarms))
+    groups += [contact_group(one) for one in trace.contacts]
     with atomic_file(path) as stream:
-        writer = Writer(stream, LIBRARY, SCHEMAS)
+        writer = Writer(stream, LIBRARY)
         writer.metadata("tauguard.meta", trace.meta)
         writer.metadata("tauguard.trace", describe(trace, detection))
         for name, text in sorted(trace.attachments.items()):
             media_type = MEDIA_TYPES.get(Path(name).suffix, "text/plain")
             writer.attachment(name, media_type, text.encode())
         for group in groups:
-            writer.group(group)
+            if len(group.nanoseconds) or group is groups[0]:
+                writer.group(group)
         writer.finish()
 
 
@@ -82,7 +111,11 @@ def read_mcap(path: str | Path) -> Trace:
 
 
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
-    """Metadata from which the reader derives the layouts of the messages."""
+    """Metadata from which the reader derives the layouts of the messages.
+
+    Raises:
+        ValueError: a checker has two entries.
+    """
     form: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trace.joint_names,
@@ -94,135 +127,98 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
     if detection is not None:
         form |= {"detector": detection.detector, "threshold": float(detection.threshold).hex()}
     if trace.contacts:
-        form["checkers"] = mcap_contacts.describe(trace.contacts)
+        names = [one.checker for one in trace.contacts]
+        if len(set(names)) < len(names):
+            raise ValueError(f"contacts: a checker twice: {', '.join(names)}")
+        form["checkers"] = [
+            {"name": one.checker, "partners": one.partners, "rows": len(one)}
+            for one in trace.contacts
+        ]
     return {name: json.dumps(value) for name, value in form.items()}
 
 
-COMMANDED = ("q_des", "qd_des", "qdd_des")
+def sample_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
+    """The layout of each topic with one message per sample, in the order of writing."""
+    joints, obstacles = form["joint_names"], form["obstacle_names"]
+    wide = "q", "qd", "current", "tau_ext", "residual", *form["commanded"]
+    lengths = dict.fromkeys(wide, len(joints)) | {"obstacle_poses": 16 * len(obstacles)}
+    strings = {"/joint_states": joints, "/truth/obstacles": obstacles}
+    there = {
+        "/joint_command": form["commanded"],
+        "/truth/contact": form["truth"],
+        "/truth/obstacles": obstacles,
+        "/detection": "detector" in form,
+    }
+    return {
+        topic: layout(kind, fields, strings.get(topic, ()), lengths)
+        for topic, (kind, fields) in SAMPLES.items()
+        if there.get(topic, True)
+    }
 
 
-def layouts(form: Mapping[str, Any]) -> list[Topic]:
-    """The topics with one message per sample, in the order of writing; ``values`` are empty."""
-    names, joints = form["joint_names"], len(form["joint_names"])
-    state = Layout().header().strings(names)
-    state.sequence("q", joints).sequence("qd", joints).sequence("effort", 0)
-    current = Layout().header().number("time", "f8").sequence("current", joints)
-    topics = [
-        Topic("/joint_states", "sensor_msgs/msg/JointState", state),
-        Topic("/motor_currents", "tauguard_msgs/msg/MotorCurrents", current),
-    ]
-    if form["commanded"]:
-        command = Layout().header()
-        for name in COMMANDED:
-            command.sequence(name, joints if name in form["commanded"] else 0)
-        topics.append(Topic("/joint_command", "tauguard_msgs/msg/JointCommand", command))
-    if form["truth"]:
-        contact = Layout().header().sequence("tau_ext", joints)
-        contact.number("contact_force", "f8").number("payload", "f8").number("contact_link", "i8")
-        contact.number("contact_point", "f8", 3).number("contact_vector", "f8", 3)
-        topics.append(Topic("/truth/contact", "tauguard_msgs/msg/ContactTruth", contact))
-    if form["obstacle_names"]:
-        obstacles = Layout().header().strings(form["obstacle_names"])
-        obstacles.sequence("obstacle_poses", 16 * len(form["obstacle_names"]))
-        topics.append(Topic("/truth/obstacles", "tauguard_msgs/msg/Obstacles", obstacles))
-    if "detector" in form:
-        said = Layout().header().number("time", "f8").sequence("residual", joints)
-        said.number("score", "f8").number("threshold", "f8").number("alarm", "?")
-        topics.append(Topic("/detection", "tauguard_msgs/msg/Detection", said))
-    return topics
+def contact_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
+    """The layout of each checker's topic."""
+    checkers = form.get("checkers", [])
+    return {f"/contacts/{one['name']}": layout(*CHECKED, one["partners"]) for one in checkers}
 
 
 def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
-    """The topics of :func:`layouts` with the trace's and the detection's values."""
-    values: dict[str, Anything] = stamp(trace.t) | {
-        "time": trace.t,
-        "q": trace.q,
-        "qd": trace.qd,
-        "current": trace.current,
-    }
-    values |= {n: getattr(trace, n) for n in COMMANDED if getattr(trace, n) is not None}
-    if trace.truth is not None:
-        truth = trace.truth
-        fields = "tau_ext", "contact_force", "payload", "contact_link", "contact_point"
-        values |= {name: getattr(truth, name) for name in (*fields, "contact_vector")}
-        if truth.obstacle_names:
-            shape = (len(trace.t), len(truth.obstacle_names), 4, 4)
-            if truth.obstacle_poses.shape != shape:
-                raise ValueError(
-                    f"truth.obstacle_poses: shape {truth.obstacle_poses.shape}, expected {shape}"
-                )
-            values["obstacle_poses"] = truth.obstacle_poses.reshape(
-                len(trace.t), 16 * len(truth.obstacle_names)
+    """The topics of :func:`sample_layouts` with the trace's and the detection's values.
+
+    Raises:
+        ValueError: poses of the wrong shape, or the detection of another trace.
+    """
+    names, truth = ("q", "qd", "current", *COMMANDED), trace.truth
+    values: dict[str, Anything] = stamp(trace.t) | {"time": trace.t}
+    values |= {name: getattr(trace, name) for name in names}
+    if truth is not None:
+        values |= {name: getattr(truth, name) for name in TRUTH}
+        shape = (len(trace.t), len(truth.obstacle_names), 4, 4)
+        if truth.obstacle_names and truth.obstacle_poses.shape != shape:
+            raise ValueError(
+                f"truth.obstacle_poses: shape {truth.obstacle_poses.shape}, expected {shape}"
             )
+        poses = truth.obstacle_poses
+        values["obstacle_poses"] = poses.reshape(len(poses), 16 * len(truth.obstacle_names))
     if detection is not None:
         if not np.array_equal(detection.t, trace.t):
             raise ValueError("detection.t: differs from trace.t; expected one row per sample")
         values |= {name: getattr(detection, name) for name in ("residual", "score", "alarm")}
         values["threshold"] = np.full(len(trace.t), detection.threshold)
     form = {name: json.loads(text) for name, text in describe(trace, detection).items()}
-    topics = layouts(form)
-    for topic in topics:
-        for name in topic.layout.dtype.names or ():
-            expected = (len(trace.t), *topic.layout.dtype[name].shape)
-            if values[name].shape != expected:
-                raise ValueError(f"{name}: shape {values[name].shape}, expected {expected}")
     return [
-        Topic(
-            topic.name,
-            topic.schema,
-            topic.layout,
-            {name: values[name] for name in topic.layout.dtype.names or ()},
-        )
-        for topic in topics
+        Topic(topic, SAMPLES[topic][0], found, values)
+        for topic, found in sample_layouts(form).items()
     ]
 
 
-def collision_layout() -> Layout:
-    """The layout of ``tauguard_msgs/msg/Collision``."""
-    layout = Layout().header().number("onset", "f8").number("end", "f8").number("peak_tau", "f8")
-    return (
-        layout.number("link", "i8")
-        .number("point", "f8", 3)
-        .number("force", "f8", 3)
-        .number("kind", "u1")
-    )
-
-
-def collision_group(collisions: tuple[Collision, ...]) -> Group:
-    """The labelled collisions, logged at their onsets.
+def event_group(topic: str, events: Sequence[Collision] | Sequence[Alarm]) -> Group:
+    """Events of one kind, logged at their beginnings.
 
     Raises:
-        ValueError: an unknown kind.
+        ValueError: an unknown kind of collision.
     """
-    for collision in collisions:
-        if collision.kind not in KINDS:
-            raise ValueError(f"collision kind {collision.kind!r}: one of {', '.join(KINDS)}")
-    onset = np.array([c.onset for c in collisions], np.float64)
-    values: dict[str, Anything] = stamp(onset) | {
-        "onset": onset,
-        "end": np.array([c.end for c in collisions], np.float64),
-        "peak_tau": np.array([c.peak_tau for c in collisions], np.float64),
-        "link": np.array([c.link for c in collisions], np.int64),
-        "point": np.array([c.point for c in collisions], np.float64),
-        "force": np.array([c.force for c in collisions], np.float64),
-        "kind": np.array([KINDS.index(c.kind) for c in collisions], np.uint8),
-    }
-    topic = Topic("/truth/collisions", "tauguard_msgs/msg/Collision", collision_layout(), values)
-    return Group(nanoseconds(onset), [topic])
+    kind, fields = EVENTS[topic]
+    values: dict[str, Any] = {name: [getattr(one, name) for one in events] for name in fields}
+    for name in values.get("kind", ()):
+        if name not in KINDS:
+            raise ValueError(f"collision kind {name!r}: one of {', '.join(KINDS)}")
+    if "kind" in values:
+        values["kind"] = [KINDS.index(name) for name in values["kind"]]
+    arrays = {name: np.array(value) for name, value in values.items()}
+    return _group(topic, kind, layout(kind, fields), arrays[fields[0]], arrays)
 
 
-def alarm_layout() -> Layout:
-    """The layout of ``tauguard_msgs/msg/Alarm``."""
-    return Layout().header().number("start", "f8").number("end", "f8")
+def contact_group(contacts: CheckedContacts) -> Group:
+    """The contacts of one checker, logged at their times."""
+    values = {name: getattr(contacts, name) for name in ("point", "normal", "distance")}
+    values |= {"time": contacts.t, "first": contacts.pair[:, 0], "second": contacts.pair[:, 1]}
+    form = layout(*CHECKED, contacts.partners)
+    return _group(f"/contacts/{contacts.checker}", CHECKED[0], form, contacts.t, values)
 
 
-def alarm_group(alarms: tuple[Alarm, ...]) -> Group:
-    """Alarms, logged at their starts."""
-    start = np.array([alarm.start for alarm in alarms], np.float64)
-    end = np.array([alarm.end for alarm in alarms], np.float64)
-    values: dict[str, Anything] = stamp(start) | {"start": start, "end": end}
-    topic = Topic("/detection/alarms", "tauguard_msgs/msg/Alarm", alarm_layout(), values)
-    return Group(nanoseconds(start), [topic])
+def _group(topic: str, kind: str, form: Layout, t: Array, values: Mapping[str, Anything]) -> Group:
+    return Group(nanoseconds(t), [Topic(topic, kind, form, {**stamp(t), **values})])
 
 
 def decode(contents: Contents) -> Trace:
@@ -233,32 +229,29 @@ def decode(contents: Contents) -> Trace:
     form = {k: json.loads(v) for k, v in contents.metadata["tauguard.trace"].items()}
     if form["format"] != FORMAT:
         raise ValueError(f"format {form['format']}, this version reads {FORMAT}")
-    sampled = layouts(form)
-    known = {topic.name: topic.layout for topic in sampled}
-    events = {"/truth/collisions": collision_layout(), "/detection/alarms": alarm_layout()}
-    tables = collect(contents, known | events | mcap_contacts.layouts(form))
+    sampled, checked = sample_layouts(form), contact_layouts(form)
+    events = {topic: layout(*one) for topic, one in EVENTS.items()}
+    tables = collect(contents, sampled | events | checked)
+    rows = dict.fromkeys(sampled, form["rows"])
+    rows |= {f"/contacts/{one['name']}": one["rows"] for one in form.get("checkers", [])}
+    for topic, wanted in rows.items():
+        if (found := len(tables[topic]["sec"])) != wanted:
+            raise ValueError(
+                f"{topic}: {found} messages, expected {wanted}: some were filtered out"
+            )
     values: dict[str, Any] = {}
     for topic in sampled:
-        table = tables[topic.name]
-        if len(table["sec"]) != form["rows"]:
-            raise ValueError(
-                f"{topic.name}: {len(table['sec'])} messages, expected {form['rows']}: "
-                "some were filtered out"
-            )
-        values |= table
+        values |= tables[topic]
     contents.check_sum()
-    truth = None
-    if form["truth"]:
-        truth = decode_truth(form, values, tables["/truth/collisions"])
     return Trace(
         joint_names=tuple(form["joint_names"]),
         t=values["time"],
-        q=values["q"],
-        qd=values["qd"],
-        current=values["current"],
-        **{name: values[name] for name in form["commanded"]},
-        truth=truth,
-        contacts=mcap_contacts.decode(form, tables),
+        **{name: values[name] for name in ("q", "qd", "current", *form["commanded"])},
+        truth=decode_truth(form, values, tables["/truth/collisions"]) if form["truth"] else None,
+        contacts=tuple(
+            decode_contacts(one, tables[f"/contacts/{one['name']}"])
+            for one in form.get("checkers", [])
+        ),
         meta=contents.metadata.get("tauguard.meta", {}),
         attachments={name: data.decode() for name, data in contents.attachments.items()},
         detection=_detection(form, values, tables["/detection/alarms"]),
@@ -272,38 +265,39 @@ def _detection(form: Mapping[str, Any], values: Mapping[str, Any], alarms: Any) 
     return Detection(
         detector=form["detector"],
         t=values["time"].copy(),
-        residual=values["residual"],
-        score=values["score"],
         threshold=float.fromhex(form["threshold"]),
-        alarm=values["alarm"],
         alarms=tuple(Alarm(*span) for span in spans),
+        **{name: values[name] for name in ("residual", "score", "alarm")},
     )
 
 
 def decode_truth(form: Mapping[str, Any], values: Mapping[str, Any], table: Any) -> Truth:
     """The truth, from the field arrays of its messages and the ``table`` of collisions."""
+    numbers = {name: table[name].tolist() for name in ("onset", "end", "link", "peak_tau")}
     collisions = tuple(
         Collision(
             kind=KINDS[table["kind"][i]],
-            onset=float(table["onset"][i]),
-            end=float(table["end"][i]),
-            link=int(table["link"][i]),
             point=table["point"][i].copy(),
             force=table["force"][i].copy(),
-            peak_tau=float(table["peak_tau"][i]),
+            **{name: value[i] for name, value in numbers.items()},
         )
         for i in range(len(table["onset"]))
     )
-    names = tuple(form["obstacle_names"])
-    poses = {}
+    names, fields = tuple(form["obstacle_names"]), {name: values[name] for name in TRUTH}
     if names:
-        poses = {"obstacle_poses": values["obstacle_poses"].reshape(form["rows"], len(names), 4, 4)}
-    fields = "tau_ext", "contact_force", "payload", "contact_link", "contact_point"
-    return Truth(
-        collisions=collisions,
-        obstacle_names=names,
-        **{name: values[name] for name in (*fields, "contact_vector")},
-        **poses,
+        poses = values["obstacle_poses"].reshape(form["rows"], len(names), 4, 4)
+        fields["obstacle_poses"] = poses
+    return Truth(collisions=collisions, obstacle_names=names, **fields)
+
+
+def decode_contacts(form: Mapping[str, Any], table: Any) -> CheckedContacts:
+    """The contacts of one checker, from the ``table`` of its messages."""
+    return CheckedContacts(
+        checker=form["name"],
+        partners=tuple(form["partners"]),
+        t=table["time"],
+        pair=np.column_stack([table["first"], table["second"]]),
+        **{name: table[name] for name in ("point", "normal", "distance")},
     )
 
 

@@ -15,6 +15,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
+
 Bytes = NDArray[np.uint8]
 Anything = NDArray[np.generic]
 
@@ -70,17 +72,13 @@ class Layout:
         """``std_msgs/Header``: fields ``sec`` and ``nanosec``, an empty ``frame_id``."""
         return self.number("sec", "i4").number("nanosec", "u4").string("")
 
-    @property
-    def dtype(self) -> np.dtype[np.void]:
-        """Structured type of one message, ``size`` bytes."""
-        return np.dtype(
-            {
-                "names": list(self._fields),
-                "formats": [dtype for dtype, _ in self._fields.values()],
-                "offsets": [offset for _, offset in self._fields.values()],
-                "itemsize": self.size,
-            }
-        )
+    def check(self, values: Mapping[str, Anything], rows: int) -> None:
+        """Raise ``ValueError`` for a field array whose shape is not (rows, *field shape)."""
+        for name, (dtype, _) in self._fields.items():
+            if values[name].shape != (rows, *dtype.shape):
+                raise ValueError(
+                    f"{name}: shape {values[name].shape}, expected {(rows, *dtype.shape)}"
+                )
 
     def template(self) -> Bytes:
         """A message with its constant bytes, and zeros in fields and padding. Shape (size,)."""
@@ -90,19 +88,10 @@ class Layout:
         return out
 
     def pack(self, out: Bytes, values: Mapping[str, Anything]) -> None:
-        """Write messages into ``out``, shape (rows, size), one field array at a time.
-
-        Raises:
-            ValueError: an array whose shape is not (rows, *field shape).
-        """
+        """Write messages into ``out``, shape (rows, size), one field array at a time."""
         out[:] = self.template()
         for name, (dtype, offset) in self._fields.items():
-            value = values[name]
-            if value.shape != (len(out), *dtype.shape):
-                raise ValueError(
-                    f"{name}: shape {value.shape}, expected {(len(out), *dtype.shape)}"
-                )
-            wide = np.ascontiguousarray(value, dtype.base).view(np.uint8)
+            wide = np.ascontiguousarray(values[name], dtype.base).view(np.uint8)
             out[:, offset : offset + dtype.itemsize] = wide.reshape(len(out), dtype.itemsize)
 
     def unpack(self, data: Bytes) -> dict[str, Anything]:
@@ -121,3 +110,22 @@ class Layout:
             native = dtype.base.newbyteorder("=")
             fields[name] = raw.view(dtype.base).astype(native).reshape(len(data), *dtype.shape)
         return fields
+
+
+def nanoseconds(t: Array) -> NDArray[np.uint64]:
+    """Times ``t`` [s] as log times [ns].
+
+    Raises:
+        ValueError: a time below 0 or after the year 2262.
+    """
+    bad = np.flatnonzero(~((t >= 0) & (t < 2**63 / 1e9)))
+    if bad.size:
+        raise ValueError(f"t: {t[bad[0]]} s in row {bad[0]}, expected 0 to 9.2e9 s; shift the time")
+    whole = np.floor(t)
+    return whole.astype(np.uint64) * np.uint64(10**9) + np.rint((t - whole) * 1e9).astype(np.uint64)
+
+
+def stamp(t: Array) -> dict[str, Anything]:
+    """The fields ``sec`` and ``nanosec`` of message headers at times ``t`` [s]."""
+    ns = nanoseconds(t)
+    return {"sec": (ns // 10**9).astype(np.int32), "nanosec": (ns % 10**9).astype(np.uint32)}

@@ -1,5 +1,10 @@
 """The ROS 2 message types of a trace as ``ros2msg`` schemas, for any MCAP reader."""
 
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+from tauguard.traces.mcap_cdr import Layout
+
 SEPARATOR = "=" * 80
 
 HEADER = "std_msgs/Header"
@@ -84,20 +89,62 @@ float64 distance               # between the surfaces, negative in penetration [
 """
 
 
-def complete(text: str, *parts: str) -> str:
-    """A message definition, followed by the definitions of the types that it contains."""
-    sections = [text, *(f"MSG: {name}\n{PARTS[name]}" for name in parts)]
-    return f"{SEPARATOR}\n".join(sections)
-
-
-SCHEMAS = {
-    "sensor_msgs/msg/JointState": complete(JOINT_STATE, HEADER, TIME),
-    "tauguard_msgs/msg/MotorCurrents": complete(MOTOR_CURRENTS, HEADER, TIME),
-    "tauguard_msgs/msg/JointCommand": complete(JOINT_COMMAND, HEADER, TIME),
-    "tauguard_msgs/msg/ContactTruth": complete(CONTACT_TRUTH, HEADER, TIME, POINT, VECTOR),
-    "tauguard_msgs/msg/Obstacles": complete(OBSTACLES, HEADER, TIME),
-    "tauguard_msgs/msg/Collision": complete(COLLISION, HEADER, TIME, POINT, VECTOR),
-    "tauguard_msgs/msg/Detection": complete(DETECTION, HEADER, TIME),
-    "tauguard_msgs/msg/Alarm": complete(ALARM, HEADER, TIME),
-    "tauguard_msgs/msg/CheckedContact": complete(CHECKED_CONTACT, HEADER, TIME, POINT, VECTOR),
+#: The definition of each message type, without the types that it contains.
+DEFINITIONS = {
+    "sensor_msgs/msg/JointState": JOINT_STATE,
+    "tauguard_msgs/msg/MotorCurrents": MOTOR_CURRENTS,
+    "tauguard_msgs/msg/JointCommand": JOINT_COMMAND,
+    "tauguard_msgs/msg/ContactTruth": CONTACT_TRUTH,
+    "tauguard_msgs/msg/Obstacles": OBSTACLES,
+    "tauguard_msgs/msg/Collision": COLLISION,
+    "tauguard_msgs/msg/Detection": DETECTION,
+    "tauguard_msgs/msg/Alarm": ALARM,
+    "tauguard_msgs/msg/CheckedContact": CHECKED_CONTACT,
 }
+#: NumPy type and number of elements of each type of field.
+NUMBERS: dict[str, tuple[str, int | None]] = {
+    "float64": ("f8", None),
+    "int64": ("i8", None),
+    "uint8": ("u1", None),
+    "bool": ("?", None),
+    POINT: ("f8", 3),
+    VECTOR: ("f8", 3),
+}
+
+
+def schema(name: str) -> str:
+    """The definition of a message type, followed by those of the types that it contains."""
+    text = DEFINITIONS[name]
+    parts = [part for part in PARTS if part in text or part == TIME]
+    return f"{SEPARATOR}\n".join([text, *(f"MSG: {part}\n{PARTS[part]}" for part in parts)])
+
+
+def layout(
+    name: str,
+    fields: Sequence[str],
+    strings: Sequence[str] = (),
+    lengths: Mapping[str, int] = MappingProxyType({}),
+) -> Layout:
+    """The layout of a message type.
+
+    Args:
+        name: the type.
+        fields: a name for each field of numbers, in the order of the definition.
+        strings: content of the field that is a list of strings.
+        lengths: number of elements of each field that is a sequence (default: 0).
+    """
+    found, names = Layout(), iter(fields)
+    for line in DEFINITIONS[name].splitlines():
+        kind, _, rest = line.partition("#")[0].partition(" ")
+        if "=" in rest:  # a constant
+            continue
+        if kind == HEADER:
+            found.header()
+        elif kind == "string[]":
+            found.strings(strings)
+        elif kind == "float64[]":
+            field = next(names)
+            found.sequence(field, lengths.get(field, 0))
+        else:
+            found.number(next(names), *NUMBERS[kind])
+    return found

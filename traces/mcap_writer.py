@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tauguard.traces.mcap_cdr import Bytes
 from tauguard.traces.mcap_container import MAGIC, PREFIX, Group, Topic
+from tauguard.traces.mcap_schemas import schema as schema_text
 
 CHUNK_BYTES = 4 << 20  # uncompressed: large enough for zstd, small enough to seek
 ZSTD_LEVEL = 1  # measured signals hardly compress: level 3 is slower and files are no smaller
@@ -22,9 +23,9 @@ ZSTD_LEVEL = 1  # measured signals hardly compress: level 3 is slower and files 
 class Writer:
     """Writes one MCAP file of tables to a binary stream."""
 
-    def __init__(self, stream: IO[bytes], library: str, schemas: Mapping[str, str]) -> None:
-        """Write the file header; ``schemas`` are the message definitions by type name."""
-        self._stream, self._schema_texts = stream, schemas
+    def __init__(self, stream: IO[bytes], library: str) -> None:
+        """Write the file header."""
+        self._stream = stream
         self._offset = self._crc = 0
         self._schemas: dict[str, records.Schema] = {}
         self._channels: list[records.Channel] = []
@@ -77,7 +78,7 @@ class Writer:
                 id=len(self._schemas) + 1,
                 name=topic.schema,
                 encoding="ros2msg",
-                data=self._schema_texts[topic.schema].encode(),
+                data=schema_text(topic.schema).encode(),
             )
             self._schemas[topic.schema] = schema
             self._record(schema)
@@ -93,8 +94,14 @@ class Writer:
         return channel.id
 
     def group(self, group: Group) -> None:
-        """Write all messages of a group, in chunks."""
+        """Write all messages of a group, in chunks.
+
+        Raises:
+            ValueError: a field array whose shape is not (rows, *field shape).
+        """
         rows = len(group.nanoseconds)
+        for topic in group.topics:
+            topic.layout.check(topic.values, rows)
         channels = [self._channel(topic) for topic in group.topics]
         template, starts = row_template(channels, group.topics)
         step = max(1, CHUNK_BYTES // len(template))

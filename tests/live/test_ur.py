@@ -196,7 +196,7 @@ def test_a_fault_touches_only_its_own_seconds(name):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("frozn@3", "did you mean 'frozen'"),
+        ("frozn@3", "there are frozen, stale"),
         ("frozen", "expected NAME@SECONDS"),
         ("frozen@-1", "0 or more"),
         ("frozen@1+0", "above 0"),
