@@ -187,7 +187,7 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
         values["threshold"] = np.full(len(trace.t), detection.threshold)
     form = {name: json.loads(text) for name, text in describe(trace, detection).items()}
     return [
-        Topic(topic, SAMPLES[topic][0], found, values)
+        Topic(topic, SAMPLES[topic][0], found, {name: values[name] for name in found.fields})
         for topic, found in sample_layouts(form).items()
     ]
 

@@ -29,7 +29,7 @@ class Layout:
     def __init__(self) -> None:
         """Start with an empty message."""
         self.size = len(ENCAPSULATION)  #: bytes so far, including the encapsulation header
-        self._fields: dict[str, tuple[np.dtype[np.generic], int]] = {}
+        self.fields: dict[str, tuple[np.dtype[np.generic], int]] = {}  #: type, offset [bytes]
         self._constants: list[tuple[int, bytes]] = [(0, ENCAPSULATION)]
 
     def _align(self, size: int) -> None:
@@ -45,7 +45,7 @@ class Layout:
         scalar = np.dtype(kind).newbyteorder("<")
         self._align(scalar.itemsize)
         dtype = scalar if count is None else np.dtype((scalar, (count,)))
-        self._fields[name] = (dtype, self.size)
+        self.fields[name] = (dtype, self.size)
         self.size += dtype.itemsize
         return self
 
@@ -74,7 +74,7 @@ class Layout:
 
     def check(self, values: Mapping[str, Anything], rows: int) -> None:
         """Raise ``ValueError`` for a field array whose shape is not (rows, *field shape)."""
-        for name, (dtype, _) in self._fields.items():
+        for name, (dtype, _) in self.fields.items():
             if values[name].shape != (rows, *dtype.shape):
                 raise ValueError(
                     f"{name}: shape {values[name].shape}, expected {(rows, *dtype.shape)}"
@@ -90,7 +90,7 @@ class Layout:
     def pack(self, out: Bytes, values: Mapping[str, Anything]) -> None:
         """Write messages into ``out``, shape (rows, size), one field array at a time."""
         out[:] = self.template()
-        for name, (dtype, offset) in self._fields.items():
+        for name, (dtype, offset) in self.fields.items():
             wide = np.ascontiguousarray(values[name], dtype.base).view(np.uint8)
             out[:, offset : offset + dtype.itemsize] = wide.reshape(len(out), dtype.itemsize)
 
@@ -105,7 +105,7 @@ class Layout:
             if (found != np.frombuffer(expected, np.uint8)).any():
                 raise ValueError(f"strings or lengths differ from the layout at byte {offset}")
         fields = {}
-        for name, (dtype, offset) in self._fields.items():
+        for name, (dtype, offset) in self.fields.items():
             raw = np.ascontiguousarray(data[:, offset : offset + dtype.itemsize])
             native = dtype.base.newbyteorder("=")
             fields[name] = raw.view(dtype.base).astype(native).reshape(len(data), *dtype.shape)
