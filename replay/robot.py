@@ -172,7 +172,7 @@ def sticks(model: Any, index: int) -> list[Any]:
     return found
 
 
-def sheets(model: Any) -> Iterator[tuple[int, slice, NDArray[np.int64]]]:
+def sheets(model: Any) -> Iterator[tuple[int, slice, NDArray[np.int32]]]:
     """Each cloth of the model: its flex, its rows of ``flexvert_xpos``, and its triangles."""
     for flex in np.flatnonzero(np.asarray(model.flex_dim) == 2).tolist():
         first = int(model.flex_vertadr[flex])
