@@ -5,10 +5,11 @@ same card. The checksums of shards and arms are in the manifest and in ``dataset
 """
 
 import json
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from tauguard.atomic_write import write_atomic
+from tauguard.atomic_write import write_changed
 from tauguard.datasets.columns_of_shards import JOINT_SIGNALS, MEANING, RESIDUAL, schema
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import (
@@ -24,105 +25,6 @@ from tauguard.datasets.inspection import SplitSummary, summarised
 
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
 
-#: The card, with the header of the Hugging Face hub.
-CARD_TEXT = """---
-license: {license}
-pretty_name: {name}
-tags:
-- robotics
-- collision-detection
-- time-series
-- simulation
-- tauguard
-size_categories:
-- {size}
-configs:
-- config_name: default
-  data_files:
-{files}---
-
-# {name}
-
-{sentence}. The arms, their drives, sensors and collisions are simulated; no real arm
-was recorded.
-
-| split | episodes | hours | rows | MB | collisions |
-|---|---|---|---|---|---|
-{splits}
-
-An episode is a run of one arm.{pairs} No motion occurs in two splits. `unseen` in
-`dataset.json` lists the properties whose values in a split do not occur in the first split.
-
-## Files
-
-* `data/SPLIT-NNNNNN.parquet`: one row per sample, one row group per episode.
-* `manifest/SPLIT-NNNNNN.jsonl`: one line per episode (arm, speed, payload, seed, collisions,
-  outcome, everything needed to simulate it again); the last line is a checksum of the others.
-* `arms/NAME.xml`: the nominal arm, whose numbers an observer may use; the simulated arms differ.
-  `arms/NAME.drive.json`: the nominal drive, for an arm that is not part of tauguard.
-* `dataset.json`: configuration, versions, planned counts.
-
-## Columns
-
-{columns}
-
-Joint signals have one column per joint, `q_1` to `q_{joints}`.
-
-## Labels
-
-A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
-ends at the last one; contacts less than 0.5 s apart are one collision. The manifest gives kind,
-link, point, force and peak torque of each collision; the column `collision` is its index there.
-Episodes whose collisions differ from the plan are kept, and their `outcome` says so.
-
-`tau_ext` is the sum over all contacts at that time; `contact_x` and `force_x` are those of the
-contact with the largest force. With several contacts, J^T f of that one is not all of `tau_ext`.
-
-## Load it
-
-```python
-import polars as pl  # pandas, DuckDB and pyarrow read the same files
-
-rows = pl.scan_parquet("data/{first}-[0-9]*.parquet")
-print(rows.filter(pl.col("collision") >= 0).group_by("episode").agg(pl.col("t").min()).collect())
-```
-
-```python
-from datasets import load_dataset  # Hugging Face datasets
-
-rows = load_dataset("FOLDER", split="{first_name}")  # the path of this folder
-```
-
-```python
-from tauguard.datasets import read  # traces with their collisions
-
-for trace in read(".", splits=["{first}"]):
-    print(trace, trace.truth.collisions)
-```
-
-## Use and limits
-
-For training and comparing detectors of collisions, and estimators of contact force, from joint
-signals. Report results on the splits whose names begin with "test"; train a detector for each arm.
-The dataset does not show how well a detector works on a real arm: drives, sensors and contacts are
-models. It is no evidence for the safety of a workplace.
-
-## Cite
-
-```bibtex
-@misc{{{key},
-  title = {{{name}: simulated collisions of robot arms}},
-  author = {{the tauguard authors}},
-  note = {{configuration {sha256}}}
-}}
-```
-
-## How it was made
-
-By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-256
-`{sha256}`. The same configuration and versions give the same bytes.
-"""
-
 #: Sentence that the card of a dataset of pairs adds.
 PAIRS = """ Episodes 2k and 2k + 1 of a split are a pair: the same arm, load, temperature, noise and
 commanded motion, first without and then with collisions."""
@@ -132,14 +34,9 @@ def write_cards(folder: Path) -> None:
     """Write card, metadata and checksums; a file with the right content is not rewritten."""
     configuration = configuration_in(folder)
     summary = summarised(folder)
-    _write(folder / CARD, card(configuration, read_head(folder), summary))
-    _write(folder / CROISSANT, croissant(folder, configuration, summary))
-    _write(folder / SUMS, checksums(folder))
-
-
-def _write(path: Path, text: str) -> None:
-    if not path.is_file() or path.read_bytes() != text.encode():
-        write_atomic(path, text)
+    write_changed(folder / CARD, card(configuration, read_head(folder), summary))
+    write_changed(folder / CROISSANT, croissant(folder, configuration, summary))
+    write_changed(folder / SUMS, checksums(folder))
 
 
 def describe(configuration: Configuration) -> str:
@@ -155,27 +52,32 @@ def describe(configuration: Configuration) -> str:
 def card(
     configuration: Configuration, head: dict[str, Any], summary: dict[str, SplitSummary]
 ) -> str:
-    """The text of ``README.md``."""
-    files = "".join(
+    """The text of ``README.md``, from the template ``card.md``."""
+    parts = "".join(
         f"  - split: {name.replace('-', '_')}\n    path: {shards(name)}\n" for name in summary
     )
     rows, first = sum(one.rows for one in summary.values()), next(iter(summary))
-    return CARD_TEXT.format(
-        license=LICENSE,
-        name=configuration.name,
-        size=_size(rows),
-        files=files,
-        sentence=describe(configuration),
-        splits=_split_rows(summary),
-        pairs=PAIRS if all(split.paired for split in configuration.splits) else "",
-        columns=_column_rows(configuration),
-        joints=configuration.most_joints,
-        first=first,
-        first_name=first.replace("-", "_"),
-        key=configuration.name.replace("-", "_"),
-        sha256=head["configuration_sha256"],
-        tauguard=head["code"]["tauguard"],
-        mujoco=head["code"]["mujoco"],
+    return (
+        files("tauguard.datasets")
+        .joinpath("card.md")
+        .read_text()
+        .format(
+            license=LICENSE,
+            name=configuration.name,
+            size=_size(rows),
+            files=parts,
+            sentence=describe(configuration),
+            splits=_split_rows(summary),
+            pairs=PAIRS if all(split.paired for split in configuration.splits) else "",
+            columns=_column_rows(configuration),
+            joints=configuration.most_joints,
+            first=first,
+            first_name=first.replace("-", "_"),
+            key=configuration.name.replace("-", "_"),
+            sha256=head["configuration_sha256"],
+            tauguard=head["code"]["tauguard"],
+            mujoco=head["code"]["mujoco"],
+        )
     )
 
 
@@ -222,8 +124,9 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
         for split in summary
         if any(s == split for _, _, s in shards.values())
     ]
+    context = files("tauguard.datasets").joinpath("croissant_context.json").read_text()
     content = {
-        "@context": CONTEXT,
+        "@context": json.loads(context),
         "@type": "sc:Dataset",
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": configuration.name,
@@ -244,7 +147,7 @@ def shards(split: str) -> str:
 
 def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], dict[str, Any]]:
     """The files of a split, and the columns of their rows."""
-    files = {
+    own = {
         "@type": "cr:FileSet",
         "@id": f"{split}-files",
         "name": f"{split}-files",
@@ -271,26 +174,4 @@ def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], 
                 },
             }
         )
-    return files, {"@type": "cr:RecordSet", "@id": split, "name": split, "field": fields}
-
-
-#: Names of Croissant's vocabulary in its JSON-LD context.
-NAMES = (
-    "citeAs", "column", "conformsTo", "data", "dataType", "equivalentProperty", "samplingRate",
-    "examples", "extract", "field", "fileProperty", "fileObject", "fileSet", "format", "includes",
-    "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet", "references",
-    "regex", "repeated", "replace", "separator", "source", "subField", "transform",
-)  # fmt: skip
-CONTEXT = {
-    "@language": "en",
-    "@vocab": "https://schema.org/",
-    "sc": "https://schema.org/",
-    "cr": "http://mlcommons.org/croissant/",
-    "rai": "http://mlcommons.org/croissant/RAI/",
-    "dct": "http://purl.org/dc/terms/",
-    **{name: f"cr:{name}" for name in NAMES},
-    "conformsTo": "dct:conformsTo",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-}
+    return own, {"@type": "cr:RecordSet", "@id": split, "name": split, "field": fields}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import tomllib
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from tauguard.traces.trace import UR_JOINTS
 from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
@@ -156,88 +157,17 @@ class Reading:
 AS_IS = Reading()
 
 
-def numbered(prefix: str, joints: int = 6, first: int = 0, end: str = "") -> tuple[str, ...]:
-    """Names of ``joints`` columns: ``prefix0end``, ``prefix1end``, ..., numbered from ``first``."""
-    return tuple(f"{prefix}{i}{end}" for i in range(first, first + joints))
+def _map_of(fields: dict[str, Any]) -> ColumnMap:
+    """The map in a JSON or TOML file, whose lists become tuples."""
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+    if "repair" in values:
+        values["repair"] = frozenset(values["repair"])
+    return ColumnMap(**values)
 
 
-PRESETS = {
-    # The headerless files of the UR10e identification data of Mamedov et al. 2020: t, then six
-    # columns each of q, qd, i, i_des and tau_des.
-    "ur10e": ColumnMap(
-        t=0,
-        q=tuple(range(1, 7)),
-        qd=tuple(range(7, 13)),
-        current=tuple(range(13, 19)),
-        joint_names=UR_JOINTS,
-        width=31,
-        headerless=True,
-        repair=frozenset({"repeat", "tail"}),
-    ),
-    # Files of the recorder of Universal Robots' real-time data exchange (RTDE).
-    "ur_rtde": ColumnMap(
-        t="timestamp",
-        q=numbered("actual_q_"),
-        qd=numbered("actual_qd_"),
-        current=numbered("actual_current_"),
-        joint_names=UR_JOINTS,
-        repair=frozenset({"repeat", "tail"}),
-    ),
-    # Published logs of a UR5 (Kufieta 2014): t, q1..6, qd1..6, i1..6 and more.
-    "ur5": ColumnMap(
-        t="t",
-        q=numbered("q", first=1),
-        qd=numbered("qd", first=1),
-        current=numbered("i", first=1),
-        joint_names=UR_JOINTS,
-        repair=frozenset({"repeat", "tail"}),
-    ),
-    # Published logs of a UR3: t, q1..6, qd1..6, tau1..6 [N m].
-    "ur3": ColumnMap(
-        t="t",
-        q=numbered("q", first=1),
-        qd=numbered("qd", first=1),
-        torque=numbered("tau", first=1),
-        joint_names=UR_JOINTS,
-        repair=frozenset({"repeat", "tail"}),
-    ),
-    # Franka's arms by the names of libfranka's RobotState, with joint torque sensors [N m].
-    "franka": ColumnMap(
-        t="time",
-        q=numbered("q", 7),
-        qd=numbered("dq", 7),
-        torque=numbered("tau_J", 7),
-        repair=frozenset({"repeat", "tail", "state"}),
-    ),
-    # Files of libfranka's logToCSV; their tau_ext_hat_filtered, Franka's own estimate, is not read.
-    "libfranka": ColumnMap(
-        t="time",
-        q=numbered("state.q[", 7, end="]"),
-        qd=numbered("state.dq[", 7, end="]"),
-        torque=numbered("state.tau_J[", 7, end="]"),
-        time_scale=1e-3,
-        repair=frozenset({"repeat", "tail", "state"}),
-    ),
-    # Doosan's RobotStateRt: degrees; torques are currents times gear and torque constant.
-    "doosan": ColumnMap(
-        t="time_stamp",
-        q=numbered("actual_joint_position[", end="]"),
-        qd=numbered("actual_joint_velocity[", end="]"),
-        torque=numbered("actual_motor_torque[", end="]"),
-        degrees=True,
-        repair=frozenset({"repeat", "tail", "state"}),
-    ),
-    # A KUKA LBR by sensor_msgs/JointState, with joint torque sensors [N m]. Its efforts have the
-    # opposite sign of the robot's torques: gravity fits a Med 7's logs with -0.8 to -0.95.
-    "lbr": ColumnMap(
-        t="t",
-        q=numbered("q", 7, 1),
-        qd=numbered("qd", 7, 1),
-        torque=numbered("effort", 7, 1),
-        torque_scale=-1.0,
-        repair=frozenset({"repeat", "tail", "state"}),
-    ),
-}
+_TEXT = files("tauguard.datasets").joinpath("presets.toml").read_text()
+#: Maps of known formats by name.
+PRESETS = {name: _map_of(fields) for name, fields in tomllib.loads(_TEXT).items()}
 
 
 def preset_of(columns: ColumnMap) -> str | None:
@@ -289,7 +219,4 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
     if missing := [name for name in ("t", "q") if name not in fields]:
         raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
     with reading(columns, fields_are):
-        fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
-        if "repair" in fields:
-            fields["repair"] = frozenset(fields["repair"])
-        return ColumnMap(**fields)
+        return _map_of(fields)

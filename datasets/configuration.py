@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -177,8 +176,6 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
         folder: base of relative paths of arms and objects.
     """
     top = checked_table("", {k: v for k, v in values.items() if k not in TABLES}, KEYS["top"])
-    if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", top["name"]):
-        refuse("name", top["name"], "small letters, digits, dots and dashes, at most 64")
     widths = checked_table("mismatch", _table(values, "mismatch"), KEYS["mismatch"])
     common = dict(_table(values, "episodes"))
     checked_table("episodes", common, KEYS["split"], partial=True)

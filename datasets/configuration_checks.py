@@ -1,7 +1,7 @@
 """The keys of a dataset's description: type, range, default, and errors that name them."""
 
 import difflib
-import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NoReturn
@@ -71,15 +71,13 @@ def checked_table(
 
 
 def number(low: float, high: float, above: bool = False) -> Read:
-    """Reader of a finite number in [low, high], or (low, high] with ``above``."""
+    """Reader of a number in [low, high], or (low, high] with ``above``."""
 
     def read(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise TypeError
-        good = low <= value <= high and not (above and value == low)
-        if not (math.isfinite(value) and good):
+        checked = float(of_type(int, float)(value))
+        if not low <= checked <= high or (above and checked == low):
             raise ValueError
-        return float(value)
+        return checked
 
     return read
 
@@ -88,11 +86,31 @@ def integer(low: int, high: int) -> Read:
     """Reader of a whole number in [low, high]."""
 
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise TypeError
-        if not low <= value <= high:
+        if not low <= of_type(int)(value) <= high:
+            raise ValueError
+        return int(value)
+
+    return read
+
+
+def of_type(*kinds: type) -> Read:
+    """Reader of a value of one of ``kinds``; true and false are no numbers."""
+
+    def read(value: Any) -> Any:
+        if type(value) not in kinds:
             raise ValueError
         return value
+
+    return read
+
+
+def matching(pattern: str) -> Read:
+    """Reader of a text that a regular expression matches as a whole."""
+
+    def read(value: Any) -> str:
+        if not re.fullmatch(pattern, value):
+            raise ValueError
+        return str(value)
 
     return read
 
@@ -101,25 +119,12 @@ def several(read: Read, least: int = 1, distinct: bool = False) -> Read:
     """Reader of a list of at least ``least`` values."""
 
     def read_all(value: Any) -> tuple[Any, ...]:
-        if not isinstance(value, list | tuple):
-            raise TypeError
-        items = tuple(read(item) for item in value)
+        items = tuple(read(item) for item in of_type(list, tuple)(value))
         if len(items) < least or (distinct and len(set(items)) < len(items)):
             raise ValueError
         return items
 
     return read_all
-
-
-def one_of(*words: str) -> Read:
-    """Reader of one of ``words``."""
-
-    def read(value: Any) -> str:
-        if value not in words or not isinstance(value, str):
-            raise ValueError
-        return value
-
-    return read
 
 
 def span(low: float, high: float, equal: bool) -> Read:
@@ -135,29 +140,6 @@ def span(low: float, high: float, equal: bool) -> Read:
     return read
 
 
-def text(value: Any) -> str:
-    """Read a text."""
-    if not isinstance(value, str):
-        raise TypeError
-    return value
-
-
-def split_name(value: Any) -> str:
-    """Read a name that can be part of a file's name."""
-    if not isinstance(value, str) or not value.replace("-", "").replace("_", "").isalnum():
-        raise ValueError
-    if not value.isascii() or len(value) > 40 or value.startswith(("-", "_")):
-        raise ValueError
-    return value
-
-
-def flag(value: Any) -> bool:
-    """Read true or false."""
-    if not isinstance(value, bool):
-        raise TypeError
-    return value
-
-
 def rows_a_second(value: Any) -> int:
     """Read a sample rate that divides the 1000 Hz of the physics."""
     rate = int(integer(1, 1000)(value))
@@ -171,14 +153,12 @@ _DEFAULT = Mismatch(seed=0)
 #: Longest clamp [s]: it ends at least 0.5 s before the end of its slot.
 LONGEST_CLAMP = round(SLOT - OFFSET - SPREAD - 0.5, 6)
 SPLIT = {
-    "name": Key(split_name, "letters, digits, - and _, at most 40"),
+    "name": Key(matching("[A-Za-z0-9][A-Za-z0-9_-]{0,39}"), "letters, digits, - and _, at most 40"),
     "episodes": Key(integer(1, 10_000_000), "a whole number, 1 to 10,000,000"),
-    "quick_episodes": Key(
-        lambda v: None if v is None else integer(1, 10_000_000)(v), "a whole number from 1", None
-    ),
+    "quick_episodes": Key(integer(1, 10_000_000), "a whole number from 1", None),
     "seconds": Key(number(1, 600), "seconds, 1 to 600", 60.0),
     "arms": Key(
-        several(text, distinct=True),
+        several(of_type(str), distinct=True),
         f"a list of {', '.join(cura6.NAMES)}, names of `tauguard robot` or robot files",
     ),
     "individuals": Key(
@@ -187,11 +167,9 @@ SPLIT = {
     "speeds": Key(several(number(1, 100, above=True)), "a list of percentages above 1 to 100"),
     "payloads_g": Key(several(number(0, 20_000)), "a list of grams, 0 to 20,000", (0.0,)),
     "struck": Key(number(0, 1), "a fraction, 0 to 1", 0.5),
-    "collisions": Key(
-        lambda v: None if v is None else integer(1, 200)(v), "a whole number, 1 to 200", None
-    ),
+    "collisions": Key(integer(1, 200), "a whole number, 1 to 200", None),
     "kinds": Key(
-        several(one_of(*KINDS)),
+        several(matching("|".join(KINDS))),
         f"a list of {', '.join(KINDS)}",
         ("strike", "pulse", "strike", "clamp"),
     ),
@@ -202,7 +180,7 @@ SPLIT = {
     "temperature": Key(span(-10, 80, equal=True), "[low, high] in degC, -10 to 80", (25.0, 45.0)),
     "picks": Key(number(0, 1), "a fraction, 0 to 1", 0.0),
     "unseen": Key(
-        several(one_of("arm", "individual", "payload", "speed"), least=0, distinct=True),
+        several(matching("arm|individual|payload|speed"), least=0, distinct=True),
         "a list of arm, individual, payload, speed",
         (),
     ),
@@ -211,16 +189,19 @@ SPLIT = {
         f"[low, high] in seconds, 0.05 to {LONGEST_CLAMP:g}",
         CLAMP_SECONDS,
     ),
-    "paired": Key(flag, "true or false", False),
+    "paired": Key(of_type(bool), "true or false", False),
 }
 KEYS: dict[str, dict[str, Key]] = {
     "top": {
-        "name": Key(text, "the dataset's name"),
+        "name": Key(
+            matching("[a-z0-9][a-z0-9._-]{0,63}"),
+            "small letters, digits, dots and dashes, at most 64",
+        ),
         "seed": Key(integer(0, 2**62), "a whole number, 0 to 2^62"),
         "rate": Key(rows_a_second, "rows per second that divide 1000", 1000),
         "episodes_per_shard": Key(integer(1, 1000), "a whole number, 1 to 1000", 10),
-        "residual": Key(flag, "true or false", False),
-        "objects": Key(text, "a TOML file that lists objects around the arm", ""),
+        "residual": Key(of_type(bool), "true or false", False),
+        "objects": Key(of_type(str), "a TOML file that lists objects around the arm", ""),
     },
     "mismatch": {
         name: Key(number(0, largest), f"a half-width, 0 to {largest}", getattr(_DEFAULT, name))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from tauguard.atomic_write import PART, remove_parts, write_atomic
+from tauguard.atomic_write import PART, remove_parts, write_atomic, write_changed
 from tauguard.datasets.code_identity import code, computed_bits, versions
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.robots import check_unchanged, nominal_texts
@@ -236,19 +236,10 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
     for name in ("data", "manifest", "arms"):
         (folder / name).mkdir(exist_ok=True)
     for name, text in _arm_files(configuration).items():
-        _write_once(folder / "arms" / name, text)
-    text = json.dumps(head, indent=1, sort_keys=True) + "\n"
-    if not _holds(folder / HEAD, text):
+        write_changed(folder / "arms" / name, text)
+    path, text = folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n"
+    if not path.is_file() or path.read_bytes() != text.encode():
         (folder / SUMS).unlink(missing_ok=True)  # checksums of the old head; write_cards writes new
-        write_atomic(folder / HEAD, text)
-
-
-def _holds(path: Path, text: str) -> bool:
-    return path.is_file() and path.read_bytes() == text.encode()
-
-
-def _write_once(path: Path, text: str) -> None:
-    if not _holds(path, text):
         write_atomic(path, text)
 
 

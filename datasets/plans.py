@@ -1,8 +1,9 @@
 """Plans of episodes, drawn from a seed: with collisions, without collisions, and for the demo."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -113,24 +114,12 @@ def struck_episodes(
     joints, scale = len(load_arm(robot).joints), torque_scale(robot)
     links = range(min(2, joints), joints + 1)
     strata = [(scale * low, scale * high) for low, high in STRATA]
-    children = np.random.SeedSequence([seed, 1]).spawn(count)
-    episodes = []
-    for i, child in enumerate(children):
-        rng = np.random.default_rng(child)
-        speed, payload = pairing(i, speeds, payloads)
-        episodes.append(
-            Episode(
-                seed=int(rng.integers(2**62)),
-                seconds=episode_seconds(collisions),
-                speed=speed,
-                payload_g=payload,
-                collisions=collision_plans(rng, collisions, strata=strata, links=links),
-                mismatch=mismatch,
-                temperature=float(rng.uniform(25, 45)),
-                arm=robot,
-            )
-        )
-    return episodes
+
+    def hits(rng: np.random.Generator) -> tuple[CollisionPlan, ...]:
+        return collision_plans(rng, collisions, strata=strata, links=links)
+
+    common = {"seconds": episode_seconds(collisions), "mismatch": mismatch, "arm": robot}
+    return _episodes([seed, 1], count, speeds, payloads, hits, **common)
 
 
 def free_episodes(
@@ -143,21 +132,33 @@ def free_episodes(
     robot: str = "cura6",
 ) -> list[Episode]:
     """Collision-free episodes."""
-    children = np.random.SeedSequence([seed, 2]).spawn(count)
+    common = {"seconds": seconds, "mismatch": mismatch, "arm": robot}
+    return _episodes([seed, 2], count, speeds, payloads, lambda rng: (), **common)
+
+
+def _episodes(
+    seed: list[int],
+    count: int,
+    speeds: Sequence[float],
+    payloads: Sequence[float],
+    collisions: Callable[[np.random.Generator], tuple[CollisionPlan, ...]],
+    **common: Any,
+) -> list[Episode]:
+    """Episodes drawn from ``seed``; ``common`` are fields that are the same in all of them."""
     episodes = []
-    for i, child in enumerate(children):
+    for i, child in enumerate(np.random.SeedSequence(seed).spawn(count)):
         rng = np.random.default_rng(child)
         speed, payload = pairing(i, speeds, payloads)
-        episode = Episode(
-            seed=int(rng.integers(2**62)),
-            seconds=seconds,
-            speed=speed,
-            payload_g=payload,
-            mismatch=mismatch,
-            temperature=float(rng.uniform(25, 45)),
-            arm=robot,
+        episodes.append(
+            Episode(
+                seed=int(rng.integers(2**62)),
+                speed=speed,
+                payload_g=payload,
+                collisions=collisions(rng),
+                temperature=float(rng.uniform(25, 45)),
+                **common,
+            )
         )
-        episodes.append(episode)
     return episodes
 
 

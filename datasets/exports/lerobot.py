@@ -7,7 +7,7 @@ tag ``v3.0``; otherwise LeRobot's loader refuses it.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,15 +46,14 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
     for name in ("meta/episodes/chunk-000", "data"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     episodes: list[dict[str, Any]] = []
-    total: dict[str, Moments] = {}
     names: tuple[str, ...] = ()
     for number, group in enumerate(_files(traces)):
         where = {"chunk": number // CHUNK, "file": number % CHUNK}
-        _write_file(folder, where, group, episodes, total)
+        _write_file(folder, where, group, episodes)
         names = group[0].joint_names
     if not episodes:
         raise ValueError("no episodes to export")
-    _write_meta(folder, episodes, total, rate, robot, features(names))
+    _write_meta(folder, episodes, rate, robot, features(names))
     return len(episodes)
 
 
@@ -107,34 +106,23 @@ def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
     return {name: x.astype(kinds[name]["dtype"]) for name, x in found.items()}
 
 
-class Moments:
-    """Minimum, maximum, mean and standard deviation of columns, accumulated part by part."""
+def moments(values: Array) -> dict[str, Array]:
+    """Statistics of a column's values, shape (T,) or (T, c), under LeRobot's names."""
+    wide = values.reshape(len(values), -1).astype(np.float64)
+    found = {name: getattr(wide, name)(axis=0) for name in ("min", "max", "mean", "std")}
+    return {**found, "count": np.array([len(wide)])}
 
-    def __init__(self, values: Array) -> None:
-        """Moments of ``values``, shape (T,) or (T, c)."""
-        wide = values.reshape(len(values), -1).astype(np.float64)
-        self.count = len(wide)
-        self.low, self.high, self.mean = wide.min(axis=0), wide.max(axis=0), wide.mean(axis=0)
-        self.spread = ((wide - self.mean) ** 2).sum(axis=0)
 
-    def add(self, other: Moments) -> None:
-        """Add the rows of another part."""
-        count = self.count + other.count
-        apart = other.mean - self.mean
-        self.spread = self.spread + other.spread + apart**2 * self.count * other.count / count
-        self.mean = self.mean + apart * other.count / count
-        self.low, self.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
-        self.count = count
-
-    def values(self) -> dict[str, list[float]]:
-        """The statistics under LeRobot's names."""
-        return {
-            "min": self.low.tolist(),
-            "max": self.high.tolist(),
-            "mean": self.mean.tolist(),
-            "std": np.sqrt(self.spread / self.count).tolist(),
-            "count": [self.count],
-        }
+def combined(parts: Sequence[dict[str, Array]]) -> dict[str, Array]:
+    """Statistics of all rows, from the :func:`moments` of parts of them."""
+    low, high, mean, std, count = (
+        np.array([part[name] for part in parts]) for name in ("min", "max", "mean", "std", "count")
+    )
+    weight = count / count.sum()
+    middle = (weight * mean).sum(axis=0)
+    variance = (weight * (std**2 + (mean - middle) ** 2)).sum(axis=0)
+    ends = {"min": low.min(axis=0), "max": high.max(axis=0)}
+    return {**ends, "mean": middle, "std": np.sqrt(variance), "count": count.sum(axis=0)}
 
 
 def _files(traces: Iterable[Trace]) -> Iterator[list[Trace]]:
@@ -149,11 +137,7 @@ def _files(traces: Iterable[Trace]) -> Iterator[list[Trace]]:
 
 
 def _write_file(
-    folder: Path,
-    where: dict[str, int],
-    group: list[Trace],
-    episodes: list[dict[str, Any]],
-    total: dict[str, Moments],
+    folder: Path, where: dict[str, int], group: list[Trace], episodes: list[dict[str, Any]]
 ) -> None:
     path = folder / "data" / f"chunk-{where['chunk']:03d}" / f"file-{where['file']:03d}.parquet"
     path.parent.mkdir(exist_ok=True)
@@ -161,13 +145,7 @@ def _write_file(
     tables = []
     for trace in group:
         columns = columns_of(trace, len(episodes), first)
-        own = {name: Moments(x) for name, x in columns.items()}
-        for name, one in own.items():
-            if name in total:
-                total[name].add(one)
-            else:
-                total[name] = Moments(columns[name])
-        episodes.append(_episode(len(episodes), first, len(trace.t), where, own))
+        episodes.append(_episode(len(episodes), first, where, columns))
         first += len(trace.t)
         tables.append(pa.table({name: _column(x) for name, x in columns.items()}))
     with atomic_file(path) as stream:
@@ -182,8 +160,9 @@ def _column(values: Array) -> pa.Array:
 
 
 def _episode(
-    number: int, first: int, rows: int, where: dict[str, int], own: dict[str, Moments]
+    number: int, first: int, where: dict[str, int], columns: dict[str, Array]
 ) -> dict[str, Any]:
+    rows = len(columns["timestamp"])
     line: dict[str, Any] = {
         "episode_index": number,
         "tasks": [TASK],
@@ -195,15 +174,14 @@ def _episode(
         "meta/episodes/chunk_index": 0,
         "meta/episodes/file_index": 0,
     }
-    for name, moments in own.items():
-        line |= {f"stats/{name}/{key}": value for key, value in moments.values().items()}
+    for name, x in columns.items():
+        line |= {f"stats/{name}/{key}": value.tolist() for key, value in moments(x).items()}
     return line
 
 
 def _write_meta(
     folder: Path,
     episodes: list[dict[str, Any]],
-    total: dict[str, Moments],
     rate: int,
     robot: str,
     described: dict[str, dict[str, Any]],
@@ -212,7 +190,7 @@ def _write_meta(
         pq.write_table(pa.Table.from_pylist(episodes), stream, compression="zstd")
     with atomic_file(folder / "meta/tasks.parquet") as stream:
         pq.write_table(_tasks(), stream)
-    stats = {name: one.values() for name, one in total.items()}
+    stats = {name: _stats(name, episodes) for name in described}
     write_atomic(folder / "meta/stats.json", json.dumps(stats, indent=1) + "\n")
     info = {
         "codebase_version": VERSION,
@@ -230,6 +208,13 @@ def _write_meta(
         "features": described,
     }
     write_atomic(folder / "meta/info.json", json.dumps(info, indent=1) + "\n")
+
+
+def _stats(name: str, episodes: list[dict[str, Any]]) -> dict[str, list[float]]:
+    """Statistics of a column over all episodes."""
+    keys = ("min", "max", "mean", "std", "count")
+    parts = [{key: line[f"stats/{name}/{key}"] for key in keys} for line in episodes]
+    return {key: value.tolist() for key, value in combined(parts).items()}
 
 
 def _tasks() -> pa.Table:

@@ -44,6 +44,12 @@ def write_atomic(path: Path, content: bytes | str) -> None:
         stream.write(content.encode() if isinstance(content, str) else content)
 
 
+def write_changed(path: Path, text: str) -> None:
+    """Write ``text`` to ``path``, unless the file holds just that."""
+    if not path.is_file() or path.read_bytes() != text.encode():
+        write_atomic(path, text)
+
+
 def remove_parts(folder: Path) -> None:
     """Remove the files that killed writers left in ``folder``; no writer may be running there."""
     for part in folder.rglob(f".*{PART}"):

@@ -12,7 +12,7 @@ import pytest
 from tauguard.datasets.card import shards
 from tauguard.datasets.configuration import load
 from tauguard.datasets.dataset_folder import CARD, CROISSANT, lines
-from tauguard.datasets.exports.lerobot import Moments, write_lerobot
+from tauguard.datasets.exports.lerobot import combined, moments, write_lerobot
 from tauguard.datasets.exports.minari import write_minari
 from tauguard.datasets.reader import read
 from tauguard.datasets.shard import digest
@@ -46,11 +46,10 @@ def test_lerobot_layout_and_statistics(tiny, tmp_path):
 
 def test_moments_of_parts_are_those_of_the_whole():
     values = np.random.default_rng(3).normal(5, 2, (1000, 3))
-    parts = Moments(values[:10])
-    parts.add(Moments(values[10:700]))
-    parts.add(Moments(values[700:]))
-    np.testing.assert_allclose(parts.values()["mean"], values.mean(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(parts.values()["std"], values.std(axis=0), rtol=1e-12)
+    parts = combined([moments(values[a:b]) for a, b in ((0, 10), (10, 700), (700, 1000))])
+    for name in ("min", "max", "mean", "std"):
+        np.testing.assert_allclose(parts[name], getattr(values, name)(axis=0), rtol=1e-12)
+    assert parts["count"] == 1000
 
 
 def test_minari_reads_what_was_written(tiny, tmp_path, monkeypatch):

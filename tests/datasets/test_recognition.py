@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.datasets.arm_logs import reduced
-from tauguard.datasets.columns import PRESETS, ColumnMap, numbered
+from tauguard.datasets.columns import PRESETS, ColumnMap
 from tauguard.datasets.logs import Log, read_csv, read_log
 from tauguard.datasets.recognition import described, grouped, recognised
 from tauguard.traces import Trace
@@ -163,9 +163,9 @@ def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp
     source = np.where(rows < 300, rows, np.maximum(300, rows - 100)) // 2 * 2
     columns = ColumnMap(
         "t",
-        numbered("q", 2),
-        numbered("v", 2),
-        torque=numbered("f", 2),
+        ("q0", "q1"),
+        ("v0", "v1"),
+        torque=("f0", "f1"),
         repair=frozenset({"state"}),
     )
     names = ["t", *columns.q, *columns.qd, *columns.torque]
