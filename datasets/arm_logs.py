@@ -166,10 +166,7 @@ def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
     if set(given) != set(names):
         raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
     order = [given.index(name) for name in names]
-    tables = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
-    moved: dict[str, Any] = {
-        name: getattr(trace, name)[:, order] for name in tables if getattr(trace, name) is not None
-    }
+    moved: dict[str, Any] = {name: values[:, order] for name, values in trace.signals.items()}
     return dataclasses.replace(trace, joint_names=names, **moved)
 
 

@@ -76,34 +76,15 @@ def stored(trace: Trace, every: int) -> Trace:
     def single(x: Array) -> Array:
         return x[rows].astype(np.float32).astype(np.float64)
 
-    def signal(name: str) -> Array | None:
-        x: Array | None = getattr(trace, name)
-        return None if x is None else single(rounded(name, x))
-
     truth = trace.truth
     if truth is not None:
-        truth = Truth(
-            tau_ext=single(truth.tau_ext),
-            contact_force=single(truth.contact_force),
-            collisions=truth.collisions,
-            payload=single(truth.payload),
-            contact_link=truth.contact_link[rows].copy(),
-            contact_point=single(truth.contact_point),
-            contact_vector=single(truth.contact_vector),
-        )
-    return Trace(
-        joint_names=trace.joint_names,
-        t=trace.t[rows].copy(),
-        q=given(signal("q")),
-        qd=given(signal("qd")),
-        current=given(signal("current")),
-        q_des=signal("q_des"),
-        qd_des=signal("qd_des"),
-        qdd_des=signal("qdd_des"),
-        truth=truth,
-        meta=trace.meta,
-        attachments=trace.attachments,
-    )
+        names = "tau_ext", "contact_force", "payload", "contact_point", "contact_vector"
+        arrays: dict[str, Any] = {name: single(getattr(truth, name)) for name in names}
+        arrays["contact_link"] = truth.contact_link[rows].copy()
+        truth = Truth(collisions=truth.collisions, **arrays)
+    signals: dict[str, Any] = {n: single(rounded(n, x)) for n, x in trace.signals.items()}
+    signals |= {"meta": trace.meta, "attachments": trace.attachments}
+    return Trace(trace.joint_names, trace.t[rows].copy(), truth=truth, **signals)
 
 
 def rounded(name: str, signal: Array) -> Array:

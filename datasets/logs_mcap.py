@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mcap.exceptions import McapError
+from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.traces.mcap import read_mcap
-from tauguard.traces.mcap_container import CHUNK, Contents, check_chunks, walk
+from tauguard.traces.mcap_container import Contents
 from tauguard.traces.trace import Trace
 
 if TYPE_CHECKING:
@@ -27,56 +29,45 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
         ValueError: no such topic, messages without velocity or effort, or a message that lacks a
             joint of the first one.
     """
-    from mcap.exceptions import McapError
-
     from tauguard.datasets.log_checks import checked
     from tauguard.datasets.logs import Log
 
     try:
-        content = path.read_bytes()
-        contents = Contents(content)
-        check_chunks(
-            [(at, body) for at, code, body in walk(content) if code == CHUNK], len(content)
-        )
+        contents = Contents(path.read_bytes())
         contents.check_sum()
-        if "tauguard.trace" in contents.metadata:
-            own = read_mcap(path)
-            return Log(own, checked(own, lambda row: f"sample {row}"))
-        topic, messages = _messages(content)
-    except (McapError, struct.error, RecursionError) as error:
+    except (McapError, struct.error) as error:
         raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
+    if "tauguard.trace" in contents.metadata:
+        own = read_mcap(path)
+        return Log(own, checked(own, lambda row: f"sample {row}"))
+    topic, messages = _messages(contents)
     trace = assemble(topic, messages, joint_names)
     notes = checked(trace, lambda row: f"{topic}, message {row}")
     return Log(trace, (f"{topic}: effort is taken as current [A]", *notes))
 
 
-def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
-    """Name, log times and messages of the first topic of the type.
-
-    Messages are read in the order of the file, not through the index at its end: a damaged index
-    could omit messages without an error.
-    """
-    from mcap.reader import NonSeekingReader, make_reader
-
-    summary = make_reader(io.BytesIO(content), validate_crcs=True).get_summary()
-    channels = list(summary.channels.values()) if summary is not None else []
-    schemas = summary.schemas if summary is not None else {}
+def _messages(contents: Contents) -> tuple[str, list[tuple[int, bytes]]]:
+    """Name, log times and messages of the first topic of the type, in the order of time."""
+    schemas, channels = contents.schemas, contents.channels.values()
     types = {c.topic: getattr(schemas.get(c.schema_id), "name", "?") for c in channels}
     topic = next((name for name, kind in types.items() if kind == TYPE), None)
     if topic is None:
         have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
         raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
-    reader = NonSeekingReader(io.BytesIO(content), validate_crcs=True)
-    messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
-    if summary is not None and summary.statistics is not None:
-        counts = summary.statistics.channel_message_counts
-        counted = sum(counts.get(c.id, 0) for c in channels if c.topic == topic)
-        if counts and counted != len(messages):
-            raise ValueError(
-                f"{topic}: {len(messages)} messages, but the file's summary counts {counted}: "
-                "damaged, or cut"
-            )
-    return topic, messages
+    own = {c.id for c in channels if c.topic == topic}
+    messages = [
+        (int(time), row.tobytes())
+        for block in contents.messages()
+        if block.channel in own
+        for time, row in zip(block.nanoseconds, block.payload, strict=True)
+    ]
+    counted = sum(contents.counts.get(number, 0) for number in own)
+    if contents.counts and counted != len(messages):
+        raise ValueError(
+            f"{topic}: {len(messages)} messages, but the file's summary counts {counted}: "
+            "damaged, or cut"
+        )
+    return topic, sorted(messages, key=lambda message: message[0])
 
 
 def assemble(
@@ -122,37 +113,28 @@ def joint_state(where: str, data: bytes) -> dict[str, Any]:
     order = "<" if data[1] == 1 else ">"
     body, at = data[4:], 0
 
-    def scalar() -> int:
+    def values(kind: str, count: int) -> NDArray[Any]:
         nonlocal at
-        at += -at % 4
-        (value,) = struct.unpack_from(f"{order}I", body, at)
-        at += 4
-        return int(value)
+        at += -at % np.dtype(kind).itemsize if count else 0
+        found = np.frombuffer(body, order + kind, count, at)
+        at += found.nbytes
+        return found
+
+    def scalar() -> int:
+        return int(values("u4", 1)[0])
 
     def text() -> str:
-        nonlocal at
-        size = scalar()
-        value = body[at : at + size]
-        if len(value) != size:
-            raise struct.error("string")
-        at += size
-        return value[:-1].decode()
+        return values("u1", scalar()).tobytes()[:-1].decode()
 
-    def doubles() -> Any:
-        nonlocal at
-        count = scalar()
-        if count:
-            at += -at % 8
-        value = np.frombuffer(body, f"{order}f8", count, at).astype(np.float64)
-        at += 8 * count
-        return value
+    def doubles() -> Array:
+        return values("f8", scalar()).astype(np.float64)
 
     try:
         stamp = scalar() * 10**9 + scalar()
         text()
         names = [text() for _ in range(scalar())]
         position, velocity, effort = doubles(), doubles(), doubles()
-    except (struct.error, ValueError) as error:
+    except ValueError as error:
         raise ValueError(f"{where}: cut off ({len(data)} bytes)") from error
     return {
         "stamp": stamp,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.datasets.drives import preset_drive
+from tauguard.datasets.drives import preset_gains
 from tauguard.detectors import ArmModel, RobotNumbers
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.assessment import (
@@ -155,13 +155,13 @@ def initial_arm(
             )
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     traces = [r.trace for r in recordings]
-    preset = None if gains else preset_drive(columns, traces)
+    preset = () if gains else preset_gains(columns, traces)
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
         otherwise = "payload" if known else "masses"
         scale = "gains" if gains or (preset and not known) else otherwise
-    if preset is not None:
-        gains = preset[1].gain
+    if preset:
+        gains = preset
         scale = "preset" if scale == "gains" else scale
     _check_count(gains, numbers)
     if not gains and scale == "gains":

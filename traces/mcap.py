@@ -20,14 +20,12 @@ from tauguard.traces.mcap_cdr import Anything, Layout, nanoseconds, stamp
 from tauguard.traces.mcap_container import Contents, Group, Topic
 from tauguard.traces.mcap_schemas import layout
 from tauguard.traces.mcap_writer import Writer
-from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
+from tauguard.traces.trace import COMMANDED, KINDS, Alarm, Collision, Detection, Trace, Truth
 from tauguard.untrusted_input import reading
 
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"
 MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "application/toml"}
-#: Fields of a trace that may be missing.
-COMMANDED = ("q_des", "qd_des", "qdd_des")
 #: Fields of the truth with a row per sample, apart from the poses of obstacles.
 TRUTH = "tau_ext", "contact_force", "payload", "contact_link", "contact_point", "contact_vector"
 #: Topics with one message per sample: type, and fields of trace, truth or detection.
@@ -119,7 +117,7 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
     form: dict[str, Any] = {
         "format": FORMAT,
         "joint_names": trace.joint_names,
-        "commanded": [name for name in COMMANDED if getattr(trace, name) is not None],
+        "commanded": [name for name in COMMANDED if name in trace.signals],
         "truth": trace.truth is not None,
         "obstacle_names": trace.truth.obstacle_names if trace.truth is not None else (),
         "rows": len(trace.t),
@@ -168,9 +166,8 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
     Raises:
         ValueError: poses of the wrong shape, or the detection of another trace.
     """
-    names, truth = ("q", "qd", "current", *COMMANDED), trace.truth
-    values: dict[str, Anything] = stamp(trace.t) | {"time": trace.t}
-    values |= {name: getattr(trace, name) for name in names}
+    truth = trace.truth
+    values: dict[str, Anything] = {**stamp(trace.t), "time": trace.t, **trace.signals}
     if truth is not None:
         values |= {name: getattr(truth, name) for name in TRUTH}
         shape = (len(trace.t), len(truth.obstacle_names), 4, 4)
@@ -308,7 +305,7 @@ def collect(contents: Contents, known: Mapping[str, Layout]) -> dict[str, dict[s
         ValueError: a message whose length or strings differ from the layout of its topic.
     """
     runs: dict[str, list[dict[str, Anything]]] = {name: [] for name in known}
-    for channel, sequence, payload in contents.messages():
+    for channel, sequence, _, payload in contents.messages():
         name = contents.channels[channel].topic
         if name not in known:
             continue

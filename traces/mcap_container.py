@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mcap import records
@@ -45,6 +45,15 @@ class Group:
     topics: Sequence[Topic]
 
 
+class Block(NamedTuple):
+    """Equally long messages of a channel."""
+
+    channel: int
+    sequence: NDArray[np.integer[Any]]  #: sequence numbers, shape (rows,)
+    nanoseconds: NDArray[np.uint64]  #: log times, shape (rows,)
+    payload: Bytes  #: shape (rows, size)
+
+
 class Contents:
     """The records of an MCAP file in memory; chunks are decompressed one at a time.
 
@@ -60,19 +69,20 @@ class Contents:
         self.attachments: dict[str, bytes] = {}
         self.channels: dict[int, records.Channel] = {}
         self.schemas: dict[int, records.Schema] = {}
-        self.profile = ""
+        self.counts: dict[int, int] = {}  #: messages of each channel, as the summary says
         self._chunks: list[tuple[int, memoryview]] = []
-        self._data, self._size = data, len(data)
-        self._end = len(data), records.DataEnd(0)
+        self._single = b""  # messages outside of chunks
+        self._data = data
+        self._end = len(data), 0  # of the data section, and its checksum
         for offset, opcode, body in walk(data):
-            if opcode == Opcode.DATA_END:
-                self._end = offset, records.DataEnd.read(ReadDataStream(io.BytesIO(body)))
-            elif opcode == Opcode.CHUNK:
+            if opcode == Opcode.CHUNK:
                 self._chunks.append((offset, body))
+            elif opcode == Opcode.MESSAGE:
+                self._single += data[offset : offset + 9 + len(body)]
             elif opcode in READERS:
-                self._keep(READERS[opcode].read(ReadDataStream(io.BytesIO(body))))
+                self._keep(READERS[opcode].read(ReadDataStream(io.BytesIO(body))), offset)
 
-    def _keep(self, record: object) -> None:
+    def _keep(self, record: object, offset: int) -> None:
         if isinstance(record, records.Metadata):
             self.metadata[record.name] = record.metadata
         elif isinstance(record, records.Attachment):
@@ -81,8 +91,10 @@ class Contents:
             self.channels[record.id] = record
         elif isinstance(record, records.Schema):
             self.schemas[record.id] = record
-        elif isinstance(record, records.Header):
-            self.profile = record.profile
+        elif isinstance(record, records.Statistics):
+            self.counts = record.channel_message_counts
+        elif isinstance(record, records.DataEnd):
+            self._end = offset, record.data_section_crc
 
     def check_sum(self) -> None:
         """Compare the data section with its checksum, if there is one.
@@ -90,13 +102,14 @@ class Contents:
         Raises:
             ValueError: metadata, names or messages were damaged or changed.
         """
-        offset, end = self._end
-        if end.data_section_crc not in (0, zlib.crc32(memoryview(self._data)[:offset])):
-            raise ValueError(f"damaged: the first {offset} bytes do not match their checksum")
+        end, wanted = self._end
+        if wanted not in (0, zlib.crc32(memoryview(self._data)[:end])):
+            raise ValueError(f"damaged: the first {end} bytes do not match their checksum")
 
-    def messages(self) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
-        """Blocks of equally long messages: channel, sequence numbers, payloads (rows, size)."""
-        check_chunks(self._chunks, self._size)
+    def messages(self) -> Iterator[Block]:
+        """Blocks of equally long messages, in the order of the file."""
+        check_chunks(self._chunks, len(self._data))
+        yield from singles(self._single)
         for offset, body in self._chunks:
             try:
                 chunk = records.Chunk.read(ReadDataStream(io.BytesIO(body)))
@@ -106,8 +119,6 @@ class Contents:
             except Exception as error:
                 raise ValueError(f"damaged chunk at byte {offset}: {error}") from error
 
-
-CHUNK = int(Opcode.CHUNK)
 
 MOST_CHUNK = 1 << 27  #: largest unpacked size of a chunk [bytes]
 #: A file is refused if its unpacked size exceeds both MOST_UNPACKED [bytes] and MOST_RATIO times
@@ -154,11 +165,12 @@ def unpacked_size(chunk: records.Chunk) -> int:
 
 
 READERS: dict[int, Any] = {
-    Opcode.HEADER: records.Header,
     Opcode.METADATA: records.Metadata,
     Opcode.ATTACHMENT: records.Attachment,
     Opcode.CHANNEL: records.Channel,
     Opcode.SCHEMA: records.Schema,
+    Opcode.STATISTICS: records.Statistics,
+    Opcode.DATA_END: records.DataEnd,
 }
 
 
@@ -182,7 +194,7 @@ def walk(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
     raise ValueError(f"cut off: {len(data)} bytes end inside the record at byte {at}")
 
 
-def rows_of(data: bytes) -> list[tuple[int, NDArray[np.uint32], Bytes]]:
+def rows_of(data: bytes) -> list[Block]:
     """The messages of a chunk in which one sequence of records repeats; empty for other chunks."""
     row: list[tuple[int, int, int]] = []  # start, channel, record length
     at = 0
@@ -199,22 +211,23 @@ def rows_of(data: bytes) -> list[tuple[int, NDArray[np.uint32], Bytes]]:
         if (table[:, start : start + 11] != table[0, start : start + 11]).any():
             return []
     return [
-        (
+        Block(
             channel,
             np.ascontiguousarray(table[:, start + 11 : start + 15]).view("<u4")[:, 0],
+            np.ascontiguousarray(table[:, start + 15 : start + 23]).view("<u8")[:, 0],
             table[:, start + PREFIX.itemsize : start + length],
         )
         for start, channel, length in row
     ]
 
 
-def singles(data: bytes) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
+def singles(data: bytes) -> Iterator[Block]:
     """The messages of any chunk, one at a time."""
     at = 0
     while at < len(data):
         opcode, length = struct.unpack_from("<BQ", data, at)
         if opcode == Opcode.MESSAGE:
-            channel, sequence = struct.unpack_from("<HI", data, at + 9)
+            channel, sequence, time = struct.unpack_from("<HIQ", data, at + 9)
             payload = np.frombuffer(data[at + PREFIX.itemsize : at + 9 + length], np.uint8)
-            yield channel, np.array([sequence], np.uint32), payload[None]
+            yield Block(channel, np.array([sequence]), np.array([time], np.uint64), payload[None])
         at += 9 + length

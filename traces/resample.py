@@ -39,14 +39,9 @@ def resampled(trace: Trace, hz: float) -> Trace:
     return replace(
         trace,
         t=t,
-        q=at(trace.q),
-        qd=at(trace.qd),
-        current=at(trace.current),
-        q_des=None if trace.q_des is None else at(trace.q_des),
-        qd_des=None if trace.qd_des is None else at(trace.qd_des),
-        qdd_des=None if trace.qdd_des is None else at(trace.qdd_des),
         truth=None if trace.truth is None else _truth(trace.truth, trace.t, t),
         contacts=(),
+        **{name: at(values) for name, values in trace.signals.items()},  # type: ignore[arg-type]
     )
 
 
@@ -68,12 +63,7 @@ def averaged(trace: Trace, hz: float) -> Trace:
             "trace: it has truth, expected none; averaged signals would lag behind the labels"
         )
     thin = resampled(trace, hz)
-    names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
-    means = {
-        name: _averaged(values, trace.t, thin.t)
-        for name in names
-        if (values := getattr(trace, name)) is not None
-    }
+    means = {name: _averaged(x, trace.t, thin.t) for name, x in trace.signals.items()}
     return replace(thin, **means)  # type: ignore[arg-type]
 
 

@@ -12,6 +12,8 @@ from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
+#: Fields of a trace with commands, which may be missing.
+COMMANDED = ("q_des", "qd_des", "qdd_des")
 #: Joints of every UR arm by the names of UR's own ROS driver.
 UR_JOINTS = (
     "shoulder_pan_joint",
@@ -99,12 +101,7 @@ class Trace:
                 the message names the field and the first bad row.
         """
         rows, joints = len(self.t), len(self.joint_names)
-        signals = {"q": self.q, "qd": self.qd, "current": self.current}
-        signals |= {
-            name: value
-            for name in ("q_des", "qd_des", "qdd_des")
-            if (value := getattr(self, name)) is not None
-        }
+        signals = self.signals
         if self.truth is not None:
             signals["truth.tau_ext"] = self.truth.tau_ext
         for name, value in signals.items():
@@ -131,6 +128,12 @@ class Trace:
             f"Trace({f'{arm}, ' if arm else ''}{len(self.joint_names)} joints, {len(self.t)} "
             f"samples{step}, {long:.2f} s, {known})"
         )
+
+    @property
+    def signals(self) -> dict[str, Array]:
+        """The signals that the trace has, by the name of their field, shape (T, n) each."""
+        every = {name: getattr(self, name) for name in ("q", "qd", "current", *COMMANDED)}
+        return {name: value for name, value in every.items() if value is not None}
 
     @property
     def dt(self) -> float:

@@ -37,6 +37,8 @@ ALIKE, APART, REPEATED = 2.0, 1.5, 1.0
 SHORTEST = 1.0
 #: Least number of windows of each kind for an area under a curve, and number of folds.
 FEWEST, FOLDS = 40, 5
+#: Largest number of pairs of windows that are compared at once, which take 24 bytes each.
+BLOCK = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,64 +110,62 @@ def compare(
         seed: seed of sensor noise and classifier.
         own: the logs from which the twin was identified, for ``programs_auc``.
     """
-    real: list[Array] = []
-    twin: list[Array] = []
-    times: list[Array] = []
-    moves: list[Bools] = []
-    still: list[Bools] = []
-    others: list[Trace] = []
-    motions: list[Array] = []
-    for k, trace in enumerate(traces):
-        other = replace(trace, current=played(arm, drive, trace, seed + k))
-        begin = _begin(trace)
-        motions.append(_motion(trace))
-        real.append(residual_of(arm, trace)[begin:])
-        twin.append(residual_of(arm, other)[begin:])
-        times.append(trace.t[begin:])
-        others.append(other)
-        fast = np.asarray(np.abs(trace.qd[begin:]) > SLOW)
-        moves.append(fast)
-        still.append(np.asarray(~fast.any(axis=1)))
+    others = [
+        replace(trace, current=played(arm, drive, trace, seed + k))
+        for k, trace in enumerate(traces)
+    ]
+    real, twin = ([track(arm, trace) for trace in logs] for logs in (traces, others))
+    moving = [one.fast for one in real]
+    standing = [np.broadcast_to(one.still[:, None], one.fast.shape) for one in real]
     dt = float(np.median(np.concatenate([np.diff(trace.t) for trace in traces])))
-    stand = [np.repeat(s[:, None], arm.robot.joints, axis=1) for s in still]
-    real_, twin_ = np.concatenate(real), np.concatenate(twin)
-    moving, standing = np.concatenate(moves), np.concatenate(stand)
-    seconds = np.concatenate([np.gradient(t) for t in times])
     lag = max(1, round(0.1 / dt))
-    both = np.array([np.concatenate(real), np.concatenate(twin)])
-    stirred = [~s for s in still]
+    both = np.array([np.concatenate([one.residual for one in logs]) for logs in (real, twin)])
     return Likeness(
-        _rms(twin_, moving, seconds) / _rms(real_, moving, seconds),
-        _peaks(twin, moves, times) / _peaks(real, moves, times),
-        _rms(twin_, standing, seconds) / _rms(real_, standing, seconds),
-        _peaks(twin, stand, times) / _peaks(real, stand, times),
+        _rms(twin, moving) / _rms(real, moving),
+        _peaks(twin, moving) / _peaks(real, moving),
+        _rms(twin, standing) / _rms(real, standing),
+        _peaks(twin, standing) / _peaks(real, standing),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        told_apart(real, twin, stirred, times, motions, seed),
-        told_apart(real, twin, still, times, motions, seed),
-        _programs_auc(arm, own, real, stirred, times, motions, seed),
-        tuple(real),
-        tuple(twin),
-        tuple(times),
+        told_apart(real, twin, False, seed),
+        told_apart(real, twin, True, seed),
+        _programs_auc([track(arm, trace) for trace in own], real, seed),
+        tuple(one.residual for one in real),
+        tuple(one.residual for one in twin),
+        tuple(one.t for one in real),
         tuple(others),
     )
 
 
-def _begin(trace: Trace) -> int:
-    """The first row after :data:`BEGIN`."""
-    return int(BEGIN / float(np.median(np.diff(trace.t))))
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Motion and residuals along a log after :data:`BEGIN`."""
+
+    t: Array  #: [s], shape (T,)
+    motion: Array  #: positions and velocities in units of PLACE and SPEED, shape (T, 2 n)
+    residual: Array  #: [N m], shape (T, n)
+    fast: Bools  #: whether each joint moves, shape (T, n)
+
+    @property
+    def still(self) -> Bools:
+        """Whether no joint moves, shape (T,)."""
+        return np.asarray(~self.fast.any(axis=1))
 
 
-def _motion(trace: Trace) -> Array:
-    """Positions and velocities after :data:`BEGIN` in the units of likeness, shape (T, 2 n)."""
-    return np.hstack([trace.q / PLACE, trace.qd / SPEED])[_begin(trace) :]
+def track(arm: ArmModel, trace: Trace) -> Track:
+    """The residuals of an arm model along a log."""
+    rows = slice(int(BEGIN / float(np.median(np.diff(trace.t)))), None)
+    motion = np.hstack([trace.q / PLACE, trace.qd / SPEED])
+    fast = np.asarray(np.abs(trace.qd[rows]) > SLOW)
+    return Track(trace.t[rows], motion[rows], residual_of(arm, trace)[rows], fast)
 
 
-def _rms(values: Array, rows: Bools, seconds: Array) -> Array:
+def _rms(logs: Sequence[Track], rows: Sequence[Bools]) -> Array:
     """Root mean square over each joint's rows, shape (n,); NaN if shorter than SHORTEST."""
-    weight = rows * seconds[:, None]
+    seconds = np.concatenate([np.gradient(one.t) for one in logs])
+    weight = np.concatenate(rows) * seconds[:, None]
     total = weight.sum(axis=0)
-    square = (weight * values**2).sum(axis=0)
+    square = (weight * np.concatenate([one.residual for one in logs]) ** 2).sum(axis=0)
     out: Array = np.where(total >= SHORTEST, np.sqrt(square / np.maximum(total, 1e-9)), np.nan)
     return out
 
@@ -176,29 +176,30 @@ def _spans(t: Array, length: float) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(ends) if b - a >= 4]
 
 
-def _peaks(values: Sequence[Array], rows: Sequence[Bools], times: Sequence[Array]) -> Array:
+def _peaks(logs: Sequence[Track], rows: Sequence[Bools]) -> Array:
     """The 99 % quantile of the largest |residual| in spans, shape (n,)."""
-    peaks: list[list[float]] = [[] for _ in range(values[0].shape[1])]
-    for value, wanted, t in zip(values, rows, times, strict=True):
-        for span in _spans(t, SPAN):
-            largest = np.abs(value[span]).max(axis=0)
+    peaks: list[list[float]] = [[] for _ in range(rows[0].shape[1])]
+    for one, wanted in zip(logs, rows, strict=True):
+        for span in _spans(one.t, SPAN):
+            largest = np.abs(one.residual[span]).max(axis=0)
             for j in np.flatnonzero(wanted[span].all(axis=0)):
                 peaks[j].append(float(largest[j]))
     return np.array([np.quantile(p, 0.99) if len(p) >= 10 else np.nan for p in peaks])
 
 
-def _windows(rows: Sequence[Bools], times: Sequence[Array]) -> list[tuple[int, slice]]:
-    """Log and samples of each window of wanted rows."""
+def _windows(logs: Sequence[Track], still: bool) -> list[tuple[int, slice]]:
+    """Log and samples of each window in which the arm stands throughout, or moves throughout."""
     found = []
-    for log, (wanted, t) in enumerate(zip(rows, times, strict=True)):
-        found += [(log, span) for span in _spans(t, WINDOW) if wanted[span].all()]
+    for log, one in enumerate(logs):
+        wanted = one.still == still
+        found += [(log, span) for span in _spans(one.t, WINDOW) if wanted[span].all()]
     return found
 
 
-def _features(values: Sequence[Array], windows: Sequence[tuple[int, slice]]) -> Array:
+def _features(logs: Sequence[Track], windows: Sequence[tuple[int, slice]]) -> Array:
     table = []
     for log, span in windows:
-        part = values[log][span]
+        part = logs[log].residual[span]
         steps = np.diff(part, axis=0)
         table.append(
             np.concatenate([
@@ -209,12 +210,10 @@ def _features(values: Sequence[Array], windows: Sequence[tuple[int, slice]]) -> 
     return np.array(table)
 
 
-def _groups_of(
-    windows: Sequence[tuple[int, slice]], times: Sequence[Array], motions: Sequence[Array]
-) -> NDArray[np.int64]:
+def _groups_of(logs: Sequence[Track], windows: Sequence[tuple[int, slice]]) -> NDArray[np.int64]:
     """The group of each window, see :func:`_groups`."""
-    place = [motions[log][span].mean(axis=0) for log, span in windows]
-    starts = [times[log][span.start] - times[log][0] for log, span in windows]
+    place = [logs[log].motion[span].mean(axis=0) for log, span in windows]
+    starts = [logs[log].t[span.start] - logs[log].t[0] for log, span in windows]
     return _groups(np.array(place), np.array([log for log, _ in windows]), np.array(starts))
 
 
@@ -246,7 +245,7 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
     """The nearest earlier window that each one repeats, -1 without one; and whether any does.
 
     Of equal places only the first and the last window count: if those are too near in time, so are
-    the windows between. More and more neighbours are looked up, until an earlier one is among them.
+    the windows between.
     """
     count = len(place)
     # Mean positions at rest differ in the last bits.
@@ -261,79 +260,49 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
         out: Bools = (logs[i] != logs[j]) | (np.abs(starts[i] - starts[j]) > APART)
         return out
 
-    before, repeated = np.full(count, -1), np.zeros(count, dtype=np.bool_)
-    left, near = np.arange(count), 32
-    while len(left):
-        near, more = min(near, len(places)), []
-        for rows in np.array_split(left, 1 + len(left) * near // 2_000_000):
-            far, at = tree.query(place[rows], near, distance_upper_bound=ALIKE)
-            far, at, own = far.reshape(len(rows), -1), at.reshape(len(rows), -1), rows[:, None]
-            within = np.isfinite(far)
-            at[~within] = 0
-            early, late = first[at], last[at]
-            usable = within & (early < own) & apart(early, own)
-            far[~usable] = np.inf
-            least = far.min(axis=1)
-            found = np.isfinite(least)
-            nearest = np.where(usable & (far <= least[:, None] + 1e-9), early, count).min(axis=1)
-            before[rows[found]] = nearest[found]
-            repeated[rows] |= (within & (apart(early, own) | apart(late, own))).any(axis=1)
-            more.append(rows[within[:, -1] & ~found])
-        left = np.concatenate(more) if near < len(places) else np.empty(0, dtype=np.int64)
-        near *= 4
-    return before, repeated
+    before, repeated = np.full(count, count), np.zeros(count, dtype=np.bool_)
+    for rows in np.array_split(np.arange(count), 1 + count * len(places) // BLOCK):
+        pairs = cKDTree(place[rows]).sparse_distance_matrix(tree, ALIKE, output_type="ndarray")
+        own, far = rows[pairs["i"]], pairs["v"]
+        early, late = first[pairs["j"]], last[pairs["j"]]
+        repeated[own[apart(early, own) | apart(late, own)]] = True
+        usable = (early < own) & apart(early, own)
+        own, early, far = own[usable], early[usable], far[usable]
+        least = np.full(count, np.inf)
+        np.minimum.at(least, own, far)
+        near = far <= least[own] + 1e-9
+        np.minimum.at(before, own[near], early[near])
+    return np.where(before < count, before, -1), repeated
 
 
 def told_apart(
-    real: Sequence[Array],
-    twin: Sequence[Array],
-    rows: Sequence[Bools],
-    times: Sequence[Array],
-    motions: Sequence[Array],
-    seed: int,
+    real: Sequence[Track], twin: Sequence[Track], still: bool, seed: int
 ) -> tuple[float, float]:
     """Areas under the curves of two classifiers of windows of real and simulated residuals.
 
     Args:
-        real: residuals of each log, shape (T, n).
-        twin: residuals of the twin along the same motion, shape (T, n).
-        rows: the samples that are used, shape (T,).
-        times: times of the samples [s].
-        motions: positions and velocities in units of :data:`PLACE` and :data:`SPEED`, (T, 2 n).
+        real: real logs.
+        twin: the twin along the same motion.
+        still: whether windows in which the arm stands are used, or those in which it moves.
         seed: seed of the classifiers.
 
     Returns:
         Areas of boosted trees and of logistic regression; NaN with too few windows or groups.
     """
-    windows = _windows(rows, times)
+    windows = _windows(real, still)
     table = np.concatenate([_features(real, windows), _features(twin, windows)])
-    groups = _groups_of(windows, times, motions)
-    return _area(table, np.repeat([0, 1], len(windows)), np.tile(groups, 2), seed)
+    groups = np.tile(_groups_of(real, windows), 2)
+    return _area(table, np.repeat([0, 1], len(windows)), groups, seed)
 
 
-def _programs_auc(
-    arm: ArmModel,
-    own: Sequence[Trace],
-    real: Sequence[Array],
-    rows: Sequence[Bools],
-    times: Sequence[Array],
-    motions: Sequence[Array],
-    seed: int,
-) -> tuple[float, float]:
+def _programs_auc(own: Sequence[Track], real: Sequence[Track], seed: int) -> tuple[float, float]:
     """Areas for moving windows of real residuals in the twin's own logs and in held-out logs."""
-    if not own:
-        return (float("nan"),) * 2
-    ends = [(trace, slice(_begin(trace), None)) for trace in own]
-    residuals = [residual_of(arm, trace)[end] for trace, end in ends]
-    moving = [np.asarray((np.abs(trace.qd[end]) > SLOW).any(axis=1)) for trace, end in ends]
-    at, like = [trace.t[end] for trace, end in ends], [_motion(trace) for trace in own]
-    at = [*at, *times]
-    windows = _windows([*moving, *rows], at)
+    logs = [*own, *real]
+    windows = _windows(logs, False)
     labels = np.array([float(log >= len(own)) for log, _ in windows])
     if min(np.sum(labels == 0), np.sum(labels == 1)) < FEWEST:
         return (float("nan"),) * 2
-    table = _features([*residuals, *real], windows)
-    return _area(table, labels, _groups_of(windows, at, [*like, *motions]), seed)
+    return _area(_features(logs, windows), labels, _groups_of(logs, windows), seed)
 
 
 def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> tuple[float, float]:

@@ -107,7 +107,7 @@ def nominal(arm: ArmData) -> ArmModel:
     """The arm model without a calibration: the robot file and the drives' nominal gains."""
     robot = RobotNumbers.from_pin(pin_model(arm.file))
     drive = DRIVES.get(arm.name)
-    return ArmModel(robot, np.array(drive.gain) if drive else np.ones(robot.joints))
+    return ArmModel(robot, np.array(drive) if drive else np.ones(robot.joints))
 
 
 def recordings(arm: ArmData) -> dict[str, Recording]:

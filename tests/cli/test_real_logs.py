@@ -9,7 +9,7 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.datasets import arm_logs, columns, real_arms
-from tauguard.datasets.drives import DRIVES, preset_drive
+from tauguard.datasets.drives import DRIVES, preset_gains
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.recording import Load, cut
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
@@ -299,13 +299,13 @@ def test_maps_that_are_no_maps(tmp_path, fields, message):
 def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
     plain = record(0, 1.0)
     own = [dataclasses.replace(plain, meta={"columns": name}) for name in ("ur5", "ur10e")]
-    assert preset_drive(None, own[:1]) == preset_drive("ur10e", own[:1]) == ("ur5", DRIVES["ur5"])
-    assert preset_drive("ur10e", [plain]) == ("ur10e", DRIVES["ur10e"])
-    assert preset_drive("mine.json", [plain]) is preset_drive(None, [plain, plain]) is None
+    assert preset_gains(None, own[:1]) == preset_gains("ur10e", own[:1]) == DRIVES["ur5"]
+    assert preset_gains("ur10e", [plain]) == DRIVES["ur10e"]
+    assert preset_gains("mine.json", [plain]) == preset_gains(None, [plain, plain]) == ()
     with pytest.raises(ValueError, match="logs of ur10e, ur5, whose drive gains differ"):
-        preset_drive(None, own)
+        preset_gains(None, own)
     with pytest.raises(ValueError, match="logs of no preset, ur5, whose drive gains differ"):
-        preset_drive(None, [own[0], plain])
+        preset_gains(None, [own[0], plain])
 
 
 def test_where_the_scale_comes_from_is_said(folder):

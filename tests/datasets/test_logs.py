@@ -243,7 +243,7 @@ def test_a_bag_is_read_by_its_data_not_by_its_index(tmp_path):
     assert np.array_equal(found.t, whole.t)
     assert np.array_equal(found.current, whole.current)
     (tmp_path / "chunk.mcap").write_bytes(without(data, Opcode.CHUNK))
-    with pytest.raises(ValueError, match=r"chunk\.mcap: not a whole"):
+    with pytest.raises(ValueError, match=r"chunk\.mcap: .*damaged"):
         read_log(tmp_path / "chunk.mcap")
 
 

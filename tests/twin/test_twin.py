@@ -12,7 +12,7 @@ from tauguard.twin import compare, identify_twin, with_intervals
 from tauguard.twin.description import write_twin
 from tauguard.twin.drive_fit import fit_friction
 from tauguard.twin.identify import USUAL, left_over, turned
-from tauguard.twin.judge import told_apart
+from tauguard.twin.judge import Track, told_apart
 from tauguard.twin.play import friction_torque, modelled
 from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 from tests.detectors.synthetic_arm import (
@@ -219,20 +219,18 @@ def cycle(seed, places, shake=0.3, cycles=10):
     offset = np.random.default_rng(places).normal(size=(30, 2))
     phase = 2 * np.pi * t / 6.0
     motion = 10 * np.column_stack([np.cos(phase), np.sin(phase)])
-    return [offset[place] + shake * rng.normal(size=(len(t), 2))], [t], [motion]
+    residual = offset[place] + shake * rng.normal(size=(len(t), 2))
+    return Track(t, motion, residual, np.ones((len(t), 2), dtype=bool))
 
 
 def test_a_cycle_that_repeats_does_not_tell_two_draws_of_one_process_apart():
-    a, t, motion = cycle(1, places=10)
-    b, *_ = cycle(2, places=11)
-    every, elsewhere = [np.ones(len(t[0]), dtype=bool)], [1000 * t[0][:, None]]
+    a, b = cycle(1, places=10), cycle(2, places=11)
+    elsewhere = replace(a, motion=1000 * a.t[:, None])
     # Were no place met twice, the classifier would be tested on what it learned there.
-    assert told_apart(a, b, every, t, elsewhere, 0)[0] > 0.9
-    assert abs(told_apart(a, b, every, t, motion, 0)[0] - 0.5) < 0.15
+    assert told_apart([elsewhere], [b], False, 0)[0] > 0.9
+    assert abs(told_apart([a], [b], False, 0)[0] - 0.5) < 0.15
 
 
 def test_a_difference_at_all_places_of_a_cycle_is_found():
-    a, t, motion = cycle(1, places=10)
-    b, *_ = cycle(2, places=11, shake=0.45)
-    every = [np.ones(len(t[0]), dtype=bool)]
-    assert told_apart(a, b, every, t, motion, 0)[0] > 0.95
+    a, b = cycle(1, places=10), cycle(2, places=11, shake=0.45)
+    assert told_apart([a], [b], False, 0)[0] > 0.95

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from tauguard.replay.events import EventFolder
     from tauguard.traces import Trace
 
+    #: Name of a split or folder, its matched recordings, and their metrics.
+    Part = tuple[str, list[Matching], dict[str, Any]]
+
 
 def command(
     traces: Path | None = None,
@@ -45,39 +48,28 @@ def command(
             file of its recording; with --data by SPLIT/NUMBER, as for `tauguard inspect --episode`.
         late: with --events, a detection with a longer delay is late [s].
     """
-    if alarms is not None:
-        if data is None or detector is not None or events is not None:
-            raise ValueError("--alarms goes with --data, and not with --detector or --events")
-        _evaluate_alarms(data, alarms, splits, json, figure)
-        return
-    from tauguard.datasets.reader import episodes_of_splits
-    from tauguard.datasets.recordings import labelled
-    from tauguard.detectors import load_model
     from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
-    from tauguard.detectors.registry import make_detector
     from tauguard.replay.events import EventFolder, command_to_open
     from tauguard.report import measured, write_json
 
-    if (traces is None) == (data is None):
-        raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
-    if detector is not None:
-        make_detector(detector)  # allows the file to hold its classes
-    alarm = load_model(model)
-    parts = (
-        episodes_of_splits(data, alarm.detector.arm.robot, splits)
-        if data is not None
-        else iter([(str(traces), iter(labelled(Path(str(traces)))))])
-    )
-    rows: list[dict[str, Any]] = []
     wrong = None
-    if events is not None:
-        wrong = EventFolder(events, late, alarm)
-    for name, recordings in parts:
-        matchings, summary = evaluated(alarm, recordings, wrong)
+    if alarms is not None:
+        if data is None or detector is not None or events is not None:
+            raise ValueError("--alarms goes with --data, and not with --detector or --events")
+        parts = of_file(data, alarms, splits)
+    else:
+        if (traces is None) == (data is None):
+            raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
+        alarm = loaded(model, detector)
+        wrong = None if events is None else EventFolder(events, late, alarm)
+        parts = of_model(alarm, traces, data, splits, wrong)
+    rows: list[dict[str, Any]] = []
+    for name, matchings, summary in parts:
         rows.append({"split": name, **summary} if data is not None else summary)
         print(f"{len(matchings)} recordings in {name}")
         print(text(summary))
-        print(diagnosis_text(summary["diagnosis"]))
+        if "diagnosis" in summary:
+            print(diagnosis_text(summary["diagnosis"]))
         if figure is not None:
             drawn = figure if data is None else figure.with_stem(f"{figure.stem}-{name}")
             draw(drawn, summary, matchings)
@@ -88,25 +80,42 @@ def command(
         write_json(json, measured("evaluate", rows))
 
 
-def _evaluate_alarms(
-    data: Path, alarms: Path, splits: tuple[str, ...], json: Path | None, figure: Path | None
-) -> None:
-    """Judge a file of alarms on a dataset, split by split."""
+def loaded(model: Path, detector: str | None) -> CollisionAlarm:
+    """The model in a file; ``detector`` names the user's class that the file may hold."""
+    from tauguard.detectors import load_model
+    from tauguard.detectors.registry import make_detector
+
+    if detector is not None:
+        make_detector(detector)
+    return load_model(model)
+
+
+def of_file(data: Path, alarms: Path, splits: tuple[str, ...]) -> Iterator[Part]:
+    """A file of alarms, matched with the collisions of a dataset split by split."""
     from tauguard.datasets.alarm_files import judged_alarms
     from tauguard.detectors import detection_metrics
-    from tauguard.detectors.evaluation.metrics_page import draw, text
-    from tauguard.report import measured, write_json
 
-    rows: list[dict[str, Any]] = []
     for name, matchings in judged_alarms(data, alarms, splits):
-        summary = detection_metrics(matchings)
-        rows.append({"split": name, **summary})
-        print(f"{len(matchings)} recordings in {name}")
-        print(text(summary))
-        if figure is not None:
-            draw(figure.with_stem(f"{figure.stem}-{name}"), summary, matchings)
-    if json is not None:
-        write_json(json, measured("evaluate", rows))
+        yield name, matchings, detection_metrics(matchings)
+
+
+def of_model(
+    alarm: CollisionAlarm,
+    traces: Path | None,
+    data: Path | None,
+    splits: tuple[str, ...],
+    wrong: EventFolder | None,
+) -> Iterator[Part]:
+    """A detector on the splits of a dataset, or on a folder of recordings."""
+    from tauguard.datasets.reader import episodes_of_splits
+    from tauguard.datasets.recordings import labelled
+
+    if data is not None:
+        parts = episodes_of_splits(data, alarm.detector.arm.robot, splits)
+    else:
+        parts = iter([(str(traces), iter(labelled(Path(str(traces)))))])
+    for name, recordings in parts:
+        yield name, *evaluated(alarm, recordings, wrong)
 
 
 def evaluated(
