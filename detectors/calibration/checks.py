@@ -82,38 +82,62 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
 #: arms, an exchange of currents lowers it by 0.05 at most, one of columns by 0.83. Exchanged
 #: currents mostly give 2.9 or more, exchanged columns of a wrist's joints less than the limit.
 EXCHANGED = {"currents": (6.0, 1.0), "columns": (20.0, 1.25)}
+#: Least motion [s] for exchanged columns if the arm is calibrated: right logs then lower it by 0.11
+#: at most, exchanged columns by 2.4 or more in nearly all cases.
+EXCHANGED_KNOWN = 6.0
+#: As EXCHANGED, for one joint whose columns are negated. In right logs, negating lowers the
+#: logarithm by 0.3 (currents) and 0.94 (columns) at most. Negated currents give 0.7 to 8, negated
+#: columns of joints that carry the arm mostly 3 or more.
+NEGATED = {"currents": (6.0, 1.0), "columns": (6.0, 2.0)}
 
 #: Sample interval in the check of the order [s].
 THINNED = 0.02
 
 
 def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
-    """Refuse logs in which the columns of two joints are exchanged.
+    """Refuse logs in which the columns of two joints are exchanged, or one joint's are negated.
+
+    Raises:
+        ValueError: names the joints, see :func:`misread`.
+    """
+    if found := misread(arm, logs):
+        raise ValueError(found)
+
+
+def misread(arm: ArmModel, logs: Mapping[str, Recording]) -> str:
+    """Which joints' columns seem exchanged or negated; empty: none.
 
     Each joint's current is fitted by an offset and, with weights of at least 0, by the joint's
     rigid-body torque, the direction of motion and the speed. The unexplained variances are compared
-    with those after exchanging the currents, or all columns, of two joints. Only joints that move
-    for long enough (:data:`EXCHANGED`) are checked.
+    with those after exchanging the currents, or all columns, of two joints, and after negating
+    those of one. Only joints that move for long enough (:data:`EXCHANGED`, :data:`NEGATED`) are
+    checked.
 
     Args:
-        arm: arm of the robot file; of the gains, only the signs are used.
-        logs: by name, collision-free.
-
-    Raises:
-        ValueError: names the two joints.
+        arm: arm of the robot file, or calibrated; of the gains, only the signs are used.
+        logs: by name, mostly free of collisions.
     """
     traces = [one.trace for one in logs.values() if moves(one.trace)]
-    least, a, b, what = min(_exchanges(arm, traces), default=(0.0, 0, 0, ""))
-    if least < -1:
-        names = arm.robot.joint_names
-        raise ValueError(
-            f"the {what} of {names[a]} and {names[b]} seem exchanged: the other way round they fit "
-            "the robot file's arm better; give the columns in the order of the robot file's joints"
+    least, a, b, what = min(_misreadings(arm, traces), default=(0.0, 0, 0, ""))
+    if least > -1:
+        return ""
+    names = arm.robot.joint_names
+    if a == b:
+        return (
+            f"the {what} of {names[a]} seem to have the opposite sign: negated they fit the arm of "
+            "the robot file better; use the signs of the robot file's axes"
         )
+    return (
+        f"the {what} of {names[a]} and {names[b]} seem exchanged: the other way round they fit "
+        "the robot file's arm better; give the columns in the order of the robot file's joints"
+    )
 
 
-def _exchanges(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
-    """Exchanges of two joints: change of log unexplained variance over its limit, both, what."""
+def _misreadings(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
+    """Change of log unexplained variance over its limit, two joints (or one twice), and what.
+
+    Columns of two joints are exchanged, those of one joint negated.
+    """
     if not traces:
         return
     n, sign = arm.robot.joints, np.sign(arm.drive_gain)
@@ -130,34 +154,38 @@ def _exchanges(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, 
     speed, current = late(lambda trace: trace.qd), late(lambda trace: trace.current)
     fast = span[:, None] & (np.abs(np.concatenate([trace.qd for trace in traces])) > FAST)
 
-    def torque(order: Sequence[int]) -> Array:
+    def torque(order: Sequence[int], signs: Array) -> Array:
         found = []
         for trace, dt in zip(traces, every, strict=True):
-            q, qd = (np.ascontiguousarray(x[:, order]) for x in (trace.q, trace.qd))
+            q, qd = (np.ascontiguousarray(x[:, order] * signs) for x in (trace.q, trace.qd))
             found.append(low_pass(LOG_GAIN, dt, *momentum_terms(arm.robot, q, qd)))
-        return np.concatenate(found)
+        return np.concatenate(found) * signs
 
-    def left(torques: Array, joint: int, motion: int, column: int) -> float:
+    def left(torques: Array, joint: int, motion: int, column: int, given: float = 1.0) -> float:
         on = fast[:, motion]
         x = (torques[on, joint], direction[on, motion], speed[on, motion])
-        return _unexplained(np.column_stack(x), current[on, column] * sign[joint])
+        return _unexplained(np.column_stack(x), current[on, column] * sign[joint] * given)
 
     each = np.repeat([trace.dt for trace in traces], [len(trace.t) for trace in traces])
     same, seconds = range(n), each @ fast
-    as_given = torque(same)
+    as_given = torque(same, np.ones(n))
     own = [left(as_given, j, j, j) for j in same]
-    for a, b in itertools.combinations(same, 2):
-        least = float(min(seconds[a], seconds[b]))
-        if not (least >= EXCHANGED["currents"][0] and math.isfinite(own[a] + own[b])):
+    for a, b in itertools.combinations_with_replacement(same, 2):
+        least, limits = float(min(seconds[a], seconds[b])), NEGATED if a == b else EXCHANGED
+        if not (least >= limits["currents"][0] and math.isfinite(own[a] + own[b])):
             continue
-        change = left(as_given, a, a, b) + left(as_given, b, b, a) - own[a] - own[b]
-        yield change / EXCHANGED["currents"][1], a, b, "currents"
-        if least < EXCHANGED["columns"][0]:
+        change = (
+            left(as_given, a, a, a, -1.0) - own[a]
+            if a == b
+            else left(as_given, a, a, b) + left(as_given, b, b, a) - own[a] - own[b]
+        )
+        yield change / limits["currents"][1], a, b, "currents"
+        if least < (EXCHANGED_KNOWN if arm.friction is not None else limits["columns"][0]):
             continue
         order = [b if j == a else a if j == b else j for j in same]
-        exchanged = torque(order)
-        changes = [left(exchanged, j, order[j], order[j]) - own[order[j]] for j in same]
-        yield float(np.nansum(changes)) / EXCHANGED["columns"][1], a, b, "columns"
+        other = torque(order, np.where((a == b) & (np.arange(n) == a), -1.0, 1.0))
+        changes = [left(other, j, order[j], order[j]) - own[order[j]] for j in same]
+        yield float(np.nansum(changes)) / limits["columns"][1], a, b, "columns"
 
 
 def _unexplained(x: Array, current: Array) -> float:

@@ -46,7 +46,7 @@ def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike)
     """All columns of two wrist joints may be exchanged: these look alike, and are not named."""
     from tauguard.datasets.arm_logs import moving, read_logs
     from tauguard.datasets.real_arms import initial_arm
-    from tauguard.detectors.calibration.checks import _exchanges, check_order
+    from tauguard.detectors.calibration.checks import _misreadings, check_order
     from tauguard.detectors.calibration.recording import Recording
 
     read = read_logs((data_dir / name / "free",), columns, data_dir / name / f"{name}.urdf")
@@ -66,7 +66,7 @@ def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike)
             }
             if (a, b) in alike and "q" in fields:
                 traces_of = [one.trace for one in mixed.values()]
-                changes = {tuple(key): change for change, *key in _exchanges(arm, traces_of)}
+                changes = {tuple(key): change for change, *key in _misreadings(arm, traces_of)}
                 assert changes[a, b, "columns"] > -1, changes
                 check_order(arm, mixed)
                 continue

@@ -53,7 +53,7 @@ def command(
     The output then states which contacts were detected, the delays, and the false alarms.
 
     A log is refused if its motion does not explain its torques, for example because currents have a
-    wrong unit or sign. Exchanged joints are noticed only if they carry gravity loads.
+    wrong unit or sign. A note names joints whose columns seem exchanged or negated.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
@@ -93,7 +93,7 @@ def command(
     print_notes(read.notes)
     trace = read.trace
     if model is not None:
-        trace, alarm = trained(model, trace, payload, robot)
+        trace, alarm = trained(model, log.name, trace, payload, robot)
     else:
         seconds = QUIET if quiet is None else quiet
         refuse_touched(log, read, seconds)
@@ -125,13 +125,19 @@ def refuse_touched(log: Path, read: Log, quiet: float) -> None:
 
 
 def trained(
-    model: Path, trace: Trace, payload: str | None, robot: Path
+    model: Path, log: str, trace: Trace, payload: str | None, robot: Path
 ) -> tuple[Trace, CollisionAlarm]:
-    """The log in the joint order of a trained detector, and the detector."""
+    """The log in the joint order of a trained detector, and the detector.
+
+    A note names joints whose columns do not fit the detector's arm.
+    """
+    from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import matched, parse_load
     from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.training import carrying
+    from tauguard.detectors.calibration.checks import check_order, check_signs
+    from tauguard.detectors.calibration.recording import Recording
 
     alarm = load_model(model)
     if payload is not None:
@@ -141,6 +147,12 @@ def trained(
     trace = matched(trace, arm.robot.joint_names)
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")
+    for check in (check_signs, check_order):
+        try:
+            check(arm, {log: Recording(trace)})
+        except ValueError as error:
+            print_notes([str(error)])
+            break
     return trace, alarm
 
 

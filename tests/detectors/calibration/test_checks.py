@@ -62,6 +62,22 @@ def test_exchanged_joints_are_named(pair):
         )
 
 
+@pytest.mark.parametrize("joint", range(3))
+def test_negated_columns_of_a_joint_are_named(joint):
+    arm, trace = ArmModel(nominal(), GAIN), record(3)
+    sign = np.where(np.arange(3) == joint, -1.0, 1.0)
+    for what, fields in (("currents", ("current",)), ("columns", ("q", "qd", "current"))):
+        negated = replace(trace, **{key: getattr(trace, key) * sign for key in fields})
+        own = {"log": Recording(negated)}
+        if joint == 0 and what == "columns":  # gravity does not act on it: mirrored, it looks alike
+            check_order(arm, own)
+            continue
+        with pytest.raises(ValueError, match=f"the {what} of {'abc'[joint]} seem to have the opp"):
+            check_order(arm, own)
+        if what == "currents":  # a gain of that sign makes up for it
+            check_order(replace(arm, drive_gain=GAIN * sign), own)
+
+
 def test_joints_that_hardly_move_say_nothing():
     trace = record(3, seconds=8.0)
     still = replace(trace, qd=trace.qd * [1.0, 0.0, 1.0])
