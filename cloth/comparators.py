@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth import _mesh
-from tauguard.cloth.groups import Groups
 from tauguard.cloth.mesh import MeshCCD
-from tauguard.cloth.topology import Isolated
+from tauguard.cloth.topology import Groups, Isolated
 
 #: Narrow phases of earlier work by name, with their numbers in the native module.
 COMPARATORS = {"naive": 2, "iccd": 3, "dnf": 4, "scd": 5, "vcd": 6}

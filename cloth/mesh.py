@@ -21,9 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
-from tauguard.cloth.groups import Groups
 from tauguard.cloth.impacts import METHODS, Impacts, checked_distance, method_number
-from tauguard.cloth.topology import Isolated, Topology
+from tauguard.cloth.topology import Groups, Isolated, Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether the volume is moving (two intervals per axis, one at

@@ -21,17 +21,21 @@ if TYPE_CHECKING:
     from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
     from tauguard.detectors.evaluation.diagnosis_metrics import diagnosis_metrics, match_diagnoses
-    from tauguard.detectors.evaluation.matching import Matching, match, match_detection, matchings
-    from tauguard.detectors.evaluation.metrics import detection_metrics
+    from tauguard.detectors.evaluation.matching import (
+        Matching,
+        detection_metrics,
+        match,
+        match_detection,
+        matchings,
+    )
     from tauguard.detectors.events import confirmed, find_alarms
     from tauguard.detectors.model_file import load_model, save_model
     from tauguard.detectors.registry import DETECTORS, make_detector
     from tauguard.detectors.scores.detector import Detector, FittedDetector, ScoreStream
     from tauguard.detectors.scores.kernel import SrqRegressor, srq_kernel
     from tauguard.detectors.scores.windowed import PlainSrqSvr, SrqSvr
-    from tauguard.detectors.thresholds.free_scores import FreeScores
+    from tauguard.detectors.thresholds.free_scores import FreeScores, SpeedNormalisation
     from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
-    from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
     from tauguard.report import poisson_rate
     from tauguard.report import rate as wilson
 

@@ -7,6 +7,8 @@ classes check the ranges of their numbers.
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import importlib.metadata
 import io
 import json
@@ -23,8 +25,49 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.codec import checksum, decode, encode
 from tauguard.detectors.registry import file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
-from tauguard.detectors.signature import check_signature, key_of_user, signed
 from tauguard.untrusted_input import check_no_device, reading
+
+#: Environment variable with the path of the key file, whose bytes are the key. A signature detects
+#: manipulation; a checksum does not.
+KEY_FILE = "TAUGUARD_MODEL_KEY"
+#: Least length of a key [bytes].
+SHORTEST = 16
+
+
+def key_of_user() -> bytes | None:
+    """The key in the file that the environment variable ``TAUGUARD_MODEL_KEY`` names.
+
+    Raises:
+        ValueError: the file cannot be read, or is shorter than 16 bytes.
+    """
+    path = os.environ.get(KEY_FILE)
+    if not path:
+        return None
+    try:
+        key = Path(path).read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: the key cannot be read ({error.strerror})") from None
+    if len(key) < SHORTEST:
+        raise ValueError(f"{path}: a key of {len(key)} bytes, expected {SHORTEST} or more")
+    return key
+
+
+def signed(checksum: str, key: bytes) -> str:
+    """HMAC-SHA256 of a content's checksum."""
+    return hmac.new(key, checksum.encode(), hashlib.sha256).hexdigest()
+
+
+def check_signature(checksum: str, signature: object, key: bytes) -> None:
+    """Refuse a content that was not signed with this key.
+
+    Raises:
+        ValueError: no signature, or one with another key.
+    """
+    if not isinstance(signature, str):
+        raise ValueError("not signed, and a key is set: sign it by writing it with the key")
+    if not hmac.compare_digest(signed(checksum, key), signature):
+        raise ValueError("signed with another key, or changed since")
+
 
 #: The version also changes if a detector computes other scores from the same content, because a
 #: threshold then has another meaning. Changes by version:
@@ -84,7 +127,7 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     """Write ``value``, encoded by :func:`tauguard.detectors.codec.encode`.
 
     After an error, ``path`` is unchanged. The file is signed if the user has a key (see
-    :mod:`tauguard.detectors.signature`).
+    :mod:`tauguard.detectors.model_file`).
 
     Raises:
         ValueError: the value cannot be encoded, or the folder cannot be written.

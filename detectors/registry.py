@@ -53,7 +53,7 @@ FILE_TYPES: dict[str, str] = {
         "scores.kernel": "KernelMachine",
         "scores.network": "Network",
         "scores.windowed": "FittedWindowed",
-        "thresholds.speed_normalisation": "SpeedNormalisation",
+        "thresholds.free_scores": "SpeedNormalisation",
     }.items()
     for name in names.split()
 }

@@ -1,4 +1,9 @@
-"""Check arguments and convert them to the arrays that native kernels take."""
+"""Check arguments and convert them to the (immutable) arrays that native kernels take."""
+
+import operator
+import os
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,3 +71,64 @@ def indices(
             f"{name}: index {array[tuple(bad)]} in row {bad[0]}, expected 0 to {upper - 1}"
         )
     return np.ascontiguousarray(array, dtype=np.int32)
+
+
+_T = TypeVar("_T", bound=np.generic)
+
+
+def frozen(array: NDArray[_T]) -> NDArray[_T]:
+    """A C-contiguous copy in immutable memory; ``setflags`` cannot make it writeable."""
+    if array.size == 0:
+        return sealed(np.empty(array.shape, dtype=array.dtype))
+    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape)
+
+
+def sealed(array: NDArray[_T]) -> NDArray[_T]:
+    """A read-only view without a copy. The caller must have the only reference to ``array``."""
+    array.setflags(write=False)
+    return array[:]
+
+
+def frozen_finite(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """As :func:`finite`, but an immutable copy."""
+    return all_finite(name, frozen(numbers(name, value, shape)))
+
+
+def frozen_indices(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...], upper: int
+) -> NDArray[np.int32]:
+    """As :func:`indices`, but an immutable copy."""
+    return indices(name, frozen(indices(name, value, shape, upper)), shape, upper)
+
+
+class Rebuilt:
+    """Mixin for frozen dataclasses: ``copy`` and ``pickle`` call the constructor and its checks."""
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        """The class and the arguments of its constructor."""
+        given = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        return type(self), given
+
+
+#: A larger number of threads is probably a mistake and is refused.
+MOST_THREADS = 1024
+
+
+def thread_count(threads: int) -> int:
+    """The number of threads; 0 means all processors.
+
+    Raises:
+        ValueError: ``threads`` is not an integer from 0 to 1024.
+    """
+    try:
+        count = operator.index(threads)
+    except TypeError:
+        count = -1
+    if isinstance(threads, bool) or not 0 <= count <= MOST_THREADS:
+        raise ValueError(
+            f"threads: {threads!r:.40}, expected an integer from 0 (all processors) "
+            f"to {MOST_THREADS}"
+        )
+    return count or os.cpu_count() or 1

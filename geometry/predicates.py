@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import _geometry
-from tauguard.geometry.arrays import finite
-from tauguard.geometry.threads import thread_count
+from tauguard.geometry.arrays import finite, thread_count
 
 
 def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:

@@ -12,6 +12,7 @@ from tauguard.arrays import Array, in_a_line
 from tauguard.models import cura6, derive
 from tauguard.models.arm_drive import (
     PRESLIDING,
+    calibrated,
     level_friction,
     like_cura6,
     stated_drive,
@@ -25,7 +26,6 @@ from tauguard.models.arm_file import (
     ArmFile,
     read_arm,
 )
-from tauguard.models.calibrated import calibrated
 from tauguard.models.drive import Drive, cura6_drive
 from tauguard.models.known_robots import ROBOTS, find_file, known_names
 from tauguard.models.robot import Robot, per_joint

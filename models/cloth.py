@@ -82,9 +82,8 @@ def add_sheet(
     mass: float,
     radius: float,
     young: float,
-    name: str = "garment",
 ) -> None:
-    """Add an elastic sheet of any shape, free of pins, as the flex ``name_sheet``.
+    """Add an elastic sheet of any shape, free of pins, as the flex ``garment_sheet``.
 
     Args:
         spec: a spec with the integrator ``discrete``.
@@ -93,7 +92,6 @@ def add_sheet(
         mass: [kg].
         radius: half the thickness in contacts [m].
         young: Young's modulus [Pa]; Poisson's ratio is 0.3.
-        name: prefix of the sheet's names.
     """
     text = f"""<mujoco><worldbody><body name="frame">
       <flexcomp name="sheet" type="direct" dim="2" mass="{mass!r}" radius="{radius!r}"
@@ -102,7 +100,7 @@ def add_sheet(
         <contact contype="2" conaffinity="1" condim="3" selfcollide="none" solref="0.003 1"/>
       </flexcomp></body></worldbody></mujoco>"""
     part = mujoco.MjSpec.from_string(text)
-    spec.attach(part, frame=spec.worldbody.add_frame(), prefix=f"{name}_")
+    spec.attach(part, frame=spec.worldbody.add_frame(), prefix="garment_")
 
 
 def flex_elements(model: Any, flex: int) -> NDArray[np.int32]:

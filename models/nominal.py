@@ -13,10 +13,8 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
-from tauguard.models.checks import rigid_pose
 from tauguard.models.robot_check import checked_robot, checked_text
 from tauguard.models.urdf import is_urdf, xml_root
 from tauguard.untrusted_input import read_text
@@ -89,21 +87,14 @@ def _check_depth(root: ElementTree.Element) -> None:
             raise ValueError(f"elements nested more than {MOST_DEPTH} deep")
 
 
-def pin_model(
-    source: str | Path | mujoco.MjSpec | mujoco.MjModel,
-    base_pose: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-) -> pin.Model:
+def pin_model(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> pin.Model:
     """The Pinocchio model of an arm: hinge and slide joints, armature included, sites as frames.
 
     Args:
         source: MJCF or URDF (text or file), a spec or a compiled model, of the arm only.
-        base_pose: pose of the file's world frame in the world, (4, 4); default: they coincide.
-        gravity: [m/s^2], (3,); default: the file's.
 
     Raises:
-        ValueError: not a model, no joints, ball or free joints, several joints on one body, or a
-            base pose that is no rigid motion.
+        ValueError: not a model, no joints, ball or free joints, or several joints on one body.
     """
     m = compiled(source)
     if m.njnt == 0:
@@ -113,10 +104,8 @@ def pin_model(
     mujoco.mj_kinematics(m, data)
     model = pin.Model()
     model.name = "arm"
-    model.gravity.linear = _vector(m.opt.gravity if gravity is None else gravity, "gravity")
-    base = pin.SE3(rigid_pose(base_pose)) if base_pose is not None else pin.SE3.Identity()
-    joint_of = {0: 0}
-    offset = {0: base}
+    model.gravity.linear = m.opt.gravity
+    joint_of, offset = {0: 0}, {0: pin.SE3.Identity()}
     for body in range(1, m.nbody):
         placed = pin.SE3(_quat(m.body_quat[body]), m.body_pos[body])
         parent = int(m.body_parentid[body])
@@ -170,10 +159,3 @@ def _quat(wxyz: Array) -> Array:
     frame = np.zeros(9)
     mujoco.mju_quat2Mat(frame, np.asarray(wxyz, dtype=float))
     return frame.reshape(3, 3)
-
-
-def _vector(value: ArrayLike, name: str) -> Array:
-    vector = np.array(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} {value!r}: expected three finite numbers")
-    return vector

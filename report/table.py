@@ -57,7 +57,7 @@ def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:
 def cell(value: object, brief: bool = False) -> str:
     """A value with three digits; a rate or a time as ``value [low, high]``, unless ``brief``.
 
-    Delays (:func:`~tauguard.detectors.evaluation.metrics.delay_metrics`) are ``median, p95``.
+    Delays (:func:`~tauguard.detectors.evaluation.matching.delay_metrics`) are ``median, p95``.
     """
     if value is None:
         return "-"

@@ -2,8 +2,7 @@
 
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
-from tauguard.rigid.plane_cache import PlaneCache
-from tauguard.rigid.queries import sweep
+from tauguard.rigid.queries import PlaneCache, sweep
 from tauguard.rigid.results import Distances, Impacts, MeshDistances, MeshImpacts, Overlap, Witness
 from tauguard.rigid.rounded import Capsules, Rounded, Spheres
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra

@@ -1,4 +1,4 @@
-"""Overlap and sweeps of convex bodies without radii, row by row.
+"""Overlap, also in successive frames, and sweeps of convex bodies without radii, row by row.
 
 * ``abfme`` eliminates the unknowns of a separating plane by Fourier-Motzkin elimination. Facet
   functions are scaled by determinants, so nothing is divided; redundant combinations are left out.
@@ -9,6 +9,7 @@ Both run in floating point with derived error bounds. Exact arithmetic decides t
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from threading import Lock
 from typing import Literal, get_args
 
 import numpy as np
@@ -166,3 +167,44 @@ def rows(a: Bodies, b: Bodies) -> int:
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ValueError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
     return max(len(a), len(b)) if len(a) and len(b) else 0
+
+
+class PlaneCache:
+    """Overlap queries on the same pairs frame after frame.
+
+    The cache keeps the normal of a separating plane for each pair that was apart. While this normal
+    separates the bodies, nothing else is computed. The result always equals that of
+    :func:`tauguard.rigid.overlap`. Calls from several threads wait for each other.
+
+    Args:
+        count: The number of pairs N, the same in every frame.
+
+    Raises:
+        ValueError: ``count`` is not an integer of 0 or more.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Start without planes; see the class."""
+        if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 0:
+            raise ValueError(f"count: {count!r:.40}, expected an integer of 0 or more")
+        self._lock = Lock()
+        self._normals: NDArray[np.float64] = np.zeros((count, 3))
+        #: Number of pairs of the last frame that were decided by their cached plane.
+        self.answered = 0
+
+    def overlap(self, a: Bodies, b: Bodies, threads: int = 1) -> Overlap:
+        """Overlap in one frame; the separating planes are kept. Arguments as for ``overlap``.
+
+        Raises:
+            ValueError: the number of pairs is not ``count``, or an error of ``overlap``.
+        """
+        count = rows(a, b)
+        if count != len(self._normals):
+            raise ValueError(f"a, b: {count} pairs, expected {len(self._normals)}")
+        hit = np.empty(count, dtype=np.uint8)
+        with self._lock:
+            self.answered = _rigid.overlap_cached(
+                *native(a), *native(b), thread_count(threads), self._normals, hit
+            )
+        found = hit.view(np.bool_)
+        return Overlap(found, lambda: find_witness(a, b, found, threads))

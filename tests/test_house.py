@@ -137,7 +137,6 @@ BELOW, ABOVE = (
         "model_file",
         "registry",
         "self_check",
-        "signature",
     },
 )
 NATIVE = {"_kernel", "_observer", "_network"}

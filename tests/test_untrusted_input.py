@@ -158,7 +158,7 @@ def test_a_robot_file_names_nothing_outside_its_folder(part, tmp_path):
 
 def test_a_robot_file_on_which_mujoco_would_crash_is_one_line(tmp_path, monkeypatch):
     import tauguard.models.robot_check as robot_check
-    from tauguard.models.robot_trial import Trial
+    from tauguard.models.robot_check import Trial
 
     robot = tmp_path / "arm.xml"
     robot.write_text(ARM % "")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.cloth.groups import Groups
+from tauguard.cloth.topology import Groups
 
 Points = NDArray[np.float64]
 #: Faces, groups, and the function from a time to positions.

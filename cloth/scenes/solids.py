@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.cloth.groups import Groups
 from tauguard.cloth.scenes.scene import (
     Parts,
     Points,
@@ -14,6 +13,7 @@ from tauguard.cloth.scenes.scene import (
     sphere,
     square,
 )
+from tauguard.cloth.topology import Groups
 
 RADIUS, HALF_GAP = 0.5, 0.12  #: radius of the rollers, and half of the gap between them [m]
 BODY, BUMPS = 0.32, 24

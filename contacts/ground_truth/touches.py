@@ -1,5 +1,7 @@
 """Find the pairs that touch on the path between two states, and when."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +13,175 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts.checker import State, geom_kinds, pair_kind
 from tauguard.contacts.ground_truth import triangles
-from tauguard.contacts.ground_truth.motion import Step
-from tauguard.contacts.ground_truth.pairs import Index, flex_geoms, geom_pairs
-from tauguard.contacts.ground_truth.search import Found, search
 from tauguard.models.cloth import flex_elements
+
+Index = NDArray[np.int32]
+
+
+def geom_pairs(model: Any) -> Index:
+    """Ids of the geoms that may touch, the smaller id first. Shape (P, 2)."""
+    explicit = {tuple(sorted(p)) for p in zip(model.pair_geom1, model.pair_geom2, strict=True)}
+    excluded = {(int(e) >> 16, int(e) & 0xFFFF) for e in model.exclude_signature}
+    weld, parent = model.body_weldid, model.body_parentid
+    filter_parents = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    found = []
+    for i in range(model.ngeom):
+        for j in range(i + 1, model.ngeom):
+            if (i, j) in explicit:
+                found.append((i, j))
+                continue
+            bodies = int(model.geom_bodyid[i]), int(model.geom_bodyid[j])
+            a, b = int(weld[bodies[0]]), int(weld[bodies[1]])
+            above = int(weld[parent[a]]), int(weld[parent[b]])
+            related = filter_parents and a and b and (a == above[1] or b == above[0])
+            if a == b or related or tuple(sorted(bodies)) in excluded:
+                continue
+            if meet(model.geom_contype, model.geom_conaffinity, i, j):
+                found.append((i, j))
+    return np.array(found, dtype=np.int32).reshape(-1, 2)
+
+
+def meet(contype: Any, conaffinity: Any, i: int, j: int) -> bool:
+    """Whether the collision bits of two geoms allow contacts."""
+    return bool(contype[i] & conaffinity[j] or contype[j] & conaffinity[i])
+
+
+def flex_geoms(model: Any, flex: int) -> list[int]:
+    """Geoms that the flex may touch."""
+    kind, affinity = int(model.flex_contype[flex]), int(model.flex_conaffinity[flex])
+    return [
+        g
+        for g in range(model.ngeom)
+        if kind & int(model.geom_conaffinity[g]) or affinity & int(model.geom_contype[g])
+    ]
+
+
+#: Function (rows, s), both of shape (K,), that returns signed distances of pairs [m], shape (K,).
+Distance = Callable[[NDArray[Any], Array], Array]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The result of a search for each pair; every field has shape (N,)."""
+
+    time: Array  #: first touch (fraction of the step), late by less than resolution / L; or inf
+    depth: Array  #: largest depth found [m]; 0 without penetration
+
+
+def search(
+    distance: Distance, bound: Array, tolerance: float = 1e-5, resolution: float = 2e-6
+) -> Found:
+    """Find the first touch of each pair, and whether it becomes deeper than ``tolerance``.
+
+    Let d(s) be the signed distance of two objects whose points move by at most L relative to each
+    other in the step. Then |d(s) - d(t)| <= L |s - t|, so d has no zero in [a, b] if d(a) + d(b) >
+    L (b - a). Intervals are halved until this holds, or a penetration is found, or the interval is
+    shorter than the resolution (Piyavskii 1972; conservative advancement uses the same bound).
+
+    Args:
+        distance: Distances of pairs at given times.
+        bound: Bound L of each pair [m], shape (N,).
+        tolerance: Once a pair is deeper than this, greater depths are not searched for [m].
+        resolution: Distance below which a pair may be reported as touching [m].
+    """
+    n = len(bound)
+    rows = np.arange(n)
+    first, deepest = np.full(n, np.inf), np.full(n, np.inf)
+
+    def sample(pairs: NDArray[Any], s: Array) -> Array:
+        d = distance(pairs, s)
+        np.minimum.at(deepest, pairs, d)
+        touching = d <= 0
+        np.minimum.at(first, pairs[touching], s[touching])
+        return d
+
+    a, b = np.zeros(n), np.ones(n)
+    da, db = sample(rows, a), sample(rows, b)
+    while len(rows):
+        length = bound[rows] * (b - a)
+        # After the first contact only a depth above the tolerance matters.
+        known = (deepest[rows] < -tolerance) | ((da + db - length) / 2 > -tolerance)
+        settled = known & (a >= first[rows])
+        open_ = (da + db <= length) & ~settled
+        short = open_ & (length <= resolution)
+        np.minimum.at(first, rows[short], b[short])
+        keep = open_ & ~short
+        rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
+        # There is no contact within d / L of either end. Split the rest in the middle.
+        low = a + np.maximum(da, 0) / bound[rows]
+        high = np.maximum(b - np.maximum(db, 0) / bound[rows], low)
+        middle = np.clip((low + high) / 2, a + 0.05 * (b - a), b - 0.05 * (b - a))
+        dm = sample(rows, middle)
+        rows = np.concatenate([rows, rows])
+        a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
+        da, db = np.concatenate([da, dm]), np.concatenate([dm, db])
+    _polish(distance, first, bound, resolution)
+    return Found(first, np.maximum(-deepest, 0.0))
+
+
+def _polish(distance: Distance, first: Array, bound: Array, resolution: float) -> None:
+    """Bisect the last interval before each first touch, in place."""
+    rows = np.flatnonzero(np.isfinite(first) & (first > 0))
+    high = first[rows]
+    low = np.maximum(high - 2 * resolution / bound[rows], 0.0)
+    for _ in range(12):
+        middle = (low + high) / 2
+        touching = distance(rows, middle) <= 0
+        high = np.where(touching, middle, high)
+        low = np.where(touching, low, middle)
+    first[rows] = high
+
+
+@dataclass(frozen=True)
+class Step:
+    """The motion of all geoms and flex vertices of a scene in one step.
+
+    A point y of a body moves as ``xpos + s dx + exp(s [w]x) xmat y``, s in [0, 1]. Flex vertices
+    move linearly.
+    """
+
+    origin: Array  #: origin of each geom's body at s = 0, shape (ngeom, 3) [m]
+    shift: Array  #: dx, shape (ngeom, 3) [m]
+    turn: Array  #: w in the world frame, shape (ngeom, 3) [rad]
+    arm: Array  #: vector from the body's origin to the geom's centre at s = 0, shape (ngeom, 3) [m]
+    xmat: Array  #: the geom's rotation at s = 0, shape (ngeom, 3, 3)
+    vertices: Array  #: flex vertices at s = 0, shape (V, 3) [m]
+    travel: Array  #: displacement of flex vertices, shape (V, 3) [m]
+
+    @classmethod
+    def between(cls, model: Any, before: State, after: State) -> Step:
+        """The step from ``before`` to ``after``."""
+        from scipy.spatial.transform import Rotation
+
+        body = model.geom_bodyid
+        start = before.xmat.reshape(-1, 3, 3)
+        between = after.xmat.reshape(-1, 3, 3) @ start.transpose(0, 2, 1)
+        turn = Rotation.from_matrix(between).as_rotvec()
+        same = (before.xmat == after.xmat).all(axis=1)
+        turn[same] = 0.0
+        return cls(
+            origin=before.xpos[body],
+            shift=(after.xpos - before.xpos)[body],
+            turn=turn[body],
+            arm=before.geom_xpos - before.xpos[body],
+            xmat=before.geom_xmat.reshape(-1, 3, 3),
+            vertices=before.flexvert_xpos,
+            travel=after.flexvert_xpos - before.flexvert_xpos,
+        )
+
+    def poses(self, geoms: NDArray[Any], s: Array) -> tuple[Array, Array]:
+        """Centres (K, 3) and rotations (K, 3, 3) of ``geoms`` (K,) at ``s`` (K,)."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_rotvec(s[:, None] * self.turn[geoms])
+        center = self.origin[geoms] + s[:, None] * self.shift[geoms] + turn.apply(self.arm[geoms])
+        return center, turn.as_matrix() @ self.xmat[geoms]
+
+    def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
+        """Bound on how far rotation moves points within ``radius`` (K,) of a geom's centre [m]."""
+        spin = np.linalg.norm(self.turn[geoms], axis=1)
+        return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))
+
 
 #: A pair that never penetrates deeper than this is not scored [m].
 TOLERANCE = 1e-5

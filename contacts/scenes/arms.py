@@ -3,23 +3,19 @@
 import mujoco
 import numpy as np
 
-from tauguard.contacts.scenes.drives import driven, sway
-from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.contacts.scenes.scene import ContactScene, driven, sway
 from tauguard.models import SceneSpec, Table, compose, load_arm
 from tauguard.models.scene import INTEGRATORS
 
 #: Distance between the pedestals of both arms along x [m].
 DISTANCE = 1.0
+PERIOD = 1.2  #: of the swings [s]
 #: Amplitudes of the first three joints in ``two_arms`` [rad].
 REACH = (0.15, 0.25, 0.1)
 
 
-def arm_boxes(speed: float = 1.0) -> ContactScene:
-    """The arm swings its base joint between two rows of boxes; a free box stands in its path.
-
-    Args:
-        speed: Factor of the swing's speed; 1 is a period of 1.2 s.
-    """
+def arm_boxes() -> ContactScene:
+    """The arm swings its base joint between two rows of boxes; a free box stands in its path."""
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False)).xml)
     for i, (x, y, z) in enumerate(
         [(0.42, 0.42, 0.72), (0.42, -0.16, 0.72), (0.1, 0.42, 0.55), (0.58, 0.2, 0.97)]
@@ -43,15 +39,11 @@ def arm_boxes(speed: float = 1.0) -> ContactScene:
         contype=2,
         conaffinity=3,
     )
-    return _swinging("arm_boxes", spec, [""], (0.45, 0.25, -0.15), 1.2 / speed)
+    return _swinging("arm_boxes", spec, [""], (0.45, 0.25, -0.15))
 
 
-def two_arms(speed: float = 1.0) -> ContactScene:
-    """Two arms face each other over one table, reach for its middle and meet there.
-
-    Args:
-        speed: Factor of the swing's speed; 1 is a period of 1.2 s.
-    """
+def two_arms() -> ContactScene:
+    """Two arms face each other over one table, reach for its middle and meet there."""
     table = Table(position=(DISTANCE / 2, 0.15, 0.5), half_extents=(0.2, 0.5, 0.02))
     spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False, table=table)).xml)
     other = load_arm("cura6").spec
@@ -60,7 +52,7 @@ def two_arms(speed: float = 1.0) -> ContactScene:
             geom.contype, geom.conaffinity = 4, 3
     frame = spec.worldbody.add_frame(pos=[DISTANCE, 0.3, 0], quat=[0, 0, 0, 1])
     spec.attach(other, frame=frame, prefix="other_")
-    return _swinging("two_arms", spec, ["", "other_"], REACH, 1.2 / speed)
+    return _swinging("two_arms", spec, ["", "other_"], REACH)
 
 
 def _swinging(
@@ -68,11 +60,10 @@ def _swinging(
     spec: mujoco.MjSpec,
     prefixes: list[str],
     amplitude: tuple[float, float, float],
-    period: float,
 ) -> ContactScene:
     """The scene ``spec``, in which every arm swings its first three joints about its home pose."""
     spec.option.integrator = INTEGRATORS["implicitfast"]
     arm = load_arm("cura6")
-    reference = sway(arm.home, np.arange(3), np.array(amplitude), period)
+    reference = sway(arm.home, np.arange(3), np.array(amplitude), PERIOD)
     arms = [(tuple(prefix + joint for joint in arm.joints), reference) for prefix in prefixes]
-    return driven(name, spec.compile(), 2 * period, arms)
+    return driven(name, spec.compile(), 2 * PERIOD, arms)

@@ -5,8 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.contacts.scenes.drives import driven, sway, turn
-from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.contacts.scenes.scene import ContactScene, driven, sway, turn
 from tauguard.models import BodyProxy, Cloth, SceneSpec, compose
 from tauguard.models.cloth import add_sheet
 
@@ -16,12 +15,11 @@ FABRIC_YOUNG = 2e5
 SLEEVED_LINK = "link3"
 
 
-def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
+def arm_cloth(count: int = 15) -> ContactScene:
     """The arm turns about its base into a cloth of 0.6 m that hangs from its upper edge.
 
     Args:
         count: vertices along each side of the cloth.
-        speed: speed of the base joint [rad/s].
     """
     cloth = Cloth(
         count=count,
@@ -30,18 +28,12 @@ def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
         young=FABRIC_YOUNG,
     )
     scene = compose(SceneSpec(labels=False, cloth=cloth, integrator="discrete"))
-    moves = [(scene.joint_names, turn(scene.home, 0, speed, 0.7))]
+    moves = [(scene.joint_names, turn(scene.home, 0, 1.5, 0.7))]
     return driven("arm_cloth", scene.model, 0.6, moves)
 
 
-def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> ContactScene:
-    """A wide tube of fabric lies around the forearm, which sways; nothing else holds the tube.
-
-    Args:
-        around: vertices around the tube.
-        along: vertices along the tube.
-        speed: factor of the swing's speed; 1 is a period of 0.8 s.
-    """
+def sleeve_arm() -> ContactScene:
+    """A wide tube of fabric lies around the forearm, which sways; nothing else holds the tube."""
     scene = compose(SceneSpec(labels=False, integrator="discrete"))
     model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[scene.qpos_adr] = scene.home
@@ -50,13 +42,13 @@ def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> Contact
     shapes = range(body.geomadr[0], body.geomadr[0] + body.geomnum[0])
     arm = next(g for g in shapes if model.geom_contype[g])
     radius, half = model.geom_size[arm, :2]
-    points, faces = tube(around, along, radius + 0.012, half)
+    points, faces = tube(14, 10, radius + 0.012, half)
     points = points @ data.geom_xmat[arm].reshape(3, 3).T + data.geom_xpos[arm]
     spec = mujoco.MjSpec.from_string(scene.xml)
     add_sheet(spec, points, faces, mass=0.08, radius=1e-3, young=FABRIC_YOUNG)
-    reference = sway(scene.home, np.array([0, 2]), np.array([0.15, 0.12]), 0.8 / speed)
+    reference = sway(scene.home, np.array([0, 2]), np.array([0.15, 0.12]), 0.8)
     moves = [(scene.joint_names, reference)]
-    return driven("sleeve_arm", spec.compile(), 0.8 / speed, moves)
+    return driven("sleeve_arm", spec.compile(), 0.8, moves)
 
 
 def tube(around: int, along: int, radius: float, length: float) -> tuple[Array, NDArray[np.int32]]:
@@ -72,16 +64,10 @@ def tube(around: int, along: int, radius: float, length: float) -> tuple[Array, 
     return points, faces.astype(np.int32)
 
 
-def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
-    """A cloth hangs over a person's chest (a fixed proxy), and the arm presses into both.
-
-    Args:
-        count: vertices along each side of the cloth.
-        speed: speed of the base joint [rad/s].
-    """
+def garment_chest() -> ContactScene:
+    """A cloth hangs over a person's chest (a fixed proxy), and the arm presses into both."""
     chest = BodyProxy("chest", (0.32, 0.42, 0.78), (0.0, 1.0, 0.0), radius=0.1, clamped=True)
     cloth = Cloth(
-        count=count,
         size=0.5,
         mass=0.12,
         position=(0.38, 0.305, 0.74),
@@ -94,5 +80,5 @@ def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
     worn.contype, worn.conaffinity = 4, 6  # collides with the cloth; with the arm by explicit pairs
     for flex in spec.flexes:
         flex.contype, flex.conaffinity = 6, 5
-    moves = [(scene.joint_names, turn(scene.home, 0, speed, 0.6))]
+    moves = [(scene.joint_names, turn(scene.home, 0, 0.8, 0.6))]
     return driven("garment_chest", spec.compile(), 0.7, moves)

@@ -17,12 +17,6 @@ CLOTH_YOUNG = 1e7
 BALL_GAP = 0.005
 #: solref and solimp of contacts so stiff that a fast ball does not sink through.
 STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))
-#: Enable bits of MuJoCo's extra contact modes, by name of the mode.
-MODES = {
-    "plain": 0,
-    "speculative": int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
-    "ipc": int(mujoco.mjtEnableBit.mjENBL_IPC),
-}
 #: Impact points on the cloth, as weights of the three vertices of a face.
 IMPACT_POINTS = {"vertex": (1.0, 0.0, 0.0), "edge": (0.5, 0.5, 0.0), "face": (1 / 3, 1 / 3, 1 / 3)}
 
@@ -32,9 +26,7 @@ def ball_cloth(
     offset: float = 0.0,
     impact: str = "face",
     stiff: bool = True,
-    mode: str = "plain",
     count: int = 15,
-    pinned: str = "frame",
 ) -> ContactScene:
     """A ball (radius 10 mm, 20 g) flies straight into a stretched cloth of 0.3 m; no gravity.
 
@@ -44,23 +36,21 @@ def ball_cloth(
         impact: one of :data:`IMPACT_POINTS`, on a face in the middle of the cloth.
         stiff: whether contacts of the cloth use :data:`STIFF`. Otherwise MuJoCo averages the time
             constants of cloth (0.003 s) and ball (0.02 s).
-        mode: one of :data:`MODES`.
         count: vertices along each side of the cloth.
-        pinned: fixed vertices, see :class:`tauguard.models.Cloth`.
 
     Raises:
-        ValueError: an unknown impact point or mode, a speed that is not above 0.
+        ValueError: an unknown impact point, or a speed that is not above 0.
     """
     if impact not in IMPACT_POINTS:
         raise ValueError(f"impact {impact!r}: expected one of {', '.join(IMPACT_POINTS)}")
-    spec = _spec("discrete", speed, mode, tuple(MODES))
+    spec = _spec("discrete", speed)
     cloth = Cloth(
         count=count,
         size=0.3,
         mass=0.05,
         position=(0.0, 0.0, 0.0),
         quat_wxyz=(1.0, 0.0, 0.0, 0.0),
-        pinned=pinned,
+        pinned="frame",
         young=CLOTH_YOUNG,
         solref=STIFF[0] if stiff else (0.003, 1.0),
     )
@@ -92,21 +82,18 @@ def _impact_point(model: mujoco.MjModel, impact: str) -> Array:
     return np.asarray(np.array(IMPACT_POINTS[impact]) @ face, dtype=np.float64)
 
 
-def sphere_plate(
-    speed: float = 10.0, offset: float = 0.0, stiff: bool = True, mode: str = "plain"
-) -> ContactScene:
+def sphere_plate(speed: float = 10.0, offset: float = 0.0, stiff: bool = True) -> ContactScene:
     """A rigid sphere (radius 10 mm, 20 g) flies straight into a fixed 2 mm plate; no gravity.
 
     Args:
         speed: speed of the sphere, along -z [m/s].
         offset: additional initial distance [m].
         stiff: whether contacts of the plate use :data:`STIFF` instead of MuJoCo's default.
-        mode: ``plain`` or ``speculative``.
 
     Raises:
-        ValueError: another mode, or a speed that is not above 0.
+        ValueError: a speed that is not above 0.
     """
-    spec = _spec("implicitfast", speed, mode, ("plain", "speculative"))
+    spec = _spec("implicitfast", speed)
     plate = spec.worldbody.add_geom(
         name="plate", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, PLATE_HALF_THICKNESS]
     )
@@ -122,14 +109,11 @@ def sphere_plate(
     return ContactScene("sphere_plate", model, qpos, qvel, (BALL_GAP + offset) / speed + 0.03)
 
 
-def _spec(integrator: str, speed: float, mode: str, known: tuple[str, ...]) -> mujoco.MjSpec:
-    """An empty scene without gravity; ``ValueError`` for a bad speed or mode."""
-    if mode not in known:
-        raise ValueError(f"mode {mode!r}: expected one of {', '.join(known)}")
+def _spec(integrator: str, speed: float) -> mujoco.MjSpec:
+    """An empty scene without gravity; ``ValueError`` for a bad speed."""
     if not 0 < speed < np.inf:
         raise ValueError(f"speed {speed} m/s: expected above 0")
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.option.integrator = INTEGRATORS[integrator]
-    spec.option.enableflags = MODES[mode]
     return spec

@@ -22,8 +22,8 @@ from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import same_rate
 from tauguard.detectors.scores.baselines import FittedThresholds
 from tauguard.detectors.scores.detector import FittedDetector
-from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.detectors.thresholds.speed_normalisation import (
+from tauguard.detectors.thresholds.free_scores import (
+    FreeScores,
     SpeedNormalisation,
     memory_samples,
     recent_speed,

@@ -12,8 +12,15 @@ from tauguard.detectors import _observer
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.estimation.estimator import Estimator
 from tauguard.detectors.events import find_alarms
-from tauguard.detectors.faults.inputs import FAULTS, SPAN, FaultCheck, UsualInput, input_fault
-from tauguard.detectors.faults.torques import TorqueCheck, torque_fault
+from tauguard.detectors.faults.inputs import (
+    FAULTS,
+    SPAN,
+    FaultCheck,
+    TorqueCheck,
+    UsualInput,
+    input_fault,
+    torque_fault,
+)
 from tauguard.detectors.samples import check_interval
 from tauguard.traces.trace import Detection, Trace
 

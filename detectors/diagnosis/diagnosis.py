@@ -11,8 +11,15 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.diagnosis.classification import Signs, signs
-from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
-from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
+from tauguard.detectors.diagnosis.contact_force import (
+    Trust,
+    contact_belief,
+    isolate,
+    last_joint,
+    link_poses,
+    moments,
+    point_jacobians,
+)
 from tauguard.detectors.diagnosis.post_alarm import AFTER, PostAlarmWindow, PostAlarmWindows
 from tauguard.detectors.diagnosis.severity import Severity, severity
 from tauguard.detectors.diagnosis.tool_contact import tool_severity

@@ -18,10 +18,10 @@ from tauguard.detectors.diagnosis.contact_force import (
     FRICTION,
     SCALES,
     ContactBelief,
+    Trust,
     link_poses,
     point_jacobians,
 )
-from tauguard.detectors.diagnosis.isolation import Trust
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface

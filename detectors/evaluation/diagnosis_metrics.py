@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import functools
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
-from tauguard.detectors.diagnosis.diagnosis import Diagnosis
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.diagnosis.diagnosis import Diagnosis, diagnose
+from tauguard.detectors.evaluation.matching import Matching, match_detection
 from tauguard.detectors.events import detection_window
+from tauguard.detectors.samples import check_interval
+from tauguard.models import link_surface
 from tauguard.report import rate as wilson
-from tauguard.traces.trace import Collision, Trace, Truth
+from tauguard.traces.trace import Collision, Detection, Trace, Truth
 
 #: An estimate lags, so it is compared with the largest true force in this time before it [s].
 LAG = 0.015
@@ -176,3 +181,43 @@ def spread(values: Sequence[float]) -> dict[str, Any]:
         return {"median": None, "p95": None, "n": 0}
     median, p95 = np.percentile(values, (50, 95))
     return {"median": float(median), "p95": float(p95), "n": len(values)}
+
+
+_surface = functools.cache(link_surface)
+
+
+class JudgedRecording(NamedTuple):
+    """The detection of a recording, matched with its truth."""
+
+    trace: Trace
+    detection: Detection
+    matching: Matching
+
+    def diagnoses(self, alarm: CollisionAlarm) -> list[MatchedDiagnosis]:
+        """Diagnoses of the alarms compared with the truth; none if no arm file is attached."""
+        arm = self.trace.attachments.get("arm.xml")
+        if arm is None:
+            return []
+        said = diagnose(alarm, self.trace, self.detection, _surface(arm))
+        return match_diagnoses(said, self.trace)
+
+
+def judged_recordings(
+    alarm: CollisionAlarm, recordings: Iterable[Trace]
+) -> Iterator[JudgedRecording]:
+    """Detect in each recording and match with its truth.
+
+    Raises:
+        ValueError: no truth, another sample rate, or other joints; names the recording's number,
+            counted from 0.
+    """
+    own = alarm.detector.arm.robot.joint_names
+    for number, trace in enumerate(recordings):
+        check_interval(f"recording {number}", trace, alarm.detector.dt)
+        if trace.joint_names != own:
+            raise ValueError(
+                f"recording {number} has joints {', '.join(trace.joint_names)}, the model "
+                f"{', '.join(own)}"
+            )
+        found = alarm.detect(trace)
+        yield JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))

@@ -1,4 +1,4 @@
-"""Matching of alarms with collisions: detected and missed collisions, and false alarms.
+"""Matching of alarms with collisions, and metrics of a detector over many traces.
 
 A collision is detected by the first alarm that starts between its onset and 0.5 s later or, for a
 clamping, its end if that is later. Any other alarm is false, for example during a payload change.
@@ -9,9 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.events import CASE_SECONDS, Interval, detection_window, occupied
+from tauguard.report import poisson_rate
+from tauguard.report import rate as wilson
+from tauguard.traces.severity import STRATA, stratum
 from tauguard.traces.trace import Alarm, Collision, Detection, Trace
 
 
@@ -27,30 +33,21 @@ class Matching:
     false_cases: int  #: number of non-collision cases with a false alarm
 
 
-def match(
-    alarms: Sequence[Alarm],
-    collisions: Sequence[Collision],
-    span: Interval,
-    case_seconds: float = CASE_SECONDS,
-) -> Matching:
+def match(alarms: Sequence[Alarm], collisions: Sequence[Collision], span: Interval) -> Matching:
     """Match the alarms of one trace with its collisions.
 
-    Each collision-free interval is divided into non-collision cases of ``case_seconds``, from its
-    beginning; a shorter rest at its end does not count.
+    Each collision-free interval is divided into non-collision cases of :data:`CASE_SECONDS`, from
+    its beginning; a shorter rest at its end does not count.
 
     Args:
         alarms: merged alarms, in order.
         collisions: the truth.
         span: first and last time that counts [s]; alarms and collisions that start before or
             after it are left out, for example while a detector settles.
-        case_seconds: length of a non-collision case [s].
     """
     begin, end = span
-    if not (begin <= end and case_seconds > 0):
-        raise ValueError(
-            f"span {span} s, case_seconds {case_seconds} s: expected begin <= end "
-            "and case_seconds > 0"
-        )
+    if not begin <= end:
+        raise ValueError(f"span {span} s: expected begin <= end")
     inside = [c for c in collisions if begin <= c.onset <= end]
     inner = [a for a in alarms if begin <= a.start <= end]
     delays: list[float | None] = []
@@ -64,9 +61,9 @@ def match(
     false_alarms = tuple(a for k, a in enumerate(inner) if k not in useful)
     free = collision_free([occupied(c) for c in collisions], span)
     cases = [
-        (low + k * case_seconds, low + (k + 1) * case_seconds)
+        (low + k * CASE_SECONDS, low + (k + 1) * CASE_SECONDS)
         for low, high in free
-        for k in range(int((high - low) / case_seconds + 1e-9))
+        for k in range(int((high - low) / CASE_SECONDS + 1e-9))
     ]
     touched = sum(any(a.start < high and a.end >= low for a in false_alarms) for low, high in cases)
     return Matching(
@@ -117,3 +114,64 @@ def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:
         ValueError: a trace without truth, or with other joints or sample rate than the detector's.
     """
     return [match_detection(alarm.detect(trace), trace, alarm.settle) for trace in traces]
+
+
+#: Least peak torque of the collisions in ``headline`` [N m].
+HEADLINE = 16.0
+
+
+def delay_metrics(delays: Iterable[float | None]) -> dict[str, Any]:
+    """Median and 95th percentile of the detected collisions' delays [ms]."""
+    known = np.array([d for d in delays if d is not None]) * 1e3
+    if not len(known):
+        return {"median": None, "p95": None, "n": 0}
+    median, p95 = np.percentile(known, (50, 95))
+    return {"median": float(median), "p95": float(p95), "n": len(known)}
+
+
+def _severity(pairs: Sequence[tuple[float, float | None]]) -> dict[str, Any]:
+    found = [delay is not None for _, delay in pairs]
+    return {
+        "sensitivity": wilson(sum(found), len(found)),
+        "delay_ms": delay_metrics(delay for _, delay in pairs),
+    }
+
+
+def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
+    """All metrics over the given traces.
+
+    Returns:
+        ``confusion`` (tp, fn over collisions; fp, tn over non-collision cases), ``sensitivity``,
+        ``specificity``, ``ppv``, ``accuracy`` (each value, low, high, n), ``delay_ms`` (median,
+        p95, n), ``false_alarms_per_hour`` (of collision-free time), ``strata`` (by peak torque,
+        each with sensitivity and delay) and ``headline`` (sensitivity and delay from 16 N m up).
+    """
+    several = list(matchings)
+    pairs = [
+        (collision.peak_tau, delay)
+        for m in several
+        for collision, delay in zip(m.collisions, m.delays, strict=True)
+    ]
+    tp = sum(delay is not None for _, delay in pairs)
+    fn = len(pairs) - tp
+    fp = sum(m.false_cases for m in several)
+    tn = sum(m.cases for m in several) - fp
+    alarms = sum(len(m.false_alarms) for m in several)
+    hours = sum(m.free_seconds for m in several) / 3600
+    names = [stratum(peak) for peak, _ in pairs]
+    every = set(names) | {stratum(low) for low, _ in STRATA}
+    order = sorted(every, key=lambda name: float(name.split("-")[0]))
+    return {
+        "confusion": {"tp": tp, "fn": fn, "fp": fp, "tn": tn},
+        "sensitivity": wilson(tp, tp + fn),
+        "specificity": wilson(tn, tn + fp),
+        "ppv": wilson(tp, tp + fp),
+        "accuracy": wilson(tp + tn, tp + fn + fp + tn),
+        "delay_ms": delay_metrics(delay for _, delay in pairs),
+        "false_alarms_per_hour": poisson_rate(alarms, hours),
+        "strata": {
+            name: _severity([p for p, own in zip(pairs, names, strict=True) if own == name])
+            for name in order
+        },
+        "headline": _severity([p for p in pairs if p[0] >= HEADLINE]),
+    }

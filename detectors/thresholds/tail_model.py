@@ -8,8 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.thresholds.free_scores import FreeScores, speed_normalisation
-from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
+from tauguard.detectors.thresholds.free_scores import (
+    FreeScores,
+    SpeedNormalisation,
+    speed_normalisation,
+)
 
 #: The tail's shape unless the peaks show another one. For two detectors on 26 simulated arms, the
 #: estimated shapes have means of 0.18 and 0.20 and standard deviations of 0.12, of which chance

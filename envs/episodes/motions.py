@@ -11,6 +11,8 @@ from tauguard.arrays import Array, in_a_line
 #: Peak velocity and peak acceleration of 10 s^3 - 15 s^4 + 6 s^5 for s from 0 to 1.
 _PEAK_VELOCITY = 1.875
 _PEAK_ACCELERATION = 5.7735026918962575
+#: Fraction of the random segments that move only one joint; shortest and longest pause [s].
+SINGLE_JOINT, DWELL = 0.2, (0.1, 0.8)
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,6 @@ def random_motion(
     seconds: float,
     speed: float,
     dt: float = 1e-3,
-    single_joint: float = 0.2,
-    dwell: tuple[float, float] = (0.1, 0.8),
 ) -> Motion:
     """A random motion from point to point with dwells; some segments move a single joint.
 
@@ -125,8 +125,6 @@ def random_motion(
         seconds: exact length of the motion [s].
         speed: percent of ``space.max_speed``, above 1 to 100.
         dt: sample interval [s].
-        single_joint: fraction of the segments that move only one joint.
-        dwell: shortest and longest pause [s].
 
     Raises:
         ValueError: a speed outside (1, 100], or too few allowed poses in ``space``.
@@ -134,14 +132,14 @@ def random_motion(
     check_percent(speed)
     points = [_free_point(rng, space)]
     spans: list[float] = []
-    dwells = [float(rng.uniform(*dwell))]
+    dwells = [float(rng.uniform(*DWELL))]
     total = dwells[0]
     while total < seconds:
-        target = _next_point(rng, space, points[-1], single_joint)
+        target = _next_point(rng, space, points[-1])
         spans.append(
             segment_time(target - points[-1], speed, space.max_speed, space.max_acceleration)
         )
-        dwells.append(float(rng.uniform(*dwell)))
+        dwells.append(float(rng.uniform(*DWELL)))
         total += spans[-1] + dwells[-1]
         points.append(target)
     motion = point_to_point(points, spans, dwells, dt)
@@ -157,13 +155,11 @@ def _free_point(rng: np.random.Generator, space: Workspace) -> Array:
     raise ValueError("no allowed pose found in 1000 draws: widen the workspace")
 
 
-def _next_point(
-    rng: np.random.Generator, space: Workspace, start: Array, single_joint: float
-) -> Array:
+def _next_point(rng: np.random.Generator, space: Workspace, start: Array) -> Array:
     """A target whose straight joint path is allowed at eight points along it."""
     for _ in range(1000):
         target = rng.uniform(space.low, space.high)
-        if rng.random() < single_joint:
+        if rng.random() < SINGLE_JOINT:
             joint = int(rng.integers(len(start)))
             target = np.where(np.arange(len(start)) == joint, target, start)
         if np.abs(target - start).max() < 0.15:

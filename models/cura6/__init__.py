@@ -9,9 +9,11 @@ from tauguard.models.cura6.design import (
     JOINTS,
     MAX_ACCELERATION,
     MAX_SPEED,
+    SIZES,
+    flange,
+    links,
     mjcf,
 )
-from tauguard.models.cura6.sizes import SIZES, flange, links
 
 __all__ = [
     "FLANGE", "HOME", "JOINTS", "MAX_ACCELERATION", "MAX_SPEED", "NAMES", "SIZES", "arm_xml",

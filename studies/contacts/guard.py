@@ -21,7 +21,6 @@ from scenes.drawing import Drawn
 from studies.framework import JobCache, answer, table_rows
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes import arm_boxes, arm_cloth
-from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
 #: Families by name: the function that draws a scene, and the number of scenes in a full and a quick
@@ -148,7 +147,8 @@ def unwarned() -> Iterator[None]:
 @unwarned()
 def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Outcome:
     """Simulate ``scene`` to its end; ``method`` is ``guarded`` or one of MuJoCo's modes."""
-    model, data = scene.start(timestep, MODES.get(method, 0), stiff)
+    flag = getattr(mujoco.mjtEnableBit, f"mjENBL_{method.upper()}", 0)
+    model, data = scene.start(timestep, int(flag), stiff)
     tunnelling, energy = Tunnelling(model, data), EnergyGain(model, data, scene.energy_unit)
     guard = GuardedStepper(model, data) if method == "guarded" else None
     every, steps = max(1, round(5e-4 / timestep)), round(scene.seconds / timestep) + 1

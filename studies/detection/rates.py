@@ -33,7 +33,7 @@ from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
 from tauguard.detectors.alarms.training import normalised
-from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
+from tauguard.detectors.evaluation.matching import HEADLINE, delay_metrics
 from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate

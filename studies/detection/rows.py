@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.detection.operating import AMPERES, HOURLY, Fleet, Outcome, Tallies, Tally
 from studies.framework import groups, table_rows
-from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
+from tauguard.detectors.evaluation.matching import HEADLINE, delay_metrics
 from tauguard.report import Row, poisson_rate, rate
 from tauguard.traces import stratum
 

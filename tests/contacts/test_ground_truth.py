@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from tauguard.contacts import State
 from tauguard.contacts.ground_truth import Event, GroundTruth, Touches, events
 from tauguard.contacts.ground_truth import triangles as tri
-from tauguard.contacts.ground_truth.pairs import geom_pairs
-from tauguard.contacts.ground_truth.search import search
+from tauguard.contacts.ground_truth.touches import geom_pairs, search
 from tauguard.contacts.scenes import ball_cloth, sphere_plate
 
 SHAPES = {

@@ -22,7 +22,7 @@ from tauguard.detectors import (
 from tauguard.detectors.events import free_rows
 from tauguard.detectors.features import front_end
 from tauguard.detectors.registry import DETECTORS, make_detector
-from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
+from tauguard.detectors.thresholds.free_scores import SpeedNormalisation
 from tauguard.traces import Trace
 
 #: Less training, so that the tests are quick.

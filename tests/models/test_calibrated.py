@@ -10,7 +10,7 @@ from tauguard.detectors.calibration.arm_file import save_arm
 from tauguard.detectors.calibration.identification import REAL_FRICTION
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models import Robot, RobotDrive, load_arm
-from tauguard.models.calibrated import friction_rows
+from tauguard.models.arm_drive import friction_rows
 from tests.detectors.synthetic_arm import GAIN, XML, true_model
 
 WIDTHS = {name: getattr(REAL_FRICTION, name) for name in

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.models import load_arm
-from tauguard.models.urdf_inertia import possible_inertia
+from tauguard.models.urdf import possible_inertia
 
 ARM = """<robot name="r"><link name="base"/>
 <link name="arm"><inertial><mass value="2"/><origin xyz="0.1 0 0"/>

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from tauguard.detectors import CollisionAlarm, Matching
-    from tauguard.detectors.evaluation.recordings import JudgedRecording
+    from tauguard.detectors.evaluation.diagnosis_metrics import JudgedRecording
     from tauguard.replay.events import EventFolder
     from tauguard.traces import Trace
 
@@ -137,7 +137,7 @@ def _judged(
     alarm: CollisionAlarm, recordings: Iterable[Trace]
 ) -> Iterator[tuple[str, JudgedRecording]]:
     """Judged recordings with their names; error messages contain the name."""
-    from tauguard.detectors.evaluation.recordings import judged_recordings
+    from tauguard.detectors.evaluation.diagnosis_metrics import judged_recordings
 
     names: list[str] = []
 

@@ -19,7 +19,7 @@ from tauguard.detectors import (
 from tauguard.detectors.alarms.training import left_out, train_and_score, with_rate
 from tauguard.detectors.features.front_end import FrontEndSettings
 from tauguard.detectors.scores.baselines import MovingThresholds
-from tauguard.detectors.thresholds.speed_normalisation import recent_speed
+from tauguard.detectors.thresholds.free_scores import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.models import Mismatch

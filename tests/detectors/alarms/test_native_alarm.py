@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tauguard.detectors import _observer
 from tauguard.detectors.events import confirmed
-from tauguard.detectors.thresholds.speed_normalisation import (
+from tauguard.detectors.thresholds.free_scores import (
     SpeedNormalisation,
     memory_samples,
     recent_speed,

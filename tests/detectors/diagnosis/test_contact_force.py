@@ -4,8 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
-from tauguard.detectors.diagnosis.isolation import isolate, last_joint, moments
+from tauguard.detectors.diagnosis.contact_force import (
+    contact_belief,
+    isolate,
+    last_joint,
+    link_poses,
+    moments,
+    point_jacobians,
+)
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models import cura6, link_surface, pin_model
 
@@ -137,7 +143,7 @@ def test_the_usual_rule():
 
 def test_moments_end_with_the_strongest_and_leave_out_the_weak():
     level = np.array([0.0, 1, 5, 9, 10, 8, 3, 1])
-    rows = moments(level, most=3, fraction=0.4)
+    rows = moments(level)
     assert rows[-1] == 4
     assert set(rows.tolist()) <= {2, 3, 4, 5}
     assert moments(np.zeros(3))[-1] == 0

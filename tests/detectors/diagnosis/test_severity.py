@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import RobotNumbers
-from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
-from tauguard.detectors.diagnosis.isolation import Trust
+from tauguard.detectors.diagnosis.contact_force import (
+    Trust,
+    contact_belief,
+    link_poses,
+    point_jacobians,
+)
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 from tauguard.detectors.diagnosis.severity import (
     COVERAGE,

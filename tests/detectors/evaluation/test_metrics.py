@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from tauguard.detectors.evaluation.matching import match
-from tauguard.detectors.evaluation.metrics import (
+from tauguard.detectors.evaluation.matching import (
     delay_metrics,
     detection_metrics,
+    match,
     poisson_rate,
     wilson,
 )
@@ -64,13 +64,13 @@ def hit(onset, peak):
 def test_figures_of_a_small_trace():
     collisions = [hit(10, 5.0), hit(20, 20.0), hit(30, 40.0), hit(40, 20.0)]
     alarms = [Alarm(20.01, 20.1), Alarm(30.03, 30.2), Alarm(50.0, 50.1)]
-    out = detection_metrics([match(alarms, collisions, (0.0, 60.0), case_seconds=3.0)])
-    # 10, 9.5 (3 times) and 19.5 s free: 3 + 3 x 3 + 6 cases
-    assert out["confusion"] == {"tp": 2, "fn": 2, "fp": 1, "tn": 17}
+    out = detection_metrics([match(alarms, collisions, (0.0, 60.0))])
+    # 10, 9.5 (3 times) and 19.5 s free: 5 + 3 x 4 + 9 cases of 2 s
+    assert out["confusion"] == {"tp": 2, "fn": 2, "fp": 1, "tn": 25}
     assert out["sensitivity"]["value"] == 0.5
-    assert out["specificity"]["value"] == pytest.approx(17 / 18)
+    assert out["specificity"]["value"] == pytest.approx(25 / 26)
     assert out["ppv"]["value"] == pytest.approx(2 / 3)
-    assert out["accuracy"]["value"] == pytest.approx(19 / 22)
+    assert out["accuracy"]["value"] == pytest.approx(27 / 30)
     assert out["delay_ms"]["median"] == pytest.approx(20.0)
     assert out["false_alarms_per_hour"]["value"] == pytest.approx(3600 / 58)
     assert list(out["strata"]) == ["4-8", "8-16", "16-32", "32-64", "64-128"]

@@ -5,7 +5,7 @@ import pinocchio
 import pytest
 
 from tauguard.detectors import ArmModel, RobotNumbers
-from tauguard.detectors.faults.torques import TorqueCheck, torque_ratios
+from tauguard.detectors.faults.inputs import TorqueCheck, torque_ratios
 from tauguard.models import cura6, pin_model
 from tauguard.traces.trace import Trace
 

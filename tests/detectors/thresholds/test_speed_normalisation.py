@@ -10,8 +10,12 @@ from scipy import stats
 
 from tauguard.detectors.alarms.training import with_rate
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate, Tails
-from tauguard.detectors.thresholds.free_scores import FreeScores, block_maxima
-from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation, recent_speed
+from tauguard.detectors.thresholds.free_scores import (
+    FreeScores,
+    SpeedNormalisation,
+    block_maxima,
+    recent_speed,
+)
 from tauguard.detectors.thresholds.tail_model import (
     USUAL_SHAPE,
     Tail,
