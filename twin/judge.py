@@ -37,8 +37,6 @@ ALIKE, APART, REPEATED = 2.0, 1.5, 1.0
 SHORTEST = 1.0
 #: Least number of windows of each kind for an area under a curve, and number of folds.
 FEWEST, FOLDS = 40, 5
-#: Largest number of pairs of windows that are compared at once, which take 24 bytes each.
-BLOCK = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +243,7 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
     """The nearest earlier window that each one repeats, -1 without one; and whether any does.
 
     Of equal places only the first and the last window count: if those are too near in time, so are
-    the windows between.
+    the windows between. More and more neighbours are looked up, until an earlier one is among them.
     """
     count = len(place)
     # Mean positions at rest differ in the last bits.
@@ -260,19 +258,27 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
         out: Bools = (logs[i] != logs[j]) | (np.abs(starts[i] - starts[j]) > APART)
         return out
 
-    before, repeated = np.full(count, count), np.zeros(count, dtype=np.bool_)
-    for rows in np.array_split(np.arange(count), 1 + count * len(places) // BLOCK):
-        pairs = cKDTree(place[rows]).sparse_distance_matrix(tree, ALIKE, output_type="ndarray")
-        own, far = rows[pairs["i"]], pairs["v"]
-        early, late = first[pairs["j"]], last[pairs["j"]]
-        repeated[own[apart(early, own) | apart(late, own)]] = True
-        usable = (early < own) & apart(early, own)
-        own, early, far = own[usable], early[usable], far[usable]
-        least = np.full(count, np.inf)
-        np.minimum.at(least, own, far)
-        near = far <= least[own] + 1e-9
-        np.minimum.at(before, own[near], early[near])
-    return np.where(before < count, before, -1), repeated
+    before, repeated = np.full(count, -1), np.zeros(count, dtype=np.bool_)
+    left, near = np.arange(count), 32
+    while len(left):
+        near, more = min(near, len(places)), []
+        for rows in np.array_split(left, 1 + len(left) * near // 2_000_000):
+            far, at = tree.query(place[rows], near, distance_upper_bound=ALIKE)
+            far, at, own = far.reshape(len(rows), -1), at.reshape(len(rows), -1), rows[:, None]
+            within = np.isfinite(far)
+            at[~within] = 0
+            early, late = first[at], last[at]
+            usable = within & (early < own) & apart(early, own)
+            far[~usable] = np.inf
+            least = far.min(axis=1)
+            found = np.isfinite(least)
+            nearest = np.where(usable & (far <= least[:, None] + 1e-9), early, count).min(axis=1)
+            before[rows[found]] = nearest[found]
+            repeated[rows] |= (within & (apart(early, own) | apart(late, own))).any(axis=1)
+            more.append(rows[within[:, -1] & ~found])
+        left = np.concatenate(more) if near < len(places) else np.empty(0, dtype=np.int64)
+        near *= 4
+    return before, repeated
 
 
 def told_apart(
