@@ -52,7 +52,7 @@ def detection_sources() -> tuple[str, str]:
 
 @functools.cache
 def tree_digest(package: str) -> str:
-    """SHA-256 over the Python and XML sources of one folder of the package."""
+    """SHA-256 over the Python, TOML and XML sources of one folder of the package."""
     digest = hashlib.sha256()
     _add_tree(digest, files(f"tauguard.{package}"), package)
     return digest.hexdigest()
@@ -86,7 +86,7 @@ def _add_tree(digest: hashlib._Hash, folder: Traversable, name: str) -> None:
     for entry in sorted(folder.iterdir(), key=lambda e: e.name):
         if entry.is_dir() and entry.name not in ("__pycache__", "src", "dm"):
             _add_tree(digest, entry, f"{name}/{entry.name}")
-        elif entry.name.endswith((".py", ".xml")):
+        elif entry.name.endswith((".py", ".toml", ".xml")):
             _add(digest, f"{name}/{entry.name}", entry)
 
 
