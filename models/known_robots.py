@@ -31,9 +31,10 @@ class KnownRobot:
 
 
 def _known(name: str, row: dict[str, Any]) -> KnownRobot:
-    places = [row.pop(key, None) for key in ("own", "urdf", "menagerie")]
+    own, urdf, menagerie = (row.pop(key, None) for key in ("own", "urdf", "menagerie"))
     sources = MappingProxyType(row.pop("sources", {}))
-    return KnownRobot(Robot.from_mapping({"file": name, **row}), *places, sources)
+    robot = Robot.from_mapping({"file": name, **row})
+    return KnownRobot(robot, own, urdf, menagerie, sources)
 
 
 _TEXT = Path(__file__).with_suffix(".toml").read_text()
