@@ -51,6 +51,12 @@ _SECONDS = {
     **dict.fromkeys(("milliseconds", "millisecond", "millis", "msec", "ms"), 1e-3),
     **dict.fromkeys(("seconds", "second", "secs", "sec", "s"), 1.0),
 }
+#: Units of the time column, which may end its name as well; of other columns, "min" is no unit.
+_TIME_UNITS = {
+    **_SECONDS,
+    **dict.fromkeys(("minutes", "minute", "mins", "min"), 60.0),
+    **dict.fromkeys(("hours", "hour", "hrs", "hr", "h"), 3600.0),
+}
 _AMPERES = {
     **dict.fromkeys(("milliamperes", "milliampere", "milliamps", "milliamp", "ma"), 1e-3),
     **dict.fromkeys(("amperes", "ampere", "amps", "amp", "a"), 1.0),
@@ -72,6 +78,7 @@ _OTHER_ANGLES = ("rpm", *(u + per for u in ("mrad", "turns", "rev") for per in _
 #: A unit as the last words of a name: "timestamp_us", "axis1_vel_deg_s".
 _NAMES = "|".join((*_SECONDS, *_AMPERES, *_NEWTON_METRES, *_ANGLES, *_OTHER_ANGLES))
 _WRITTEN = re.compile(f"(?<=[a-z0-9])_({_NAMES})$")
+_TIME_WRITTEN = re.compile(f"(?<=[a-z0-9])_({'|'.join(_TIME_UNITS)})$")
 #: Units in brackets that no map can hold, and units of another kind of signal.
 _FOREIGN = re.compile(
     f"(?:^|_)(?:{'|'.join(name for name in _NAMES.split('|') if len(name) > 1)}|"
@@ -81,7 +88,22 @@ _FOREIGN = re.compile(
     r"(?:kilo|centi|deci|milli|micro)\w*)(?:_|$)"
 )
 #: Longest word in brackets that is taken for the symbol of a unit, and words that are none.
-_SYMBOL, _SHORT_WORDS = 3, {"act", "est", "arm", "abs", "avg", "raw", "rms"}
+_SYMBOL = 3
+_SHORT_WORDS = {
+    "act",
+    "est",
+    "arm",
+    "abs",
+    "avg",
+    "raw",
+    "rms",
+    "iq",
+    "dc",
+    "utc",
+    "gmt",
+    "ros",
+    "cpu",
+}
 #: Smallest and largest number of joints of an arm.
 FEWEST, MOST = 2, 16
 
@@ -135,7 +157,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     """
 
     def plain(name: str) -> str:
-        return _WRITTEN.sub("", _UNIT.sub("", name).strip(" #").lower())
+        return _TIME_WRITTEN.sub("", _UNIT.sub("", name).strip(" #").lower())
 
     times = [name for name in header if plain(name) in TIMES]
     time = next(iter(times), None)
@@ -159,6 +181,7 @@ def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
     degrees, amperes, newton_metres = _units(used, numbers)
     scale, clock = 1.0, 0.0
     if time is not None:
+        _refuse_unknown([time], _TIME_UNITS)
         for name in times:
             _refuse_parts(name, numbers([name])[:, 0], header)
         t = numbers([time])[:, 0]
@@ -198,7 +221,7 @@ def _time_scale(name: str, t: Array) -> float:
     """Seconds in one unit of the time column, by its name, else by its usual step."""
     steps = np.diff(np.unique(t[np.isfinite(t)]))  # of the sorted times
     usual = float(np.median(steps)) if len(steps) else 0.0
-    return _unit(name, _SECONDS) or next(scale for least, scale in CLOCKS if usual >= least)
+    return _unit(name, _TIME_UNITS) or next(scale for least, scale in CLOCKS if usual >= least)
 
 
 def _units(
@@ -329,10 +352,10 @@ def rate_of(q: Array, qd: Array) -> float:
 
 def described(columns: ColumnMap) -> str:
     """A map in one line, for the user to accept."""
-    unit = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}[columns.time_scale]
+    unit = {1e-9: "ns", 1e-6: "us", 1e-3: "ms", 1.0: "s", 60.0: "min", 3600.0: "h"}
     angle = "deg" if columns.degrees else "rad"
     ampere = "mA" if columns.current_scale == 1e-3 else "A"
-    time = f"time {columns.t} [{unit}]"
+    time = f"time {columns.t} [{unit[columns.time_scale]}]"
     if columns.t is None:
         time = f"no time, {columns.clock:g} rows per second by the velocities"
     scale = columns.torque_scale

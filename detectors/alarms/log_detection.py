@@ -12,7 +12,7 @@ from tauguard.detectors.alarms.monitor import Span, detect_with_faults
 from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
-from tauguard.detectors.features.motion_regimes import motion_regimes, unseen_text
+from tauguard.detectors.features.motion_regimes import SHORTLY, motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Detection, Trace
 
@@ -97,9 +97,9 @@ def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     for regime, joints in detector.unseen:
         rows |= here[regime][:, [names.index(joint) for joint in joints]].any(axis=1)
-    if not rows.any():
-        return []
     seconds = float(rows.sum() * trace.dt)
+    if seconds < SHORTLY:
+        return []
     return [
         f"the training logs do not show {unseen_text(detector.unseen, len(names))}; this log does "
         f"for {seconds:.1f} s, in which bounds learned on other arms apply"

@@ -17,7 +17,14 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.nominal import nominal_arm
-from tauguard.detectors.calibration.recording import LEAST, Load, Recording, motion_length, pieces
+from tauguard.detectors.calibration.recording import (
+    LEAST,
+    Load,
+    Recording,
+    motion_length,
+    moves,
+    pieces,
+)
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
@@ -151,11 +158,13 @@ def train_beside(
     parts = pieces([Recording(log) for log in logs.values()], 2)
     halved = len(parts) > len(logs)
     names = [f"half {k} of {name}" for name in logs for k in (1, 2)] if halved else list(logs)
-    calibrated, found, notes = Subsets(arm, parts), list[FreeScores](), list[str]()
+    moving = [k for k, part in enumerate(parts) if moves(part.trace)]
+    calibrated = Subsets(arm, [parts[k] for k in moving])
+    found, notes = list[FreeScores](), list[str]()
     for fold in range(min(FOLDS, len(parts))):
         rest, without = [k for k in range(len(parts)) if k % FOLDS != fold], arm
         if (seconds := motion_length([parts[k] for k in rest])) >= LEAST:
-            without = calibrated(rest)
+            without = calibrated([place for place, k in enumerate(moving) if k in rest])
         else:
             notes.append(
                 f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "

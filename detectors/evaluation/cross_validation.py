@@ -173,12 +173,9 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
     @functools.cache
     def without(left: int) -> FittedFreeMotion:
         use = [place for place in range(len(moving)) if place % TURNS != left]
-        try:
-            found = calibrated(use, 0.0 if left < 0 else LEAST)
-        except ValueError:  # too little motion is left without the turn
-            if left < 0:
-                raise
+        if left >= 0 and motion_length([moving[place] for place in use]) < LEAST:
             return without(-1)
+        found = calibrated(use, 0.0 if left < 0 else LEAST)
         levels = friction_levels(found, [moving[place] for place in use])
         bound = Bound.prior(*levels, *standing_positions(parts))
         return FittedFreeMotion(found, dt, bound, UNKNOWN_LOAD, 0.0)

@@ -69,7 +69,8 @@ def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
         if delays
         else ""
     )
-    text = f"labels: {found['contacts']} contacts, {found['found']} found{when}"
+    total = found["contacts"]
+    text = f"labels: {total} contact{'' if total == 1 else 's'}, {found['found']} found{when}"
     if found["still_up"]:
         text += f", {found['still_up']} began during an earlier alarm (not judged)"
     missed = [f"{onset - since:.2f}" for onset in found["missed"]]

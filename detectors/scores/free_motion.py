@@ -21,6 +21,7 @@ from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, Subsets
 from tauguard.detectors.calibration.recording import (
+    LEAST,
     LEAST_STANDING,
     UNKNOWN_LOAD,
     Load,
@@ -28,6 +29,7 @@ from tauguard.detectors.calibration.recording import (
     Recording,
     check_length,
     laden,
+    motion_length,
     moves,
     pieces,
 )
@@ -283,10 +285,9 @@ def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmMo
     models = [whole] * len(parts)
     turns = range(min(FOLDS, len(parts)))
     for fold in tqdm(turns, desc="leave out", unit="part", disable=None, leave=False):
-        try:
-            model = calibrated([i for i in everything if i % FOLDS != fold])
-        except ValueError:  # too little motion is left without the fold
-            model = whole
+        use = [i for i in everything if i % FOLDS != fold]
+        enough = motion_length([parts[i] for i in use]) >= LEAST
+        model = calibrated(use) if enough else whole
         models[fold::FOLDS] = [model] * len(models[fold::FOLDS])
     return models, whole
 

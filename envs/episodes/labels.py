@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.detectors.events import MERGE_GAP
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.traces import Collision
-
-#: Contacts with a gap below this time are one collision [s].
-MERGE_GAP = 0.5
 
 
 @dataclass(frozen=True)

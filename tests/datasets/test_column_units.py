@@ -75,6 +75,41 @@ def test_every_unit_that_is_taken_off_a_name_is_read(time, torque, scales):
     assert f"[{unit}]" in described(found)
 
 
+@pytest.mark.parametrize(
+    ("time", "scale", "unit"),
+    [
+        ("t [min]", 60.0, "min"),
+        ("time_minutes", 60.0, "min"),
+        ("time (h)", 3600.0, "h"),
+        ("Time [hrs]", 3600.0, "h"),
+        ("time (UTC)", 1.0, "s"),
+    ],
+)
+def test_a_time_in_minutes_or_hours_is_read(time, scale, unit):
+    names = [time, *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12")]
+    table = np.random.default_rng(0).uniform(-1, 1, (50, 7))
+    table[:, 0] = 0.01 / scale * np.arange(50)
+    found = recognised(names, table)
+    assert (found.t, found.time_scale) == (time, scale)
+    assert described(found).startswith(f"time {time} [{unit}]")
+
+
+@pytest.mark.parametrize("unit", ["ticks", "counts", "cycles", "rev", "%", "jd"])
+def test_a_time_in_an_unknown_unit_is_refused(unit):
+    names = [f"time [{unit}]", *(f"{kind}{k}" for kind in ("q", "qd", "current") for k in "12")]
+    table = np.ones((5, 7)) * np.arange(5)[:, None]
+    said = f"unit {unit} is not known, expected one of .*ns, .*ms, .*s, .*min, .*h; convert it"
+    with pytest.raises(ValueError, match=said):
+        recognised(names, table)
+
+
+def test_the_quadrature_current_is_no_unit():
+    names = ["t", *(kind.replace("#", k) for kind in ("q#", "qd#", "current_# (Iq)") for k in "12")]
+    found = recognised(names, np.random.default_rng(0).uniform(-1, 1, (50, 7)).cumsum(axis=0))
+    assert found.current == ("current_1 (Iq)", "current_2 (Iq)")
+    assert found.current_scale == 1.0
+
+
 @pytest.mark.parametrize("parts", [("sec", "nanosec"), ("stamp_s", "stamp_ns"), ("t", "t_usec")])
 @pytest.mark.parametrize("first", [0, 1])
 def test_a_time_in_two_columns_is_refused(parts, first):

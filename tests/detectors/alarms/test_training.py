@@ -72,6 +72,17 @@ def test_halves_of_one_log_count_as_two():
     assert "times the highest score of 2 halves of a log" in notes[-1]
 
 
+@pytest.mark.parametrize("count", [0, 2])
+def test_logs_in_which_no_joint_moves_are_scored_too(count):
+    logs = [record(seed) for seed in range(count)]
+    logs += [cut(record(seed, dwell=(8.0, 20.0)), slice(950, 1850)) for seed in (7, 8)]
+    whole = identify(ArmModel(nominal(), GAIN), [Recording(record(0))]).arm
+    named = {f"log{k}": log for k, log in enumerate(logs)}
+    _, scores, notes = train_beside(Watched(), [], named, whole, 10.0)
+    assert len(scores) == len(logs)
+    assert any("0.0 s of motion are left without it" in note for note in notes) == (count == 0)
+
+
 def test_other_errors_of_the_calibration_are_not_hidden(monkeypatch):
     def fail(*_, **__):
         raise ValueError("another error")
