@@ -8,13 +8,19 @@ from studies.framework import Part, Point, Study, groups, number, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "continuous collision detection of deforming meshes: time, misses and false hits",
+    "continuous collision detection of deforming meshes: time, missed and false collisions",
     {
         "frames": Part(
-            "cloth.frames", "whole frames: ab2pf, ICCD, DNF, SCD, VCD and ipctk, time and misses"
+            "cloth.frames",
+            "one time step of a mesh: time and misses of ab2pf, ICCD, DNF, SCD, VCD and ipctk",
         ),
-        "volumes": Part("cloth.volumes", "kinds of bounding volumes; growth to 10^6 triangles"),
-        "queries": Part("cloth.queries", "single queries: candidates of a frame, public labels"),
+        "volumes": Part(
+            "cloth.volumes", "kinds of bounding volumes; time of meshes up to 10^6 triangles"
+        ),
+        "queries": Part(
+            "cloth.queries",
+            "single queries: those of a whole time step, and public ones with labels",
+        ),
     },
 )
 

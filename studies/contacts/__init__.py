@@ -6,15 +6,15 @@ from studies.framework import Part, Point, Study, groups, number, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "contact checkers and guarded steps: what is missed, when it is seen, at what cost",
+    "contact checkers and guarded steps: missed contacts, delays and computing time",
     {
         "checkers": Part(
             "contacts.checkers",
-            "contact checkers beside MuJoCo's contacts: what each sees, when, at what cost",
+            "contact checkers and MuJoCo's contacts: contacts found, delays and computing time",
         ),
         "guard": Part(
             "contacts.guard",
-            "guarded steps on random scenes, beside MuJoCo's modes and fine fixed steps",
+            "random scenes with guarded steps, with MuJoCo's modes and with short fixed steps",
             ("keep",),
             alias="guard",
         ),

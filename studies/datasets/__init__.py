@@ -3,14 +3,15 @@
 from studies.framework import Part, Study
 
 STUDY = Study(
-    "generating, storing and reading datasets, and detectors trained from their files",
+    "generating, storing and reading datasets, and training detectors on them",
     {
         "generation": Part(
-            "datasets.generation", "generation: rate beside mujoco.rollout, bytes, reading"
+            "datasets.generation",
+            "generation rate compared with mujoco.rollout, file sizes, time of reading",
         ),
         "entries": Part(
             "datasets.entries",
-            "every detector of the registry, and your own, on tauguard-collisions-v2",
+            "all detectors of tauguard, and your own, on tauguard-collisions-v2",
             ("keep", "detector"),
             alias="entries",
         ),

@@ -8,16 +8,16 @@ from studies.framework.headlines import HOURS, Found
 from tauguard.report import Row, cell
 
 STUDY = Study(
-    "how many collisions detectors find, how soon, and at which rate of false alarms",
+    "collisions found by detectors, delays and rates of false alarms",
     {
         "experiment": Part(
             "detection.experiment",
-            "the dissertation's experiment: detectors, speeds, operating points, false alarms",
+            "simulated arms at six speeds: all detectors, operating points, false alarms",
             ("detector", "keep"),
         ),
         "false_alarms": Part(
             "detection.rates",
-            "requested and counted false alarms on six fresh arms, also with a guarantee",
+            "requested and counted rates of false alarms on six fresh arms, also guaranteed rates",
             ("keep",),
             alias="false_alarms",
         ),
@@ -28,17 +28,17 @@ STUDY = Study(
         ),
         "sampling": Part(
             "detection.sampling",
-            "slow logs, from 23.8 Hz on: collisions found, delays and false alarms at each rate",
+            "sample rates from 23.8 Hz on: collisions found, delays and false alarms",
             ("keep",),
         ),
         "online": Part(
             "detection.online",
-            "observer and SVR a sample: microseconds, and fewer support vectors",
+            "time per sample of observer and SVR, also with fewer support vectors",
             alias="detection_online",
         ),
         "diagnosis": Part(
             "detection.diagnosis",
-            "after the alarm: link, force, point and kind of event against the truth",
+            "diagnosis of alarms: errors of link, force, point and kind of event",
             alias="diagnosis",
         ),
     },

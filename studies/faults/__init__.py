@@ -6,15 +6,15 @@ from studies.framework import Part, Point, Study, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "faults of a robot's samples: which are reported, how soon, and at what cost",
+    "faults of a robot's samples: faults reported, delays, false alarms",
     {
         "samples": Part(
             "faults.samples",
-            "faults of samples: which are seen, how soon, false alarms, and those not reported",
+            "injected faults: those reported and those not, delays, false alarms",
         ),
         "listen": Part(
             "faults.listen",
-            "a log played by RTDE in real time and heard: losses, alarms, latency",
+            "a log sent by RTDE in real time to `listen`: lost samples, alarms, latency",
             alias="listen",
         ),
     },

@@ -38,20 +38,20 @@ def command(
     figure: Path | None = None,
     out: Path = Path("bench"),
 ) -> None:
-    """Run a study of speed against error, or one part of it, and print what it found.
+    """Measure computing time and errors in a study, or in one part of it, and print them.
 
-    It prints time and error of each method, and the targets; `--tables` prints every table.
+    The output states time and error of each method, and the targets; `--tables` prints all tables.
 
     `tauguard bench all` runs every part of every study and writes figures and tables into a folder.
-    Parts that the folder holds are not run again. `tauguard report` makes one page of the folder.
+    Parts with results in the folder are not run again. `tauguard report` makes one page of these.
 
     Args:
         name: a study, or one part as STUDY-PART: `tauguard bench list` names them; or `all`.
         quick: a shorter run, 60 s or less per part on 2 cores (a full run takes up to 30 minutes).
         seed: seed of every random input.
-        detector: a method of your own as module:Class, beside those of the study `detection`.
+        detector: module:Class of your own, an additional method of the study `detection`.
         robot: arms by name or file, separated by commas, for the parts that take any arm.
-        keep: folder of the job cache. Jobs whose results it holds are not run again, unless
+        keep: folder of the job cache. Jobs with results in the cache are not run again, unless
             versions or the sources of simulation and detectors have changed.
         workers: processes of the parts that use several (default: all processors).
         tables: print every table.

@@ -33,26 +33,29 @@ LENGTH = 300
 EMPTY = "<p>Not shown: see the top of this page.</p>"
 NONE = "<p>None of these studies is in this report.</p>"
 BESIDE_WHOM = (
-    "<p>Time and error of each kernel and of a peer in the same run, one thread. "
-    "A ratio above 1 says that tauguard is faster.</p>"
+    "<p>Time and error of each method and of another library in the same run, one thread. "
+    "A ratio above 1 means that tauguard is faster.</p>"
 )
 DETECTIONS = (
-    "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
-    "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on arms.</p>"
+    "<p>Collisions of arms on which no threshold was set; every number has its 95 % interval. "
+    "Simulated arms: thresholds for 0.25 false alarms per hour. Real arms: pushes.</p>"
 )
 FIGURES = (
-    "<p>Left is fast, low is accurate. The grey line joins points that no other beats in both. "
-    "Circles are tauguard's, squares are peers of the same run.</p>"
+    "<p>Points further left are faster, lower points are more accurate. The grey line joins the "
+    "points that no other point surpasses in both. Circles are methods of tauguard, squares are "
+    "other libraries in the same run.</p>"
 )
 RUNS = (
     "Numbers of a quick run are rough; two quick parts run at the same time. load: number of "
-    "running programs at the end of a part; above the number of cores, times are too long."
+    "running programs at the end of a part; if it exceeds the number of cores, times are too long."
 )
-UNRECORDED = "<p>A quick run records none: <code>tauguard report --bound</code> does.</p>"
+UNRECORDED = (
+    "<p>Not recorded in a quick run; <code>tauguard report --bound</code> records them.</p>"
+)
 CASES = (
     "<p>Named cases with exact answers, run on every installed library; "
-    "<code>tauguard hard-cases</code> runs them, on other libraries too. "
-    "Right answers of those asked:</p>"
+    "<code>tauguard hard-cases</code> runs them, also on your own library. "
+    "Right answers, of the cases that each library supports:</p>"
 )
 
 T = TypeVar("T")
@@ -66,11 +69,11 @@ def command(
     bound: bool = False,
     mistakes: bool = True,
 ) -> None:
-    """Run the studies that the folder does not hold yet, and write `index.html` of all of them.
+    """Run the studies without results in the folder, and write all results to `index.html`.
 
-    A stopped run continues where it stopped. The page opens offline. A run that is not quick also
-    records the mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If
-    something cannot be shown, the page and a message name it, and the exit code is 1.
+    A stopped run continues where it stopped. The page opens offline. A full run also records the
+    mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` shows them. If something
+    cannot be shown, the page and a message name it, and the exit code is 1.
 
     Args:
         out: the folder of the page and of each part's rows (JSON) and figure.
@@ -78,9 +81,9 @@ def command(
             take up to 30 minutes each).
         seed: seed of every random input.
         study: these studies or parts only (default: all that `tauguard bench list` names).
-        bound: write the page from what the folder holds; run no study and no hard case.
-        mistakes: train the detector of `tauguard demo` and record its mistakes, unless the
-            folder holds those of this build; a quick run records none.
+        bound: write the page from results in the folder; run no study and no hard case.
+        mistakes: train the detector of `tauguard demo` and record its mistakes, unless the folder
+            contains mistakes of this build; a quick run records none.
     """
     from studies.framework import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run

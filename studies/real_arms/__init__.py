@@ -6,16 +6,16 @@ from studies.framework import Part, Study, table_rows
 from tauguard.report import Row, cell
 
 STUDY = Study(
-    "logs of real arms: pushes found, delays and false alarms, beside public observers",
+    "logs of real arms: pushes found, delays and false alarms; published observers",
     {
         "pushes": Part(
             "real_arms.pushes",
-            "pushes found, delays and false alarms in logs of real arms, beside public observers",
+            "pushes found, delays and false alarms of detectors and of published observers",
             alias="real_arm",
         ),
         "force": Part(
             "real_arms.force",
-            "force, impulse and time of pushes beside a force sensor, and a twin pushed with it",
+            "errors of force, impulse and time of pushes against a force sensor, on arm and twin",
         ),
     },
 )

@@ -8,19 +8,21 @@ from studies.framework import Part, Point, Study, groups, number, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "convex bodies and meshes: overlap, bounding volumes, distance, time of impact, beside coal",
+    "convex bodies and meshes: overlap, volumes, distance, time of impact; also of coal",
     {
         "convex": Part(
             "rigid.convex",
-            "Table 2.1: convex overlap by elimination (ABFME) against separating axes; hard cases",
+            "overlap of convex bodies by elimination (ABFME) and by separating axes; hard cases",
         ),
         "mesh": Part(
             "rigid.mesh",
-            "Table 2.2: bounding volumes of the bunny's tree, first hit and motion",
+            "bounding volumes of mesh trees: overlap and motion of two Stanford bunnies",
         ),
-        "volumes": Part("rigid.volumes", "Figure 1.1: cost and tightness of bounding volumes"),
-        "motion": Part("rigid.motion", "time of impact of bodies that turn: speed against error"),
-        "distance": Part("rigid.distance", "signed distance: speed against error"),
+        "volumes": Part("rigid.volumes", "time and tightness of single bounding volumes"),
+        "motion": Part(
+            "rigid.motion", "time of impact of rotating bodies: computing time and error"
+        ),
+        "distance": Part("rigid.distance", "signed distance: computing time and error"),
     },
 )
 #: Methods of Table 2.1: the columns of their times and wrong answers, and their role.

@@ -7,25 +7,25 @@ from studies.framework import Part, Point, Study, number, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "what each modelled thing of a scene costs and brings, and the environments around it",
+    "computing time and effect of each part of a simulation, and of environments",
     {
         "scene": Part(
             "simulation.scene",
-            "what each part of a scene costs, and what the time step costs in accuracy",
+            "computing time of each part of a scene; error at each time step",
         ),
         "needs": Part(
             "simulation.needs",
-            "model only what a scene needs: parts left out, and what the detector then does",
+            "scenes without some of their parts: computing time and effect on the detector",
             alias="needs",
         ),
         "impact": Part(
             "simulation.impact",
-            "impacts on body regions beside the two-mass model: error against cost",
+            "impacts on body regions: error against the two-mass model, computing time",
             alias="impact",
         ),
         "environments": Part(
             "simulation.environments",
-            "what an environment costs beside its physics, many at once, and reactions",
+            "time of environments beyond their physics, also in parallel; reactions to alarms",
             alias="environments",
         ),
     },

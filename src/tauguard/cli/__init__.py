@@ -17,7 +17,7 @@ from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
 COMMANDS = {
     "demo": "simulate an arm, train a detector, detect collisions, write a recording",
     "calibrate": "identify friction, inertia and drive gains of a real arm from free logs",
-    "twin": "identify a simulated arm that behaves like a real one from free logs",
+    "twin": "identify a simulated copy of a real arm from free logs",
     "detect": "find collisions in the log of a real arm",
     "generate": "make a labelled dataset from its description, on all cores or a Ray cluster",
     "inspect": "show the content of a generated dataset and check its files",
@@ -33,7 +33,7 @@ COMMANDS = {
     "video": "render a recording of the simulation to GIF or MP4",
     "report": "write the results of all studies and hard cases to one HTML page",
     "hard-cases": "test collision libraries on named cases with exact answers",
-    "bench": "run a study of speed and error",
+    "bench": "measure computing time and errors of methods in a study",
 }
 
 #: A user's ``module:Class``; the module may be in the working folder.

@@ -43,14 +43,13 @@ def command(
 
     Logs with currents do not determine the drive gains. These come from --gains or a preset if
     given, else from a log with a known --payload, else from the robot file's masses; the output
-    states which. In cross-validation, a calibration from the other logs predicts each log.
+    states which. For cross-validation, each log is predicted by a calibration from the other logs.
 
     Args:
         logs: CSV or MCAP files, or a folder of them; at least 10 s of motion, better two minutes.
         robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
-        columns: columns of CSV files: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto, or a
-            JSON file (see `tauguard detect`).
+        columns: columns of CSV files: a preset, auto, or a JSON file (see `tauguard detect`).
         gains: N m per ampere, one number for each joint.
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
             m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are assumed to

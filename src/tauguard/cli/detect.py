@@ -65,12 +65,13 @@ def command(
             "torque": ["tau1", "tau2"]}; a number instead of a name is the column's index from 0.
         model: a model file of `tauguard train` for this arm and the log's sample rate.
         payload: load that the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m),
-            for a model of `train --free` or no model; 0 for no load. Without it the load is
-            estimated from the motion, and until then only hard contacts are detected.
+            for a model of `train --free` or no model; 0 for no load. Without this flag
+            the load is estimated from the motion; until then only hard contacts are detected.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
         at_tool: all contacts are at the tool, which narrows the intervals of the forces.
         quiet: without --model, length of the log's beginning in which nothing touches the arm [s]
-            (default: 20). A collision in it raises the thresholds, and later ones may be missed.
+            (default: 20). A collision in this time raises the thresholds, so that later collisions
+            may be missed.
         gains: without --model, N m per ampere, one number for each joint (known for calibrated
             robot files and for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.

@@ -22,9 +22,9 @@ def command(
 ) -> None:
     """Show the content of a generated dataset; with --verify check all its bytes.
 
-    The exit code is 2 if --verify finds damaged, missing or foreign files or leaks between splits,
-    or if --episode gives other bytes. To repair damaged files, run the command that generated the
-    dataset again.
+    The exit code is 2 if --verify finds damaged, missing or foreign files or a motion in two
+    splits, or if --episode gives other bytes. To repair damaged files, run the command that
+    generated the dataset again.
 
     Args:
         folder: folder of the dataset.

@@ -40,10 +40,10 @@ def command(
 ) -> None:
     """Detect collisions of a running robot: free, collision or fault. Nothing is sent to the robot.
 
-    One of --ur, --play, --stdin and --ros names the source of the samples. The command ends after
-    --seconds, with Ctrl-C, or if the robot is disconnected for --reconnect seconds (exit code 3).
-    After 20 ms without a sample (or 2.5 sample intervals, if longer) the state is
-    `fault: no samples`.
+    One of --ur, --play, --stdin and --ros names the source of the samples. The command ends with
+    Ctrl-C, after --seconds, or if the robot is disconnected for --reconnect seconds (exit code 3).
+    After 20 ms without a sample (or 2.5 sample intervals, if longer) the state is `fault: no
+    samples`.
 
     Args:
         model: a model file of `tauguard train` for this arm and sample rate.

@@ -22,9 +22,9 @@ def command(
 ) -> None:
     """Convert an MCAP recording into an .rrd file that shows the moving arm and its signals.
 
-    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser. Of a
-    folder of MCAP recordings the newest one is converted. --web and --open use an existing .rrd of
-    PATH, unless --out, --robot or --whole is given.
+    With --web, an .rrd file or the folder of `evaluate --events` or `report` is shown in a browser.
+    Of a folder of MCAP recordings the newest one is converted. --web and --open use an existing
+    .rrd of PATH, unless --out, --robot or --whole is given.
 
     Args:
         path: an MCAP file written by tauguard, an .rrd file, or a folder of either.

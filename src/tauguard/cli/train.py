@@ -42,12 +42,12 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces, it is trained on labelled recordings, some of them with collisions. The threshold
-    comes from the collision-free recordings, each scored by a detector that was trained without it.
-    With --calibration, the threshold guarantees a rate of false alarms on motion like that in the
-    folder. With --free and --robot, the detector is trained on logs in which nothing touched a real
-    arm, with at least 10 s of motion, better two minutes. A printed card then states the torques
-    and forces that it can find, and the kinds of motion that the logs lack.
+    With --traces, the detector is trained on labelled recordings, some of them with collisions. The
+    threshold comes from the collision-free recordings, each scored by a detector that was trained
+    without it. With --calibration, the threshold guarantees a rate of false alarms on motion like
+    that in the folder. With --free and --robot, the detector is trained on logs in which nothing
+    touched a real arm, with at least 10 s of motion, better two minutes. A printed card then states
+    the torques and forces that the detector can find, and the kinds of motion that the logs lack.
 
     Args:
         traces: folder of MCAP recordings with truth, as from `tauguard simulate`, or a dataset
@@ -57,8 +57,8 @@ def command(
         calibration: folder of collision-free recordings that are not in --traces. Recordings with
             labelled collisions are refused; collisions without a label raise the threshold.
         false_alarms_per_hour: rate that the threshold aims at on motion like the training's
-            (default: 10), or guarantees with --calibration. With --free, training fails if the
-            detector's own logs show a higher rate.
+            (default: 10), or guarantees with --calibration. With --free, training fails if
+            cross-validation shows a higher rate.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
             the thresholds, so a log with far more alarms than the others is named and left out.
@@ -68,7 +68,7 @@ def command(
             contain its gains.
         columns: columns of CSV files, see `tauguard detect`.
         gains: N m per ampere, one number for each joint (known for calibrated robot files and for
-            ur10e).
+            the presets ur10e and ur5).
         payload: loads in the logs, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
@@ -79,8 +79,8 @@ def command(
             columns seem exchanged.
         arm: for a dataset with several arms, the arm of the detector.
         folds: with --traces, number of folds of the cross-validation that sets the threshold; each
-            fold is a further training (default: 3). 1 is quicker and keeps a third of the
-            recordings for the threshold.
+            fold needs one more training (default: 3). 1 is quicker, but only a third of the
+            recordings then set the threshold.
         reading: with --free, how logs are read.
     """
     _check_flags({name for name, value in locals().items() if value != DEFAULTS[name]})

@@ -51,8 +51,8 @@ def command(
         payload: loads that were carried, LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
         torque: the logs hold joint torques in N m instead of currents.
         judge: free logs of other programs, without a load, for the comparison. By default every
-            third log of LOGS is compared with a twin of the others, and the written twin is
-            identified from all.
+            third log of LOGS is compared with a twin from the other logs, and the written twin is
+            identified from all logs.
         accept: make a twin although a check fails. alarms: a log has bursts of torque like those of
             contacts. order: two joints' columns seem exchanged.
         figure: a PNG of real and simulated residuals with the results.
