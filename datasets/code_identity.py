@@ -5,25 +5,19 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.metadata
+from collections.abc import Iterator
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
 import numpy as np
 
-#: Sources that decide an episode's bytes. :func:`computed_bits` covers the native code.
-_PACKAGES = ("models", "envs")
-_FILES = {
-    "traces": ("trace.py", "severity.py"),
-    "datasets": (
-        "configuration.py",
-        "configuration_checks.py",
-        "plans.py",
-        "robots.py",
-        "schedule.py",
-        "shard.py",
-        "columns_of_shards.py",
-    ),
-}
+#: Folders and files whose sources decide an episode's bytes. :func:`computed_bits` covers the
+#: native code.
+_SOURCES = (
+    "models", "envs", "traces/trace.py", "traces/severity.py", "datasets/configuration.py",
+    "datasets/configuration_checks.py", "datasets/plans.py", "datasets/robots.py",
+    "datasets/schedule.py", "datasets/shard.py", "datasets/columns_of_shards.py",
+)  # fmt: skip
 _LIBRARIES = ("mujoco", "numpy", "pin", "pyarrow")
 
 
@@ -33,29 +27,35 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in ("tauguard", *_LIBRARIES)}
 
 
-@functools.cache
 def sources() -> str:
     """SHA-256 of the sources that decide an episode's bytes."""
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        _add_tree(digest, files(f"tauguard.{package}"), package)
-    for package, names in _FILES.items():
-        for name in names:
-            _add(digest, f"{package}/{name}", files(f"tauguard.{package}").joinpath(name))
-    return digest.hexdigest()
+    return _digest(_SOURCES)
 
 
 def detection_sources() -> tuple[str, str]:
     """SHA-256 of the simulation's sources, and of the detectors' sources."""
-    return sources(), tree_digest("detectors")
+    return sources(), _digest(("detectors",))
 
 
 @functools.cache
-def tree_digest(package: str) -> str:
-    """SHA-256 over the Python, TOML and XML sources of one folder of the package."""
+def _digest(places: tuple[str, ...]) -> str:
+    """SHA-256 over files, and over the Python, TOML and XML files of folders."""
     digest = hashlib.sha256()
-    _add_tree(digest, files(f"tauguard.{package}"), package)
+    for place in places:
+        for name, entry in _files(files("tauguard").joinpath(place), place):
+            content = entry.read_bytes()
+            digest.update(f"{name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
+
+
+def _files(entry: Traversable, name: str) -> Iterator[tuple[str, Traversable]]:
+    if entry.is_file():
+        yield name, entry
+        return
+    for inner in sorted(entry.iterdir(), key=lambda e: e.name):
+        folder = inner.is_dir() and inner.name not in ("__pycache__", "src", "dm")
+        if folder or inner.name.endswith((".py", ".toml", ".xml")):
+            yield from _files(inner, f"{name}/{inner.name}")
 
 
 @functools.cache
@@ -80,16 +80,3 @@ def code() -> str:
     """SHA-256 of :func:`versions`, :func:`sources` and :func:`computed_bits` together."""
     text = "\n".join([*(f"{k} {v}" for k, v in versions().items()), sources(), computed_bits()])
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _add_tree(digest: hashlib._Hash, folder: Traversable, name: str) -> None:
-    for entry in sorted(folder.iterdir(), key=lambda e: e.name):
-        if entry.is_dir() and entry.name not in ("__pycache__", "src", "dm"):
-            _add_tree(digest, entry, f"{name}/{entry.name}")
-        elif entry.name.endswith((".py", ".toml", ".xml")):
-            _add(digest, f"{name}/{entry.name}", entry)
-
-
-def _add(digest: hashlib._Hash, name: str, entry: Traversable) -> None:
-    text = entry.read_bytes()
-    digest.update(f"{name} {len(text)}\n".encode() + text)

@@ -57,8 +57,6 @@ class ShardTask:
 class Done:
     """Result of a task."""
 
-    split: str
-    number: int
     episodes: int
     seconds: float  #: simulated [s]
     kept: bool  #: the shard existed already and was intact
@@ -103,7 +101,7 @@ def make_shard(task: ShardTask) -> Done:
         for arm in {one.arm for one in episodes}:
             check_unchanged(arm, configuration.robots)
         _write(folder, task, configuration, episodes)
-    return Done(task.split, task.number, len(numbers), len(numbers) * split.seconds, kept)
+    return Done(len(numbers), len(numbers) * split.seconds, kept)
 
 
 def fault(folder: Path, split: str, number: int) -> str | None:

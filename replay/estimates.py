@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.traces.trace import Alarm
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Diagnosis
 
 #: An estimate is shown from its alarm on for at least this time [s].
 SHOWN = 0.5
@@ -16,36 +18,12 @@ SHOWN = 0.5
 ARROW, LONGEST_ARROW = 2e-3, 0.5
 
 
-class Explained(Protocol):
-    """The explanation of one alarm, such as ``tauguard.detectors.Diagnosis``."""
-
-    @property
-    def alarm(self) -> Alarm:
-        """The alarm that is explained."""
-
-    @property
-    def kind(self) -> str:
-        """One word for the cause of the alarm; "payload" means that there was no contact."""
-
-    @property
-    def summary(self) -> str:
-        """The explanation in one line of text."""
-
-    @property
-    def force(self) -> Array:
-        """Estimated force on the arm, in the world frame [N], shape (3,)."""
-
-    @property
-    def point(self) -> Array:
-        """Estimated point of contact, in the world frame [m], shape (3,)."""
-
-
-def during(explained: Sequence[Explained], frames: Array) -> list[Explained | None]:
+def during(explained: Sequence[Diagnosis], frames: Array) -> list[Diagnosis | None]:
     """The estimated contact at each frame time [s], or None.
 
     If several contacts overlap in time, the latest is taken. A payload change is not a contact.
     """
-    found: list[Explained | None] = [None] * len(frames)
+    found: list[Diagnosis | None] = [None] * len(frames)
     for one in sorted(explained, key=lambda e: e.alarm.start):
         if one.kind == "payload":
             continue
@@ -61,7 +39,7 @@ def arrow(force: Array) -> Array:
     return np.asarray(force / size * np.minimum(ARROW * size, LONGEST_ARROW))
 
 
-def arrows(shown: Sequence[Explained | None]) -> dict[str, Any]:
+def arrows(shown: Sequence[Diagnosis | None]) -> dict[str, Any]:
     """Arrows that end at the points: vectors, origins, labels, and the number at each frame.
 
     Args:

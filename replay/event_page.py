@@ -36,13 +36,14 @@ def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[st
 
     first, last = np.searchsorted(trace.t, [event.span[0] - 1e-9, event.span[1] + 1e-9])
     scores = held[first : max(last, first + 1)]
+    hit = event.collision
     load = None if trace.truth is None else float(trace.truth.payload[min(first, len(trace.t) - 1)])
     return {
         "kind": event.kind,
         "at [s]": f"{event.at:.2f}",
-        "collision": event.collision,
-        "link": "" if event.link is None else event.link,
-        "peak torque [N m]": "" if event.peak_torque is None else round(event.peak_torque, 1),
+        "collision": hit.kind if hit else "",
+        "link": hit.link if hit else "",
+        "peak torque [N m]": round(hit.peak_tau, 1) if hit else "",
         "delay [ms]": "" if event.delay is None else round(1e3 * event.delay),
         "largest score": float(f"{scores.max():.3g}") if np.isfinite(scores).any() else "",
         "threshold": float(f"{threshold:.3g}"),

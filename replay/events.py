@@ -36,21 +36,20 @@ class Event:
     kind: str  #: one of :data:`KINDS`
     at: float  #: onset of the collision, or start of the alarm [s]
     span: tuple[float, float]  #: window of its detection, or span of the false alarm [s]
-    collision: str = ""  #: its kind
-    link: int | None = None
-    peak_torque: float | None = None  #: [N m]
+    collision: Collision | None = None  #: None: a false alarm
     delay: float | None = None  #: [s]
     note: str = ""  #: further information
 
     @property
     def text(self) -> str:
         """The event in one line."""
-        if self.link is None:
+        one = self.collision
+        if one is None:
             what = f"False alarm at {self.at:.2f} s"
         else:
             found = "missed" if self.delay is None else f"found after {1e3 * self.delay:.0f} ms"
-            where = f"{self.collision} on link {self.link} at {self.at:.2f} s"
-            what = f"{where}, {self.peak_torque:.1f} N m: {found}"
+            where = f"{one.kind} on link {one.link} at {self.at:.2f} s"
+            what = f"{where}, {one.peak_tau:.1f} N m: {found}"
         return what[0].upper() + what[1:] + (f" ({self.note})" if self.note else "")
 
 
@@ -65,8 +64,7 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
             if kind == wanted:
                 up = [alarm for alarm in matching.false_alarms if _covers(alarm, c)]
                 note = f"an alarm was up from {_before(up[0], c)} s on" if up else ""
-                span = detection_window(c)
-                yield Event(kind, c.onset, span, c.kind, c.link, c.peak_tau, delay, note)
+                yield Event(kind, c.onset, detection_window(c), c, delay, note)
     for alarm in matching.false_alarms:
         hit = [c for c in matching.collisions if _covers(alarm, c)]
         note = f"still up at the {hit[0].kind} of {hit[0].onset:.2f} s" if hit else ""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
-from tauguard.replay.estimates import Explained, arrow, arrows, during
+from tauguard.replay.estimates import arrow, arrows, during
 from tauguard.replay.plot import SCORE_TOP
 from tauguard.replay.robot import Body, Motion, bodies, load_model, motion
 from tauguard.replay.story import cut, first_moment, page
 from tauguard.traces.trace import Detection, Trace
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Diagnosis
 
 TIMELINE = "time"
 FRAME_RATE = 60.0  # [Hz] rate of body poses
@@ -51,7 +54,7 @@ def write_rrd(
     model: Any = None,
     *,
     whole: bool = False,
-    explained: Sequence[Explained] = (),
+    explained: Sequence[Diagnosis] = (),
     about: str = "",
 ) -> None:
     """Write a recording that ``rerun FILE`` opens with its own layout.
@@ -276,7 +279,7 @@ def log_checked(recording: Any, trace: Trace, frames: NDArray[np.int64]) -> None
         log_marks(recording, f"{place}/normal", t, counts, line, **arrows)
 
 
-def log_explained(recording: Any, t: Array, explained: Sequence[Explained]) -> None:
+def log_explained(recording: Any, t: Array, explained: Sequence[Diagnosis]) -> None:
     """Show the estimated contacts as arrows at the frames' times ``t``, from the alarm on."""
     if explained:
         style = rr.Arrows3D.from_fields(radii=0.012, colors=BLUE, show_labels=True)

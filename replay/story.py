@@ -1,14 +1,18 @@
 """Guidance for the viewer of a recording: the first detection, and a page of text."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tauguard.detectors.events import detection_window
-from tauguard.replay.estimates import Explained
 from tauguard.traces import Alarm, Collision, Detection, Trace
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Diagnosis
 
 LISTED = 20  # collisions in the table of the page
 
@@ -59,7 +63,7 @@ def cut(
 
 
 def page(
-    trace: Trace, detection: Detection | None, explained: Sequence[Explained] = (), about: str = ""
+    trace: Trace, detection: Detection | None, explained: Sequence[Diagnosis] = (), about: str = ""
 ) -> str:
     """The text next to the views, in Markdown: the events, then an explanation of the views."""
     lines = [f"## {about}", ""] if about else []
@@ -98,7 +102,7 @@ def page(
 
 
 def collision_table(
-    trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()
+    trace: Trace, detection: Detection | None, explained: Sequence[Diagnosis] = ()
 ) -> list[str]:
     """Markdown rows of the collisions, with the time from onset to detection."""
     assert trace.truth is not None
@@ -131,7 +135,7 @@ def collision_table(
     return lines
 
 
-def alarms(detection: Detection | None, explained: Sequence[Explained] = ()) -> list[str]:
+def alarms(detection: Detection | None, explained: Sequence[Diagnosis] = ()) -> list[str]:
     """Markdown list of the alarms of a recording without truth."""
     if detection is None:
         return []

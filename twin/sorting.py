@@ -1,7 +1,8 @@
 """Check that all logs are of one arm with the given loads; other logs would distort a twin."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from tauguard.detectors.calibration.recording import Load, Recording
 #: some logs was not given.
 TWO = 2.0
 ROUNDS = 4
+Errors = Callable[[int, Sequence[int]], float]
 
 
 def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[int]:
@@ -31,7 +33,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         ValueError: the logs are of two arms or two loads; names the logs of each.
     """
     told = [k for k, r in enumerate(recordings) if r.load == Load()]
-    errors = _Errors(arm, [recordings[k] for k in told])
+    errors = _errors(arm, [recordings[k] for k in told])
     odd: list[int] = []
     while len(told) - len(odd) >= 3 and 3 * len(odd) < len(told):
         rest = [k for k in range(len(told)) if k not in odd]
@@ -51,28 +53,30 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
     return [told[k] for k in odd]
 
 
-class _Errors:
-    """Residual of a log with a calibration from other logs [N m]; inf if these are too short."""
+def _errors(arm: ArmModel, recordings: Sequence[Recording]) -> Errors:
+    """A function of a log and a group of logs: the log's residual with the group's calibration.
 
-    def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
-        self._recordings = recordings
-        self._calibrated = Subsets(replace(arm, friction=None), recordings)
-        self._known: dict[tuple[int, ...], ArmModel | None] = {}
+    It is in N m, and inf if the other logs of the group have too little motion.
+    """
+    calibrated = Subsets(replace(arm, friction=None), recordings)
 
-    def __call__(self, k: int, group: Sequence[int]) -> float:
-        own = tuple(sorted(set(group) - {k})) or (k,)
-        if own not in self._known:
-            try:
-                self._known[own] = self._calibrated(own)
-            except ValueError:  # too little motion
-                self._known[own] = None
-        arm = self._known[own]
-        if arm is None:
+    @cache
+    def arm_of(own: tuple[int, ...]) -> ArmModel | None:
+        try:
+            return calibrated(own)
+        except ValueError:  # too little motion
+            return None
+
+    def error(k: int, group: Sequence[int]) -> float:
+        found = arm_of(tuple(sorted(set(group) - {k})) or (k,))
+        if found is None:
             return np.inf
-        return float(np.linalg.norm(residual_rms(arm, self._recordings[k].trace)))
+        return float(np.linalg.norm(residual_rms(found, recordings[k].trace)))
+
+    return error
 
 
-def _two_sides(errors: _Errors, logs: Sequence[int]) -> Bools | None:
+def _two_sides(errors: Errors, logs: Sequence[int]) -> Bools | None:
     """Whether each log is of the second of two arms, shape (len(logs),); None: all are of one.
 
     As in k-means, each log is moved to the group whose other logs predict it better, in turn.
