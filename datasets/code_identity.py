@@ -14,7 +14,7 @@ import numpy as np
 #: Folders and files whose sources decide an episode's bytes. :func:`computed_bits` covers the
 #: native code.
 _SOURCES = (
-    "models", "envs", "traces/trace.py", "traces/severity.py", "datasets/configuration.py",
+    "models", "envs", "traces/trace.py", "datasets/configuration.py",
     "datasets/configuration_checks.py", "datasets/plans.py", "datasets/robots.py",
     "datasets/schedule.py", "datasets/shard.py", "datasets/columns_of_shards.py",
 )  # fmt: skip

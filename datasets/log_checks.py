@@ -4,7 +4,7 @@ A fault that a detector tolerates gives a note. A fault that would change the me
 is an error that names the row.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ FEW = 5
 #: Rows that repeat the previous state are left out if they are at least this fraction of all rows:
 #: the recorder is then faster than its robot. A standing arm repeats some values by chance.
 REPEATED = 0.2
+#: Names, in lower case, of columns that label contact if all their cells are in LABEL.
+LABELS = ("label", "contact", "collision", "touch", "in_contact", "in_collision")
+LABEL = {"0": False, "false": False, "1": True, "true": True}
 
 Where = Callable[[int], str]
 
@@ -223,3 +226,31 @@ def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> 
         f"come every {1e3 * usual:.3g} ms"
     )
     return kept
+
+
+def labelled(
+    header: Sequence[str],
+    rows: Sequence[tuple[int, list[str]]],
+    lines: NDArray[np.int64],
+    t: Array,
+) -> tuple[tuple[float, float], ...] | None:
+    """Times of the contacts that a label column of a log states.
+
+    Args:
+        header: names of the columns.
+        rows: lines of the file, each with its cells.
+        lines: line of each sample, shape (T,).
+        t: time of each sample [s], shape (T,).
+
+    Returns:
+        Times of the first and last sample of each contact; None without a column in LABELS whose
+        values are all 0 and 1, or false and true.
+    """
+    columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
+    cells = dict(rows) if columns else {}
+    for column in columns:
+        marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
+        if None in marks:
+            continue
+        return tuple((float(t[a]), float(t[b - 1])) for a, b in runs(np.array(marks)))
+    return None

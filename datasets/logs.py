@@ -21,8 +21,7 @@ from tauguard.datasets.columns import (
     presets_of,
     presets_of_width,
 )
-from tauguard.datasets.labels import labelled
-from tauguard.datasets.log_checks import checked, fresh, increasing, refuse_set_back
+from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
 from tauguard.datasets.recognition import described, in_units_of, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading

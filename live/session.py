@@ -63,9 +63,8 @@ class Session:
     _silence: Silence | None = None  #: the present silence
     _now: float = np.nan  #: latest robot's time that differed from the one before [s]
     _told: int = 0  #: this machine's clock when that time arrived [ns]
-    _at: float = (
-        np.nan
-    )  #: robot's time of the last sample, extrapolated while its stamps repeat [s]
+    _at: float = np.nan
+    """Robot's time of the last sample, extrapolated while its stamps repeat [s]."""
 
     def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
         """Record one sample.

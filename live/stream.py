@@ -1,7 +1,6 @@
 """The interface of every robot stream: one sample at a time, read-only."""
 
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Protocol, Self
 
 from tauguard.arrays import Array
@@ -81,11 +80,6 @@ class Closing:
         """Return this object."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close this object."""
         self.close()

@@ -54,6 +54,13 @@ def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:
     return row.get("study"), [key for key in row if key != "study"]
 
 
+def two_digits(value: float) -> str:
+    """Two significant digits, four decimals at most: ``120``, ``4.9``, ``0.03``."""
+    return np.format_float_positional(
+        round(value, 4), precision=2, unique=False, fractional=False, trim="-"
+    )
+
+
 def cell(value: object, brief: bool = False) -> str:
     """A value with three digits; a rate or a time as ``value [low, high]``, unless ``brief``.
 

@@ -8,8 +8,17 @@ if TYPE_CHECKING:
     from tauguard.traces.contacts import CheckedContacts
     from tauguard.traces.mcap import read_mcap, write_mcap
     from tauguard.traces.resample import resampled
-    from tauguard.traces.severity import STRATA, stratum
-    from tauguard.traces.trace import KINDS, TARGETS, Alarm, Collision, Detection, Trace, Truth
+    from tauguard.traces.trace import (
+        KINDS,
+        STRATA,
+        TARGETS,
+        Alarm,
+        Collision,
+        Detection,
+        Trace,
+        Truth,
+        stratum,
+    )
 
 __all__ = [
     "KINDS", "STRATA", "TARGETS", "Alarm", "CheckedContacts", "Collision", "Detection", "Trace",

@@ -14,6 +14,8 @@ from tauguard.traces.contacts import CheckedContacts
 KINDS = ("strike", "clamp", "pulse")
 #: Fields of a trace with commands, which may be missing.
 COMMANDED = ("q_des", "qd_des", "qdd_des")
+#: Severity strata: intervals [low, high) of the peak ``|tau_ext|`` over joints 1-4 [N m].
+STRATA = ((4.0, 8.0), (8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, 128.0))
 #: Joints of every UR arm by the names of UR's own ROS driver.
 UR_JOINTS = (
     "shoulder_pan_joint",
@@ -26,6 +28,16 @@ UR_JOINTS = (
 #: Attachment of an environment's recording: JSON rows of a time [s] and the target of each tool
 #: from this time on [m].
 TARGETS = "targets.json"
+
+
+def stratum(peak_tau: float) -> str:
+    """Name of the severity stratum of ``peak_tau`` [N m]."""
+    if peak_tau < STRATA[0][0]:
+        return f"0-{STRATA[0][0]:g}"
+    for low, high in STRATA:
+        if low <= peak_tau < high:
+            return f"{low:g}-{high:g}"
+    return f"{STRATA[-1][1]:g}-"
 
 
 @dataclass(frozen=True)

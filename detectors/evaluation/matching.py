@@ -17,8 +17,7 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.events import CASE_SECONDS, Interval, detection_window, occupied
 from tauguard.report import poisson_rate
 from tauguard.report import rate as wilson
-from tauguard.traces.severity import STRATA, stratum
-from tauguard.traces.trace import Alarm, Collision, Detection, Trace
+from tauguard.traces.trace import STRATA, Alarm, Collision, Detection, Trace, stratum
 
 
 @dataclass(frozen=True)
