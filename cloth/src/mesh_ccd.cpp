@@ -20,7 +20,7 @@ constexpr double worn = 2;
 // (measured on meshes of 20,000 to 90,000 triangles: equal between 0.28 and 0.34). Features at rest
 // count: their second interval costs as much and saves less.
 constexpr double fast = 0.28;
-constexpr std::size_t sampled = 1024;  // number of vertices, and of edges, over which it is taken
+constexpr std::size_t sampled = 1024;  // number of vertices, and of edges, in these means
 // The limit on leaf pairs of a step is this many times the limit on collisions.
 constexpr std::size_t leaf_pairs = 8;
 

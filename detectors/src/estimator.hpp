@@ -231,7 +231,7 @@ class Estimator {
       tau_[j] = tau - (viscous + coulomb + other);
       plain_tau_[j] = tau_[j];
       if (basis_.modelled && load != 0.0) {
-        double grows = 0.0;  // load-dependent friction; the plain one has no payload
+        double grows = 0.0;  // load-dependent friction; without the payload in plain_tau_
         for (std::size_t c = basis_.loaded_at(); c < smooth; ++c) grows += w[c] * column_[c];
         plain_tau_[j] += grows * (1.0 - std::fabs(beta_[j] / load));
       }
@@ -241,8 +241,8 @@ class Estimator {
     }
   }
 
-  // Torque of arm and estimated payload at joint j without accelerations. theta of a payload that
-  // the model does not contain is negative, as its residual is.
+  // Torque of arm and estimated payload at joint j without accelerations. A payload that the model
+  // does not contain causes a negative residual, so theta is minus the payload.
   double carried(std::size_t j) const {
     double sum = beta_[j];
     if (adapts_)
@@ -335,7 +335,7 @@ class Estimator {
   Chain carrying_;                                      // the arm with the estimated payload
   std::vector<double> mass_, inertia_, change_, acceleration_;
   double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0, change_decay_ = 0.0;
-  double since_ = 0.0;  // last correction [s]
+  double since_ = 0.0;  // time since the last correction [s]
   bool started_ = false;
 };
 

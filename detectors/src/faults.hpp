@@ -39,8 +39,8 @@ struct Usual {
   std::vector<double> current;  // largest |current| [A]
   double fraction = 0;          // allowed |dq - sum qd dt| of a window, relative to |sum qd dt|
   double step_fraction = 0;     // allowed |dq - qd dt| of one sample, relative to |qd dt|
-  std::vector<double> step;     // allowed |dq - qd dt| of one sample beyond that [rad]
-  std::vector<double> drift;    // allowed |dq - sum qd dt| of a window beyond that [rad]
+  std::vector<double> step;     // allowed in addition to `step_fraction` [rad]
+  std::vector<double> drift;    // allowed in addition to `fraction` [rad]
   std::vector<std::int64_t>
       stuck;  // allowed number of successive samples without a change of the current
 };

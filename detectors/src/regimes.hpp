@@ -2,9 +2,9 @@
 // regime the signal that is judged and its largest value without a contact, the bound.
 //
 // At rest, static friction can hold any torque. The signal is therefore the residual minus a
-// baseline that follows it. Motion of one joint changes the torques of the joints at rest, by the
-// integral action of their controllers and by changing loads. It raises their bound, fully from
-// `full_speed` on, and decays within about a second.
+// baseline that follows the residual. Motion of one joint changes the torques of the joints at
+// rest, by the integral action of their controllers and by changing loads. Motion therefore raises
+// the bound at rest, fully from `full_speed` on. This addition decays within about a second.
 //
 // A contact with a standing arm lasts from its beginning to its release. Meanwhile the signal of
 // all joints that stood is the residual minus its level before the contact. The contact is released
@@ -60,13 +60,13 @@ class Regimes {
   static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
-  static constexpr double after = 1.0;       // only change away counts, after a contact [s]
+  static constexpr double after = 1.0;       // time after a contact: only change away counts [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`
   static constexpr double farthest = 3.0;    // largest addition, in units of `beyond`
   static constexpr double released = 0.5;    // a contact ends below this fraction of its peak
   static constexpr double kept = 1.0;        // time without a change that can end a contact [s]
-  static constexpr double remembers = 10.0;  // after such an end, a release is no contact [s]
+  static constexpr double remembers = 10.0;  // time after such an end: a release is no contact [s]
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation times [s]
   static constexpr double forget = 1.05;  // factor per sample on the stored shortest interval
   static constexpr int samples = 3;       // least number of samples of the confirmation
@@ -152,7 +152,8 @@ class Regimes {
 
  private:
   struct Joint {
-    double slow_for = 10.0, quick_for = 0.0, moved = 0.0;  // [s]
+    // Time at rest or yielding, time above the speed `slow`, and time in motion until now [s].
+    double slow_for = 10.0, quick_for = 0.0, moved = 0.0;
     double base = 0.0, before = 0.0;  // baseline of the residual, and a slower baseline [N m]
     double home = 0.0;                // `before` at the beginning of a contact [N m]
     double most = 0.0;                // largest change from `home` in the contact [N m]

@@ -20,7 +20,7 @@ struct TorqueBounds {
   double rate = 20;             // rate of the observer [1/s]
   double fast = 0.5;            // time constant of the fast average [s]
   double slow = 4.0;            // time constant of the slow average [s]
-  double heard = 8.0;           // least RMS of `needed` for a ratio, as a multiple of the noise
+  double heard = 8.0;           // least RMS of `needed` to judge a ratio, in units of the noise
   std::vector<double> opposed;  // least fast ratio, n
   std::vector<double> least;    // least slow ratio, n
   std::vector<double> most;     // largest slow ratio, n

@@ -9,8 +9,9 @@ namespace tauguard::detectors {
 
 class VelocityFusion {
  public:
-  static constexpr std::size_t gain_numbers =
-      6;  // a joint: of position, velocity, acceleration by each innovation
+  // Gains of a joint: corrections of position, velocity and acceleration per unit of the two
+  // innovations (position and velocity).
+  static constexpr std::size_t gain_numbers = 6;
 
   VelocityFusion() = default;
   VelocityFusion(std::vector<double> gains, std::size_t joints)
