@@ -211,6 +211,12 @@ def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     assert "note: the training logs do not show" in out
     assert "moving alone: all joints" in out
     assert "starting: c; slow (below 0.1 rad/s): c;" in out
+    target = folder / "held.xml"
+    main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", str(target)])
+    out = capsys.readouterr().out
+    own = {line[0]: line.split() for line in out.splitlines() if line[:3] in ("b  ", "c  ")}
+    assert own["c"][-3:] == ["-", "-", "-"]
+    assert "-" not in own["b"]
     (note,) = arm_logs.not_shown([held_joint(0), record(0)])
     assert note.startswith("the logs do not show standing for 2 s: a, b;")
 

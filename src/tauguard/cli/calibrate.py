@@ -69,6 +69,7 @@ def command(
     from tauguard.cli.free_logs import free_logs, hold_to
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.evaluation.acceptance import check_held_out
+    from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
     from tauguard.detectors.features.motion_regimes import exceeded
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
@@ -87,6 +88,7 @@ def command(
     result = summary(names, found, held, target) | {"scale": given.source}
     speeds = [(one.trace.t, np.abs(one.trace.qd)) for one in recordings]
     result["speed_rad_s"] = exceeded(speeds).tolist()
+    result["moves"] = (motion_seconds(recordings) >= SHOWN_SECONDS).tolist()
     report(result, found)
     if json is not None:
         write_json(json, result)
@@ -150,7 +152,7 @@ def summary(names: list[str], found: Identified, held: list[Array], target: Path
 
 
 def report(result: dict[str, Any], found: Identified) -> None:
-    """Print the results."""
+    """Print the results; of a joint that moves in no log, only the gain and the mass."""
     from tauguard.cli.help_text import print_notes
     from tauguard.report import table
 
@@ -159,15 +161,18 @@ def report(result: dict[str, Any], found: Identified) -> None:
     rows = []
     for k, name in enumerate(result["joints"]):
         spread = result["gain_relative_sd"][k]
+        moved = {
+            "rotor kg m2": f"{result['armature'][k]:.3f}",
+            "rms N m": f"{result['rms_nm'][k]:.2f}",
+            "up to rad/s": f"{result['speed_rad_s'][k]:.2f}",
+        }
         rows.append(
             {
                 "joint": name,
                 "gain N m/A": f"{result['drive_gain'][k]:.2f}",
                 "+-": f"{100 * spread:.0f} %" if spread else held,
                 "mass kg": f"{result['mass'][k]:.2f}",
-                "rotor kg m2": f"{result['armature'][k]:.3f}",
-                "rms N m": f"{result['rms_nm'][k]:.2f}",
-                "up to rad/s": f"{result['speed_rad_s'][k]:.2f}",
+                **(moved if result["moves"][k] else dict.fromkeys(moved, "-")),
             }
         )
     print(table(rows))
