@@ -27,6 +27,10 @@
 // it, the duration is longer, because ripple and jerks exceed a bound for longer than noise at
 // rest. Time counts more from a ratio of 2 on, and twice from 3 on, so that an impact of some tens
 // of ms is confirmed. A gap between samples counts as one sample.
+//
+// A robot's protective stop ends a contact within 30 to 80 ms, before the duration is reached. So
+// if the arm brakes to standstill at once, a joint is confirmed whose signal was near its bound for
+// three samples before the arm began to brake. What comes later may be due to the braking.
 #pragma once
 
 #include <algorithm>
@@ -70,6 +74,10 @@ class Regimes {
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation times [s]
   static constexpr double forget = 1.05;  // factor per sample on the stored shortest interval
   static constexpr int samples = 3;       // least number of samples of the confirmation
+  static constexpr double near = 0.8;     // ratio before a stop that the stop confirms
+  static constexpr double recent = 0.25;  // longest time from such a ratio to the stop [s]
+  static constexpr double brakes = 0.2;   // time constant with which a speed is forgotten [s]
+  static constexpr double braking = 0.9, stopped = 0.2;  // fractions of the speed before
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), joints_(of_.rest.size()) {
     reset();
@@ -79,6 +87,8 @@ class Regimes {
     std::fill(joints_.begin(), joints_.end(), Joint{});
     touched_ = false;
     peak_ = still_ = 0.0;
+    fastest_ = before_ = 0.0;
+    near_for_ = recent;
     stirred_ = usual_ = 1.0;
     age_ = unknown_for_ = 0.0;
     elsewhere_ = false;
@@ -108,6 +118,9 @@ class Regimes {
       if (unknown && !stands) unknown_for_ = settles;
       elsewhere_ = elsewhere_ || away;
     }
+    fastest_ = fastest;
+    before_ = std::max(fastest, before_ * std::exp(-dt / brakes));
+    near_for_ += dt;
     unknown_for_ = std::max(0.0, unknown_for_ - dt);
     stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
     usual_ = std::min(dt, forget * usual_);
@@ -137,7 +150,9 @@ class Regimes {
         bound[j] = moving(j, qd[j], qdd[j], hardest) + spread[j];
       }
       const bool judged = unknown_for_ <= 0.0 && (one.rest || !elsewhere_);
-      ratio[j] = confirmed(one, judged ? std::fabs(signal) / bound[j] : 0.0, dt);
+      ratio[j] = judged ? std::fabs(signal) / bound[j] : 0.0;
+      approach(j, ratio[j]);
+      ratio[j] = confirmed(one, ratio[j], dt);
       if (one.rest && !one.held && ratio[j] > 1.0) begins = true;
     }
     if (unknown_for_ > 0.0) {
@@ -148,6 +163,9 @@ class Regimes {
     }
     if (begins) begin(bound);
     if (touched_) hold(residual, dt, ratio, bound);
+    const bool stops = before_ > full_speed && fastest_ < stopped * before_;
+    if (stops && near_for_ < recent && !joints_[nearest_].rest)
+      ratio[nearest_] = std::max(ratio[nearest_], std::nextafter(1.0, 2.0));
   }
 
  private:
@@ -162,6 +180,7 @@ class Regimes {
     double own = 0.0;                 // fraction of `turned` that is added to the bound
     double above = 0.0;               // weighted time above the bound [s]
     int count = 0;                    // number of successive samples above the bound
+    int close = 0;                    // and above `near` times the bound, in motion
     bool rest = false, held = false;  // held: takes part in a contact
   };
 
@@ -174,6 +193,15 @@ class Regimes {
                         harder * std::max(std::fabs(qdd) / of_.hard[j] - 1.0, 0.0);
     return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-joints_[j].moved / starts) +
            of_.beyond[j] * std::min(more, farthest);
+  }
+
+  // Remembers a joint in motion that is near its bound before the arm brakes.
+  void approach(std::size_t j, double ratio) {
+    Joint& one = joints_[j];
+    one.close = !one.rest && ratio > near ? one.close + 1 : 0;
+    if (one.close < samples || fastest_ < braking * before_) return;
+    near_for_ = 0.0;
+    nearest_ = j;
   }
 
   double confirmed(Joint& one, double ratio, double dt) const {
@@ -255,9 +283,12 @@ class Regimes {
 
   RegimeBounds of_;
   std::vector<Joint> joints_;
-  bool touched_ = false;                // whether there is a contact with joints at rest
-  std::size_t lead_ = 0;                // joint with the largest ratio in the contact
-  double peak_ = 0.0, still_ = 0.0;     // that ratio; time without a change [s]
+  bool touched_ = false;                 // whether there is a contact with joints at rest
+  std::size_t lead_ = 0;                 // joint with the largest ratio in the contact
+  double peak_ = 0.0, still_ = 0.0;      // that ratio; time without a change [s]
+  double fastest_ = 0.0, before_ = 0.0;  // speed of the fastest joint, now and recently [rad/s]
+  double near_for_ = recent;             // time since a joint in motion was near its bound [s]
+  std::size_t nearest_ = 0;              // this joint
   double stirred_ = 1.0, usual_ = 1.0;  // recent motion in [0, 1]; sample interval without gaps [s]
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]

@@ -38,13 +38,13 @@ def true_model(load=0.0, centre=(0.3, 0.0, 0.05)):
     return model
 
 
-def record(seed, seconds=25.0, load=0.0, dt=0.01, noise=0.01, dwell=(8.0, 10.0)):
-    """One log: sums of sines with a dwell in the middle; current noise in A."""
+def record(seed, seconds=25.0, load=0.0, dt=0.01, noise=0.01, dwell=(8.0, 10.0), ramp=0.5):
+    """One log: sums of sines with a dwell in the middle; current noise in A, stops of `ramp` s."""
     rng = np.random.default_rng(seed)
     t = np.arange(0, seconds, dt)
     # A warped clock that stops in the dwell.
     rate = np.where((t > dwell[0]) & (t < dwell[1]), 0.0, 1.0)
-    half = round(0.25 / dt)
+    half = round(ramp / 2 / dt)
     window = np.ones(2 * half + 1) / (2 * half + 1)
     rate = np.convolve(np.pad(rate, half, mode="edge"), window, mode="valid")
     s = np.cumsum(rate) * dt

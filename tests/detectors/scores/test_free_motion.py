@@ -253,6 +253,23 @@ def test_a_blow_counts_once_it_lasts_and_a_gap_confirms_nothing(alarm):
     assert (stretched[first : first + 2] == 1.0).all()
 
 
+def test_a_stop_confirms_the_short_contact_before_it_and_is_none(fitted):
+    """80 ms against the fastest joint, 1.35 times its bound, then a stop within 0.15 s."""
+    detector, through = fitted.carrying(Load()), record(8, dwell=(99.0, 100.0))
+    bound, found = detector.judge(through).bound, []
+    for stop in np.arange(5.0, 20.0, 1.0):
+        stopping, k = record(8, dwell=(stop, stop + 3.0), ramp=0.15), round(100 * (stop - 0.1))
+        speed = stopping.qd[k] * (np.abs(stopping.qd[k]) == np.abs(stopping.qd[k]).max())
+        if np.abs(speed).max() > 0.3:
+            against = tuple(-1.35 * np.sign(speed) * bound[k])
+            contact = Added(stop - 0.14, 0.08, against, "push")
+            logs = stopping, *(add_contact(log, GAIN, contact) for log in (through, stopping))
+            found.append([(detector.scores(log)[k - 8 : k + 60] > 1).any() for log in logs])
+    assert len(found) > 8
+    assert np.mean(found, axis=0)[:2].tolist() == [0, 0]
+    assert np.mean(found, axis=0)[2] >= 0.9
+
+
 def test_few_seconds_leave_the_friction_level_unsure(fitted):
     logs = [Recording(record(seed)) for seed in range(3)]
     short = [Recording(record(0, seconds=12.0))]
