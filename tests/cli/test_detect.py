@@ -101,7 +101,7 @@ def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):
         (("--gains", "8", "5", "--columns", "ur10e"), "line 1: 7 columns, expected 31"),
         (("--gains", "8", "5", "--robot", "no.urdf"), "no.urdf: no such robot file"),
         (("--gains", "8000", "5000"), "milliamperes?"),
-        (("--gains", "-8", "-5"), "pull with gravity"),
+        (("--gains", "-8", "-5"), "seem to have the opposite sign"),
         (
             ("--model", "m.json", "--quiet", "5", "--gains", "8", "5"),
             "--quiet and --gains cannot be combined",
