@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -107,32 +108,9 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
     """
     from tauguard.detectors.events import MERGE_GAP, WINDOW
 
+    begin, time = "beginning", "confirmation time"
+    if alarm is not None:
+        begin, time = f"first {alarm.settle:.3g} s", f"last {1e3 * alarm.confirmation:.3g} ms"
+    text = files("tauguard.replay").joinpath("event_terms.html").read_text()
     ms = f"{1e3 * late:.0f} ms"
-    begin = "beginning" if alarm is None else f"first {alarm.settle:.3g} s"
-    time = "confirmation time" if alarm is None else f"last {1e3 * alarm.confirmation:.3g} ms"
-    return _words(
-        {
-            "onset": "of a collision: the first sample whose contact force on the arm is above "
-            f"0 N. Contacts less than {MERGE_GAP} s apart on one link are one collision.",
-            "window": f"from the onset until {WINDOW} s after it; of a clamp, until it ends.",
-            "alarm": f"the score has been above the threshold throughout the {time}. Alarms "
-            f" less than {MERGE_GAP} s apart are one.",
-            "missed": "no alarm starts in the collision's window, or one was active before.",
-            "late": f"the first alarm in the window starts more than {ms} after the onset; "
-            "delay: how long after.",
-            "false alarm": "an alarm that starts in no collision's window.",
-            "largest score": f"largest value that the score kept throughout the {time}, in the "
-            "collision's window or during the false alarm.",
-            "peak torque": "largest external torque of the collision over joints 1 to 4.",
-            "speed": "planned, in percent of the joints' largest.",
-            "payload": "mass carried at the event; it is not given to the detector.",
-            "recording": "the file, or SPLIT/NUMBER of a dataset as tauguard inspect --episode "
-            "takes it. A number alone is a test motion's. Numbers count from 0.",
-            "not counted": f"events in a recording's {begin}, in which the detector starts up.",
-        }.items()
-    )
-
-
-def _words(pairs: Iterable[tuple[str, str]]) -> str:
-    rows = "".join(f"<tr><th>{escape(w)}</th><td>{escape(what)}</td></tr>" for w, what in pairs)
-    return f'<div class="wide"><table>{rows}</table></div>'
+    return text.format(gap=MERGE_GAP, window=WINDOW, late=ms, begin=begin, time=time)
