@@ -72,7 +72,8 @@ def kalman(arm: ArmModel, trace: Trace, tau: Array) -> Array:
     Its steady gains for a joint are those of an alpha-beta filter (Kalata 1984).
     """
     p, beta = momentum_terms(arm.robot, trace.q, trace.qd)
-    index = (RATE * trace.dt) ** 2
+    dt = trace.dt  # a median: once, not for every sample
+    index = (RATE * dt) ** 2
     root = (4 + index - np.sqrt(8 * index + index**2)) / 4
     alpha = 1 - root**2
     slope = 2 * (2 - alpha) - 4 * np.sqrt(1 - alpha)
@@ -81,7 +82,7 @@ def kalman(arm: ArmModel, trace: Trace, tau: Array) -> Array:
         step = trace.t[k] - trace.t[k - 1]
         found = found + step * (tau[k - 1] + beta[k - 1] + d)
         error = p[k] - found
-        found, d = found + alpha * error, d + slope / trace.dt * error
+        found, d = found + alpha * error, d + slope / dt * error
         out[k] = d
     return out
 
