@@ -72,8 +72,7 @@ def kalman(arm: ArmModel, trace: Trace, tau: Array) -> Array:
     Its steady gains for a joint are those of an alpha-beta filter (Kalata 1984).
     """
     p, beta = momentum_terms(arm.robot, trace.q, trace.qd)
-    dt = trace.dt  # a median: once, not for every sample
-    index = (RATE * dt) ** 2
+    dt, index = trace.dt, (RATE * trace.dt) ** 2  # a median: once, not for every sample
     root = (4 + index - np.sqrt(8 * index + index**2)) / 4
     alpha = 1 - root**2
     slope = 2 * (2 - alpha) - 4 * np.sqrt(1 - alpha)
