@@ -3,8 +3,8 @@ Newtons against limits
 ======================
 
 How fast may an arm be when it meets a person? ISO/TS 15066 limits the force on each region of the
-body and predicts it from two masses and a spring. The effective mass of the arm depends on its pose
-and on the direction of the impact.
+body and predicts the force from two masses and a spring. The effective mass of the arm depends on
+its pose and on the direction of the impact.
 """
 
 import matplotlib.pyplot as plt

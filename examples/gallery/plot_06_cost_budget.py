@@ -2,8 +2,9 @@
 A policy under a cost budget
 ============================
 
-The cost of a step is the impulse of the arm beyond the limits of the body regions. A controller
-that slows down near people has less cost, but reaches fewer targets. What is the trade-off?
+The cost of a step is the impulse of the arm's forces above the limits of the body regions. A
+controller that slows down near people has less cost, but reaches fewer targets. What is the
+trade-off?
 """
 
 import gymnasium as gym

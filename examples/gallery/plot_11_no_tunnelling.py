@@ -3,7 +3,8 @@ A step that does not tunnel
 ===========================
 
 A ball at 50 m/s moves 25 cm in a step of 5 ms and the cloth is 2 mm thick. MuJoCo looks for
-contacts at the end of a step, so the ball passes through. The guarded step stops it and says where.
+contacts at one time per step, so the ball passes through the cloth. The guarded step stops the ball
+and reports the contact.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Time of impact of two meshes
 ============================
 
-Two surfaces move and turn. When do they touch first? The computed time is never late: before it the
-surfaces do not meet.
+Two surfaces move and turn. When do they touch first? The computed time is never late: the surfaces
+do not meet before this time.
 """
 
 import matplotlib.pyplot as plt
