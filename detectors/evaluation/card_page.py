@@ -91,8 +91,10 @@ def _wrapped(line: str) -> list[str]:
 
 
 def _lines(card: ThresholdCard) -> list[str]:
+    assumed = any(_torque(card, "standing", j)[0] == "(" for j in range(len(card.joints)))
     lines = [
-        "force found at the tool: in half (in 95 %) of all poses and directions",
+        "force found at the tool: in half (in 95 %) of all poses and directions"
+        + ("; standing: if the torques in brackets hold" if assumed else ""),
         *(
             f"  {half.rjust(4)} ({most})".ljust(18) + f" {said}"
             for name, said in TOOL.items()
@@ -193,7 +195,10 @@ def draw(target: Path, card: ThresholdCard) -> None:
     place = np.arange(len(card.joints))
     for k, (name, (level, _)) in enumerate(COLUMNS.items()):
         drawn = bars.bar(place + 0.2 * (k - 1.5), getattr(card, level), 0.2, label=name)
-        bars.bar_label(drawn, fmt="%.1f", fontsize=6, padding=1)
+        said = [_torque(card, name, j) for j in place.tolist()]
+        bars.bar_label(drawn, said, fontsize=6, padding=1)
+        for bar, one in zip(drawn, said, strict=True):
+            bar.set_alpha(0.3 if one[0] == "(" else 1.0)  # not from these logs
     bars.set_xticks(place, card.joints, rotation=20, ha="right")
     bars.set_ylabel("torque that is found [N m]")
     bars.spines[["top", "right"]].set_visible(False)

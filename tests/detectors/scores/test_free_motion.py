@@ -353,6 +353,10 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert (card.fast == fitted.bound.fast).all()
     said = " ".join(text(replace(card, fast=fast, twice=np.array([7.4, 8.0, 9.6]))).split())
     assert "of the logs (a 0.51, c 2 rad/s); at twice these from 7, 10 N m" in said
+    assumed = "standing: if the torques in brackets hold" in said
+    assert assumed == any(joint in card.unseen["standing for 2 s"] for joint in card.joints)
+    still = text(replace(card, unseen={}))
+    assert "in brackets" not in still
     assert card.franka == {}  # libfranka speaks to arms of seven joints
     seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
