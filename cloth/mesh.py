@@ -190,7 +190,8 @@ class MeshCCD:
         """Candidates of the broad phase.
 
         The two features of a candidate have overlapping volumes, no common vertex, and groups that
-        are to be tested.
+        are to be tested. Some bounds have 16 bits, so that volumes can also be apart by up to
+        1.5e-4 of the mesh's extent.
 
         Args:
             x_t0: As for :meth:`find`.

@@ -39,16 +39,15 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t*
   out.size = (pair - out.pairs.data()) / 2;
 }
 
-}  // namespace
-
-void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
-                     const Groups& groups, const Isolated& isolated, CandidateBlock& out) {
-  static const OverlapKernels& kernels = overlap_kernels();
+template <class Bound>
+void leaf_candidates_in(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
+                        const Groups& groups, const Isolated& isolated, CandidateBlock& out) {
+  static const OverlapKernels<Bound>& kernels = overlap_kernels<Bound>();
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
-  LeafLanes left = a.lanes_of(leaves.a);
-  const LeafLanes right = b.lanes_of(leaves.b);
+  LeafLanes<Bound> left = a.lanes_of<Bound>(leaves.a);
+  const LeafLanes<Bound> right = b.lanes_of<Bound>(leaves.b);
   if (!same)  // the first three axes reject nearly all rows that can be rejected
-    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3,
+    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block,
                                           a.times(), left.occupied);
   Overlaps found;
   kernels.leaf_pair(left, right, a.axes(), a.times(), same, found);
@@ -58,6 +57,14 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
                                                       : emit<1, 3, false>;
   write(a.ids(leaves.a), left.vertices, b.ids(leaves.b), right.vertices, found, groups, isolated,
         out);
+}
+
+}  // namespace
+
+void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
+                     const Groups& groups, const Isolated& isolated, CandidateBlock& out) {
+  a.is_short() ? leaf_candidates_in<std::int16_t>(a, b, leaves, groups, isolated, out)
+               : leaf_candidates_in<float>(a, b, leaves, groups, isolated, out);
 }
 
 }  // namespace tauguard::cloth

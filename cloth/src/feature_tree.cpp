@@ -165,8 +165,8 @@ Row<slots> other_end(const Row<slots>& row) {
 }
 
 // Writes the lower or upper bounds of 16 volumes into a block, 4 x 4 at a time.
-template <int slots>
-void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
+template <int slots, class Bound>
+void write_lanes(const Row<slots>* rows, int axes, int times, Bound* block) {
   for (int r = 0; r < times * slots; r += 4) {
     const int t = r / slots;
     for (int lane = 0; lane < lanes; lane += 4) {
@@ -182,9 +182,7 @@ void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
           __builtin_shufflevector(later_ab, later_cd, 2, 3, 6, 7)};
       for (int j = 0; j < 4; ++j) {
         const int axis = r % slots + j;
-        if (axis < axes)
-          std::memcpy(block + (axis * times + t) * 2 * lanes + lane, columns + j,
-                      sizeof columns[j]);
+        if (axis < axes) convert(columns[j], block + (axis * times + t) * 2 * lanes + lane);
       }
     }
   }
@@ -225,9 +223,12 @@ void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
     low[lane] = least;
     high[lane] = most;
   }
-  float* out = blocks_.data() + leaf * block_stride();
-  write_lanes(low, axes_, times_, out);
-  write_lanes(high, axes_, times_, out + lanes);
+  const auto write = [&](auto* out) {
+    out += leaf * block_stride();
+    write_lanes(low, axes_, times_, out);
+    write_lanes(high, axes_, times_, out + lanes);
+  };
+  short_ ? write(short_blocks_.data()) : write(blocks_.data());
   float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
   for (int t = 0; t < times_; ++t, node += 2 * slots)
     for (int k = 0; k < slots; ++k) {
@@ -246,12 +247,17 @@ void FeatureTree::fit_inner(std::int32_t i) {
     }
 }
 
-void FeatureTree::refit(const Projection& points, int threads) {
+void FeatureTree::refit(const Projection& points, bool in_short, int threads) {
   axes_ = points.kind().axes();
   slots_ = points.kind().slots();
   times_ = points.kind().times();
   const std::size_t n = leaves_;
-  blocks_.resize(n * block_stride());
+  if (std::exchange(short_, in_short) != in_short) {  // frees the other blocks
+    short_blocks_ = {};
+    blocks_ = {};
+  }
+  short_blocks_.resize(short_ ? n * block_stride() : 0);
+  blocks_.resize(short_ ? 0 : n * block_stride());
   nodes_.resize(2 * n * node_stride());
   const auto fit = slots_ == 4   ? &FeatureTree::fit_leaf<4>
                    : slots_ == 8 ? &FeatureTree::fit_leaf<8>
@@ -331,8 +337,22 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
   return true;
 }
 
+void FeatureTree::prefetch(std::int32_t leaf) const {
+  constexpr int line = 64;
+  const auto bytes = [](const auto* from, std::size_t n) {
+    for (std::size_t i = 0; i < n * sizeof *from; i += line)
+      __builtin_prefetch(reinterpret_cast<const char*>(from) + i);
+  };
+  short_ ? bytes(lanes_of<std::int16_t>(leaf).block, block_stride())
+         : bytes(lanes_of<float>(leaf).block, block_stride());
+  bytes(node(leaves_ + leaf), node_stride());
+  bytes(vertices(leaf), lanes * arity_);
+  bytes(ids(leaf), 1);
+}
+
 std::size_t FeatureTree::bytes() const {
   return (nodes_.capacity() + blocks_.capacity()) * sizeof(float) +
+         short_blocks_.capacity() * sizeof(std::int16_t) +
          (ids_.capacity() + vertices_.capacity() + free_.capacity()) * sizeof(std::int32_t) +
          occupied_.capacity() * sizeof(Mask) +
          (members_.capacity() + partners_.capacity()) * sizeof(std::uint64_t);

@@ -38,8 +38,9 @@ class FeatureTree {
   // Places every feature by the centroid that its vertices have at the start of the step. The upper
   // levels of the tree divide the groups, the lower ones divide space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
-  // Computes the bounds of every leaf and node for this step.
-  void refit(const Projection& points, int threads);
+  // Computes the bounds of every leaf and node for this step, those of features in 16 bits or as
+  // floats.
+  void refit(const Projection& points, bool in_short, int threads);
   // Replaces the features by `features`. Old feature i becomes new_id[i]; -1 removes it. New
   // features are placed near features that share their vertices. False if there are not enough free
   // slots; then build() must be called.
@@ -53,12 +54,15 @@ class FeatureTree {
   int slots() const { return slots_; }
   bool is_leaf(std::int32_t node) const { return node >= leaves_; }
   const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
-  const float* block(std::int32_t leaf) const {
-    return blocks_.data() + std::size_t(leaf) * block_stride();
+  // Whether the volumes of features are in 16 bits.
+  bool is_short() const { return short_; }
+  template <class Bound>
+  LeafLanes<Bound> lanes_of(std::int32_t leaf) const {
+    return {blocks<Bound>().data() + std::size_t(leaf) * block_stride(), vertices(leaf), arity_,
+            occupied_[leaf]};
   }
-  LeafLanes lanes_of(std::int32_t leaf) const {
-    return {block(leaf), vertices(leaf), arity_, occupied_[leaf]};
-  }
+  // Prefetches the volumes and vertices of a leaf.
+  void prefetch(std::int32_t leaf) const;
   const std::int32_t* ids(std::int32_t leaf) const {
     return ids_.data() + std::size_t(leaf) * lanes;
   }
@@ -76,6 +80,13 @@ class FeatureTree {
  private:
   std::size_t node_stride() const { return 2 * std::size_t(slots_) * times_; }
   std::size_t block_stride() const { return 2 * std::size_t(lanes) * times_ * axes_; }
+  template <class Bound>
+  const std::vector<Bound>& blocks() const {
+    if constexpr (sizeof(Bound) == sizeof(std::int16_t))
+      return short_blocks_;
+    else
+      return blocks_;
+  }
   template <int slots>
   void fit_leaf(std::int32_t leaf, const Projection& points);
   void fit_inner(std::int32_t node);
@@ -86,8 +97,10 @@ class FeatureTree {
   int arity_ = 1, axes_ = 0, slots_ = 0, times_ = 0;
   std::int32_t leaves_ = 0;
   bool added_ = false;  // update() has added features
+  bool short_ = false;
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;
+  std::vector<std::int16_t> short_blocks_;  // this or blocks_ is empty
   std::vector<std::int32_t> ids_, vertices_,
       free_;  // free_: number of empty slots below every node
   std::vector<Mask> occupied_;

@@ -77,6 +77,7 @@ void Projection::set(const Ends& x, std::size_t n, VolumeKind kind, double min_d
     extent = std::max({extent, hi - centre[k], centre[k] - lo});
   }
   const double second = shrink(extent);
+  unit_ = first * second;
 
   for (int a = 0; a < axes; ++a) {
     const int terms = std::abs(axis[a][0]) + std::abs(axis[a][1]) + std::abs(axis[a][2]);

@@ -52,11 +52,14 @@ class Projection {
     return values_.data() + 2 * kind_.slots() * std::size_t(vertex);
   }
   const float* pad() const { return pad_; }  // [axis slot]
+  // The projection on x of a vector of length 1 along x.
+  double unit() const { return unit_; }
   std::size_t bytes() const { return values_.capacity() * sizeof(float); }
 
  private:
   VolumeKind kind_;
   float pad_[most_slots] = {};
+  double unit_ = 1;
   std::vector<float> values_;
 };
 

@@ -93,6 +93,33 @@ std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind, st
   return pairs;
 }
 
+template <class Bound>
+using Blocks = nb::ndarray<const Bound, nb::shape<-1, -1, 2, 16>, nb::c_contig>;
+using LeafVertices = nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig>;
+
+// For tests: the overlaps of two leaves by the named variant of the kernels. The result has, for
+// each row of one leaf, the lanes of the other leaf that it overlaps, and then the number of pairs
+// that share a vertex. It is empty if the processor cannot run the variant.
+template <class Bound>
+auto leaf_pair(const std::string& variant, Blocks<Bound> a, Blocks<Bound> b,
+               LeafVertices vertices_a, LeafVertices vertices_b, bool same) {
+  const auto* kernels = overlap_kernels<Bound>(variant.c_str());
+  std::vector<std::int32_t> found;
+  if (kernels) {
+    const auto leaf = [](const Blocks<Bound>& block, const LeafVertices& vertices) {
+      return LeafLanes<Bound>{block.data(), vertices.data(), static_cast<int>(vertices.shape(0)),
+                              0xffff};
+    };
+    Overlaps out;
+    kernels->leaf_pair(leaf(a, vertices_a), leaf(b, vertices_b), static_cast<int>(a.shape(0)),
+                       static_cast<int>(a.shape(1)), same, out);
+    for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
+    found.push_back(static_cast<std::int32_t>(out.adjacent));
+  }
+  const std::size_t n = found.size();
+  return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(found), {n});
+}
+
 // Adds the counts to a dictionary, by their names.
 template <class Counts>
 nb::dict with_counts(nb::dict d, Counts counts) {
@@ -269,29 +296,8 @@ NB_MODULE(_mesh, m) {
       [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,
       "For tests: narrow-phase kernels to use from now on (\"portable\", \"avx2\"); any other name "
       "selects the fastest ones. True if this machine can run the named ones.");
-  // For tests: the overlaps of two leaves by the named variant of the kernels. The result has, for
-  // each row of one leaf, the lanes of the other leaf that it overlaps, and then the number of
-  // pairs that share a vertex. It is empty if the processor cannot run the variant.
-  m.def(
-      "leaf_pair",
-      [](const std::string& variant,
-         nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
-         nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b,
-         nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_a,
-         nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b, bool same) {
-        const OverlapKernels* kernels = overlap_kernels(variant.c_str());
-        std::vector<std::int32_t> found;
-        if (kernels) {
-          Overlaps out;
-          kernels->leaf_pair(
-              {a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
-              {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
-              static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
-          for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
-          found.push_back(static_cast<std::int32_t>(out.adjacent));
-        }
-        const std::size_t n = found.size();
-        return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(found), {n});
-      },
-      "variant"_a, "a"_a, "b"_a, "vertices_a"_a, "vertices_b"_a, "same"_a);
+  m.def("leaf_pair", &leaf_pair<float>, "variant"_a, "a"_a, "b"_a, "vertices_a"_a, "vertices_b"_a,
+        "same"_a);
+  m.def("leaf_pair", &leaf_pair<std::int16_t>, "variant"_a, "a"_a, "b"_a, "vertices_a"_a,
+        "vertices_b"_a, "same"_a);
 }

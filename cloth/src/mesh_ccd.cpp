@@ -21,18 +21,19 @@ constexpr double worn = 2;
 // count: their second interval costs as much and saves less.
 constexpr double fast = 0.28;
 constexpr std::size_t sampled = 1024;  // number of vertices, and of edges, in these means
+// Bounds of features have 16 bits if a step of theirs is, on average, at most this fraction of an
+// edge. With longer steps too many volumes that are apart overlap in 16 bits.
+constexpr double fine = 1.0 / 64;
 // The limit on leaf pairs of a step is this many times the limit on collisions.
 constexpr std::size_t leaf_pairs = 8;
 
-// Prefetches the volumes and vertices of a leaf.
-void prefetch(const FeatureTree& tree, std::int32_t leaf) {
-  constexpr int line = 16;  // floats of a cache line
-  const int values = 2 * lanes * tree.axes() * tree.times();
-  for (int i = 0; i < values; i += line) __builtin_prefetch(tree.block(leaf) + i);
-  for (int i = 0; i < 2 * tree.slots() * tree.times(); i += line)
-    __builtin_prefetch(tree.node(tree.leaves() + leaf) + i);
-  for (int i = 0; i < lanes * tree.arity(); i += line) __builtin_prefetch(tree.vertices(leaf) + i);
-  __builtin_prefetch(tree.ids(leaf));
+// The mean of size(vertices) over some of the features; NaN if there are none.
+template <class Size>
+double mean(const Features& features, Size size) {
+  const std::size_t n = features.size(), stride = n / sampled + 1;
+  double sum = 0;
+  for (std::size_t i = 0; i < n; i += stride) sum += size(features.of(i));
+  return sum / ((n + stride - 1) / stride);
 }
 
 class Clock {
@@ -90,32 +91,32 @@ void MeshCcd::copy(const double* x_t0, const double* x_t1, std::size_t n) {
     throw std::invalid_argument("x_t0, x_t1: changed during the call, an entry is not finite");
 }
 
+double MeshCcd::edge(const std::int32_t* v) const {
+  const Ends x = ends();
+  return geometry::largest(x(false, v[1]) - x(false, v[0]));
+}
+
 bool MeshCcd::is_fast() const {
   const Ends x = ends();
-  const auto mean = [](const Features& features, auto size) {
-    const std::size_t n = features.size(), stride = n / sampled + 1;
-    double sum = 0;
-    for (std::size_t i = 0; i < n; i += stride) sum += size(features.of(i));
-    return sum / ((n + stride - 1) / stride);  // NaN if there is no such feature
-  };
   const double motion = mean(topology_.vertices, [&](const std::int32_t* v) {
     return geometry::largest(x(true, *v) - x(false, *v));
   });
-  const double edge = mean(topology_.edges, [&](const std::int32_t* v) {
-    return geometry::largest(x(false, v[1]) - x(false, v[0]));
-  });
-  return !(motion < fast * edge);
+  return !(motion < fast * mean(topology_.edges, [&](auto v) { return edge(v); }));
 }
 
 void MeshCcd::place(double min_distance) {
   Clock clock;
   points_.set(ends(), lines_.size(), volume_, min_distance, threads_);
   stats_.project_s = clock.lap();
+  const double step = 1 / (points_.unit() * shorts_of_unit);
+  const bool in_short = mean(topology_.edges, [&](auto v) {
+                          return edge(v) > step ? step / edge(v) : 1;
+                        }) <= fine;  // false without edges
   FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
   const Features* features[] = {&topology_.vertices, &topology_.edges, &topology_.faces};
   for (int i = 0; i < 3; ++i) {
     if (built_spread_[i] >= 0) {
-      trees[i]->refit(points_, threads_);
+      trees[i]->refit(points_, in_short, threads_);
       stats_.refit_s += clock.lap();
     }
     // Spread is in units of the scene's extent, which also makes it comparable between steps.
@@ -123,7 +124,7 @@ void MeshCcd::place(double min_distance) {
       trees[i]->build(*features[i], ends(), groups_, threads_);
       ++stats_.builds;
       stats_.build_s += clock.lap();
-      trees[i]->refit(points_, threads_);
+      trees[i]->refit(points_, in_short, threads_);
       built_spread_[i] = trees[i]->spread();
       if (i != 1) vf_front_.reset();
       if (i == 1) ee_front_.reset();
@@ -176,8 +177,8 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
         std::uint64_t candidates = 0;
         for (auto i = begin; i < end; ++i) {
           if (i + 1 < end) {
-            prefetch(a, pairs[i + 1].a);
-            prefetch(b, pairs[i + 1].b);
+            a.prefetch(pairs[i + 1].a);
+            b.prefetch(pairs[i + 1].b);
           }
           leaf_candidates(a, b, pairs[i], groups_, isolated, block);
           if (block.size >= CandidateBlock::full || (i + 1 == end && block.size > 0)) {

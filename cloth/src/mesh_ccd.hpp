@@ -75,6 +75,7 @@ class MeshCcd {
     double value[Ends::line];
   };
   void copy(const double* x_t0, const double* x_t1, std::size_t n);
+  double edge(const std::int32_t* vertices) const;  // the largest coordinate of an edge
   bool is_fast() const;
   void place(double min_distance);
   void descend(bool fresh, std::size_t limit);

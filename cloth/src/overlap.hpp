@@ -2,8 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
 #include "tauguard/geometry/lanes.hpp"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 namespace tauguard::cloth {
 
@@ -14,10 +19,27 @@ using Mask = std::uint32_t;  // one bit per lane
 
 // A block has 16 volumes, [axis][end of the step][low, high][lane]. A node has one volume,
 // [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) on every axis.
+//
+// A bound is a float, or 16 bits if a float is too precise to be worth its time. The conversion is
+// monotone, so that volumes that overlap also overlap in 16 bits.
+inline constexpr int shorts_of_unit = 32000;  // a projection is at most 1 (k_dop.hpp)
+TAUGUARD_INLINE void convert(geometry::Float4 x, float* to) { std::memcpy(to, &x, sizeof x); }
+TAUGUARD_INLINE void convert(geometry::Float4 x, std::int16_t* to) {
+  constexpr float most = shorts_of_unit;  // also of the bounds of empty lanes
+  x = most * x;
+  x = x < most ? x : geometry::Float4{} + most;
+#if defined(__x86_64__)
+  const __m128i whole = _mm_cvttps_epi32(x);  // -2^31 for less than that
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packs_epi32(whole, whole));
+#else
+  for (int i = 0; i < 4; ++i) to[i] = static_cast<std::int16_t>(x[i] > -most ? x[i] : -most);
+#endif
+}
 
 // The 16 features of a leaf: volumes, vertices [vertex of the feature][lane], and the lanes in use.
+template <class Bound>
 struct LeafLanes {
-  const float* block;
+  const Bound* block;
   const std::int32_t* vertices;
   int arity;
   Mask occupied;
@@ -34,21 +56,24 @@ struct Overlaps {
   }
 };
 
+template <class Bound>
 struct OverlapKernels {
-  // The lanes of `block`, among `candidates`, that `node` overlaps.
-  Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
+  // The lanes of `block`, among `candidates`, that `node` overlaps on the first three axes.
+  Mask (*lanes_of_node)(const float* node, int slots, const Bound* block, int times,
                         Mask candidates);
   // Finds pairs of features whose volumes overlap and that share no vertex. same: b is a, and each
   // unordered pair is found once. Features with a common vertex always overlap, so the order of the
   // two tests does not matter.
-  void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
-                    Overlaps& out);
+  void (*leaf_pair)(const LeafLanes<Bound>& a, const LeafLanes<Bound>& b, int axes, int times,
+                    bool same, Overlaps& out);
 };
 
 // The fastest kernels that this processor can run. All variants give the same result.
-const OverlapKernels& overlap_kernels();
-// For tests: the kernels "portable", "avx2" or "avx512"; null if the processor cannot run them.
-const OverlapKernels* overlap_kernels(const char* name);
+template <class Bound>
+const OverlapKernels<Bound>& overlap_kernels();
+// For tests: the kernels "portable" or "avx2"; null if the processor cannot run them.
+template <class Bound>
+const OverlapKernels<Bound>* overlap_kernels(const char* name);
 
 // Whether no axis separates two nodes on the same side at all ends.
 template <int slots, int times>

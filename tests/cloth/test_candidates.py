@@ -48,7 +48,9 @@ def check_against_all_pairs(ccd, x_t0, x_t1, kind, min_distance=0.0):
     for found, pairs, rows, split in ((found_vf, vf, vf_rows, 1), (found_ee, ee, ee_rows, 2)):
         gaps = all_pairs.axis_distance(x_t0, x_t1, rows, split, *kind) if len(rows) else np.zeros(0)
         must = pairs[gaps <= min_distance - 1e-14 * size]
-        may = pairs[gaps <= min_distance * (1 + 1e-5) + 1e-14 * size + 4e-6 * extent]
+        # The extent has at least 32,000 steps of 16 bits on a coordinate axis, and its values of
+        # less than a step are one. A step on a corner axis is 4 / sqrt(3) times as long.
+        may = pairs[gaps <= min_distance * (1 + 1e-5) + 1e-14 * size + 1.5e-4 * extent]
         assert as_set(must) <= as_set(found) <= as_set(may)
         assert len(as_set(found)) == len(found)
         assert found.tolist() == sorted(found.tolist())
@@ -151,6 +153,18 @@ def test_front_shrinks_again_after_a_collision_is_over():
     assert after - before < 0.1 * (during - before)
 
 
+def test_a_far_and_large_triangle_hardly_adds_candidates():
+    faces, x_t0, x_t1 = sheet(24, np.random.default_rng(9))
+    near = MeshCCD(faces, volume="moving_k_dop14").candidates(x_t0, x_t1)
+    far = np.array([[4e3, 0, 0], [4e3, 4e3, 0], [4e3, 0, 4e3]])  # a step of 16 bits is an edge
+    n = len(x_t0)
+    faces = np.concatenate([faces, [[n, n + 1, n + 2]]])
+    both = MeshCCD(faces, volume="moving_k_dop14")
+    found = both.candidates(np.concatenate([x_t0, far]), np.concatenate([x_t1, far]))
+    for alone, together in zip(near, found, strict=True):
+        assert 0 < len(together) < 1.2 * len(alone)
+
+
 def test_any_thread_count_gives_the_same_candidates():
     faces, x_t0, x_t1 = sheet(30, np.random.default_rng(5))
     one = MeshCCD(faces, threads=1).candidates(x_t0, x_t1)
@@ -194,8 +208,9 @@ def test_every_variant_finds_the_pairs_of_two_leaves(axes, times, arity_a, arity
         b = a if same else leaf(rng, at, arity_b)
         want = pairs_by_definition(a, b, same)
         found += want[-1]
-        for variant in ("portable", "avx2", "avx512"):
-            have = _mesh.leaf_pair(variant, a[0], b[0], a[1], b[1], bool(same))
+        for variant, bound in itertools.product(("portable", "avx2"), (np.float32, np.int16)):
+            left, right = (np.clip(x[0], -9, 9).astype(bound) for x in (a, b))
+            have = _mesh.leaf_pair(variant, left, right, a[1], b[1], bool(same))
             assert len(have) or variant != "portable"
             assert not len(have) or have.tolist() == want, variant
     assert found > 0

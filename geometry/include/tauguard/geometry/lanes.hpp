@@ -10,7 +10,6 @@
 
 #if defined(__x86_64__)
 #define TAUGUARD_AVX2 __attribute__((target("avx2")))
-#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 #endif
 
 // Compiles a function for the baseline and for AVX2; the loader chooses one. The macro is empty
@@ -24,19 +23,11 @@
 
 namespace tauguard::geometry {
 
-// Whether this processor can run functions with TAUGUARD_AVX2 or TAUGUARD_AVX512, respectively.
+// Whether this processor can run functions with TAUGUARD_AVX2.
 inline bool has_avx2() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
   return __builtin_cpu_supports("avx2");
-#else
-  return false;
-#endif
-}
-inline bool has_avx512() {
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  return __builtin_cpu_supports("avx512f");
 #else
   return false;
 #endif
