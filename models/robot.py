@@ -32,14 +32,11 @@ class RobotRipple:
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""
-        for name in ("cycles", "amplitude", "phase"):
-            rows = tuple(getattr(self, name))
-            if name != "cycles":
-                rows = tuple(tuple(np.atleast_1d(_numbers(row, name)).tolist()) for row in rows)
-                if any(len(row) != len(self.cycles) for row in rows):
-                    raise ValueError(f"{name}: expected {len(self.cycles)} numbers per joint")
-            else:
-                rows = tuple(np.atleast_1d(_numbers(rows, name)).tolist())
+        object.__setattr__(self, "cycles", _row(self.cycles, "cycles"))
+        for name in ("amplitude", "phase"):
+            rows = tuple(_row(row, name) for row in getattr(self, name))
+            if any(len(row) != len(self.cycles) for row in rows):
+                raise ValueError(f"{name}: expected {len(self.cycles)} numbers per joint")
             object.__setattr__(self, name, rows)
 
 
@@ -101,7 +98,7 @@ class RobotDrive:
         if self.gain is not None and self.torque_constant is not None:
             raise ValueError("drive.gain, drive.torque_constant: give one of them")
         if self.slope is not None:
-            rows = tuple(tuple(np.atleast_1d(_numbers(r, "drive.slope"))) for r in self.slope)
+            rows = tuple(_row(row, "drive.slope") for row in self.slope)
             object.__setattr__(self, "slope", rows)
         for field in fields(self):
             if field.name in ("like", "ripple", "sensors", "slope"):
@@ -111,10 +108,8 @@ class RobotDrive:
                 continue
             value = _numbers(value, f"drive.{field.name}")
             object.__setattr__(self, field.name, value)
-            zero = "rotor_inertia", "coulomb", "viscous", "static", "load"
-            low = 0 if field.name in zero else None
-            bad = [x for x in np.atleast_1d(value) if not (x >= 0 if low == 0 else x > 0)]
-            if bad:
+            zero = field.name in ("rotor_inertia", "coulomb", "viscous", "static", "load")
+            if not np.all(np.asarray(value) >= 0 if zero else np.asarray(value) > 0):
                 raise ValueError(f"drive.{field.name} {value}: expected above 0")
 
     def row(self, name: str, joints: int) -> Array | None:
@@ -256,6 +251,10 @@ def _numbers(value: Any, name: str) -> float | Numbers:
     if rows.ndim > 1 or not np.isfinite(rows).all():
         raise ValueError(f"{name} {value!r}: expected finite numbers, one or one per joint")
     return float(rows) if rows.ndim == 0 else tuple(rows.tolist())
+
+
+def _row(value: Any, name: str) -> Numbers:
+    return tuple(np.atleast_1d(_numbers(value, name)).tolist())
 
 
 def per_joint(value: float | Numbers, joints: int, name: str) -> Array:

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.geometry import thread_count
-from tauguard.rigid import _rigid, _rigid_mesh
+from tauguard.rigid import _rigid
 from tauguard.rigid.mesh import MeshTree
-from tauguard.rigid.queries import native, native_overlap, refuse_hulls, rows
+from tauguard.rigid.queries import native_overlap, refuse_hulls, rows
 from tauguard.rigid.shapes import Bodies
 
 #: Classes of single bounding volumes by name; each volume contains consecutive triangles.
 VOLUMES: dict[str, Any] = {
-    "sphere": _rigid_mesh.BallVolumes,
-    "aabb": _rigid_mesh.AabbVolumes,
-    "obb": _rigid_mesh.ObbVolumes,
-    "k_dop": _rigid_mesh.KDopVolumes,
+    "sphere": _rigid.BallVolumes,
+    "aabb": _rigid.AabbVolumes,
+    "obb": _rigid.ObbVolumes,
+    "k_dop": _rigid.KDopVolumes,
 }
 #: Native number of the textbook method of separating axes.
 _TEXTBOOK = 3
@@ -42,7 +42,7 @@ def overlap_by(
         return native_overlap(a, b, method, threads)
     refuse_hulls(a, b)
     hit = np.empty(rows(a, b), dtype=np.uint8)
-    left = _rigid.overlap(*native(a), *native(b), _TEXTBOOK, thread_count(threads), hit)
+    left = _rigid.overlap(a.native, b.native, _TEXTBOOK, thread_count(threads), hit)
     return hit.view(np.bool_), left
 
 

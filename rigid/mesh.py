@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
-from tauguard.rigid import _rigid_mesh
+from tauguard.rigid import _rigid
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
 from tauguard.rigid.results import MeshImpacts
 
@@ -94,7 +94,7 @@ class MeshTree:
         if volume not in self.volumes:
             raise ValueError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
         self._vertices, self._faces, self._volume = points, triangles, volume
-        self._mesh = _rigid_mesh.Mesh(points, triangles, volume)
+        self._mesh = _rigid.Mesh(points, triangles, volume)
 
     @property
     def vertices(self) -> NDArray[np.float64]:

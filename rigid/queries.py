@@ -25,8 +25,7 @@ SweepMethod = Literal["abfme", "sat", "auto"]
 
 #: Number of a method in the native module; ``exact`` is for studies and tests.
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "exact": 4}
-_KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3, Polygons: 4}
-_NO_OFFSETS = np.zeros(1, dtype=np.int64)
+_KINDS = (Tetrahedra, Boxes, Parallelepipeds, Hulls, Polygons)
 
 
 def check_method(method: object, known: Sequence[str]) -> None:
@@ -51,7 +50,7 @@ def native_overlap(
     hit = np.empty(rows(a, b), dtype=np.uint8)
     if method == "auto" and isinstance(a, Boxes) and isinstance(b, Boxes):
         return hit.view(np.bool_), overlap_boxes(a, b, thread_count(threads), hit)
-    left = _rigid.overlap(*native(a), *native(b), _METHODS[method], thread_count(threads), hit)
+    left = _rigid.overlap(a.native, b.native, _METHODS[method], thread_count(threads), hit)
     return hit.view(np.bool_), left
 
 
@@ -64,7 +63,7 @@ def refuse_hulls(a: Bodies, b: Bodies) -> None:
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
     """Overlap of batched boxes, written to ``hit``; returns the number of rows decided exactly."""
     skew = max(a.skew, b.skew)
-    return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, threads, hit)
+    return _rigid.overlap_boxes(a.native, a.blocks, b.native, b.blocks, skew, threads, hit)
 
 
 def sweep(
@@ -117,7 +116,7 @@ def native_sweep(
     moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
     hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))
     left = _rigid.sweep(
-        *native(a), *native(b), moves, _METHODS[method], thread_count(threads), points, hit, out
+        a.native, b.native, moves, _METHODS[method], thread_count(threads), points, hit, out
     )
     return hit.view(np.bool_), out, left
 
@@ -135,14 +134,8 @@ def portable() -> Iterator[None]:
 def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
     """A common point or a separating plane of each row, up to rounding."""
     out = np.empty((rows(a, b), 7))
-    _rigid.witnesses(*native(a), *native(b), thread_count(threads), hit.view(np.uint8), out)
+    _rigid.witnesses(a.native, b.native, thread_count(threads), hit.view(np.uint8), out)
     return Witness(out[:, :3], out[:, 3:6], out[:, 6])
-
-
-def native(bodies: Bodies) -> tuple[int, NDArray[np.float64], NDArray[np.int64]]:
-    """The native form of a batch: kind, packed rows, offsets."""
-    offsets = bodies.offsets if isinstance(bodies, Hulls | Polygons) else _NO_OFFSETS
-    return _KINDS[type(bodies)], bodies.packed, offsets
 
 
 def rows(a: Bodies, b: Bodies) -> int:
@@ -204,7 +197,7 @@ class PlaneCache:
         hit = np.empty(count, dtype=np.uint8)
         with self._lock:
             self.answered = _rigid.overlap_cached(
-                *native(a), *native(b), thread_count(threads), self._normals, hit
+                a.native, b.native, thread_count(threads), self._normals, hit
             )
         found = hit.view(np.bool_)
         return Overlap(found, lambda: find_witness(a, b, found, threads))

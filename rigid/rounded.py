@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
-from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
+from tauguard.rigid.shapes import (
+    SHARP,
+    Bodies,
+    Boxes,
+    Hulls,
+    Parallelepipeds,
+    Polygons,
+    Tetrahedra,
+)
 
 Spatial = Tetrahedra | Boxes | Parallelepipeds | Hulls
 
@@ -118,14 +126,13 @@ class Capsules(Rebuilt):
 
 
 Solid = Bodies | Rounded | Spheres | Capsules
-_SHARP = np.zeros(1)
 
 
 def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
     """The core of a batch and the radii; a single zero for bodies without radii."""
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
-    return solid, _SHARP
+    return solid, SHARP
 
 
 def solid_parts(
@@ -146,6 +153,6 @@ def solid_parts(
         triangles = hasattr(core, "vertices") and hasattr(core, "faces")
         way = "; a mesh is MeshTree(mesh.vertices, mesh.faces)" if triangles else ""
         raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}{way}")
-    if core.largest > most or (radius is not _SHARP and radius.max(initial=0.0) > most):
+    if core.largest > most or (radius is not SHARP and radius.max(initial=0.0) > most):
         raise ValueError(f"{name}: a number beyond {most:g}; scale the scene down".replace("+", ""))
     return core, radius

@@ -17,10 +17,25 @@ from tauguard.rigid import _rigid
 
 #: Largest deviation of an entry of R^T R from the identity; beyond it R is refused.
 ORTHONORMAL_TOLERANCE = 1e-6
+#: The radii of bodies without radii.
+SHARP = np.zeros(1)
+_NO_OFFSETS = np.zeros(1, dtype=np.int64)
 
 
 class _Batch(Rebuilt):
     """A batch of bodies."""
+
+    #: Number of this kind of bodies in native code.
+    kind: ClassVar[int]
+
+    def grown(self, radius: NDArray[np.float64]) -> _rigid.Batch:
+        """The native form of the bodies grown by balls, with one radius per body or one for all."""
+        return _rigid.Batch(self.kind, self.packed, getattr(self, "offsets", _NO_OFFSETS), radius)
+
+    @cached_property
+    def native(self) -> _rigid.Batch:
+        """The native form of the bodies."""
+        return self.grown(SHARP)
 
     @property
     def packed(self) -> NDArray[np.float64]:
@@ -44,6 +59,7 @@ class Tetrahedra(_Batch):
         ValueError: wrong shape, or an entry that is not finite (named with its row).
     """
 
+    kind: ClassVar[int] = 0
     vertices: NDArray[np.float64]
 
     def __init__(self, vertices: ArrayLike) -> None:
@@ -76,6 +92,7 @@ class Boxes(_Batch):
             rotation that is not orthonormal (named with its row).
     """
 
+    kind: ClassVar[int] = 1
     center: NDArray[np.float64]
     half_extents: NDArray[np.float64]
     rotation: NDArray[np.float64]
@@ -138,6 +155,7 @@ class Parallelepipeds(_Batch):
         ValueError: wrong shapes or lengths, or an entry that is not finite (named with its row).
     """
 
+    kind: ClassVar[int] = 2
     origin: NDArray[np.float64]
     edges: NDArray[np.float64]
 
@@ -194,7 +212,7 @@ class Hulls(PointSets):
             vertices, or an empty hull (named with its row).
     """
 
-    dimensions = 3
+    kind, dimensions = 3, 3
 
 
 class Polygons(PointSets):
@@ -204,7 +222,7 @@ class Polygons(PointSets):
     ``vertices`` of shape (M, 2).
     """
 
-    dimensions = 2
+    kind, dimensions = 4, 2
 
 
 def _partition(given: ArrayLike, count: int) -> NDArray[np.int64]:

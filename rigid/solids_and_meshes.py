@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.geometry import thread_count
-from tauguard.rigid import _rigid_mesh
+from tauguard.rigid import _rigid
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
 from tauguard.rigid.motion import Motion, bounded, common_length
-from tauguard.rigid.queries import check_method, find_witness, native, rows, sharp_overlap
+from tauguard.rigid.queries import check_method, find_witness, rows, sharp_overlap
 from tauguard.rigid.results import (
     Distances,
     Impacts,
@@ -24,8 +24,6 @@ from tauguard.rigid.shapes import Bodies
 OverlapMethod = Literal["abfme", "sat", "auto"]
 #: Largest coordinate and radius of bodies in a query with a mesh; meshes have the same limit.
 MOST_COORDINATE = 1e30
-
-Native = tuple[int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 
 
 @overload
@@ -73,20 +71,18 @@ def overlap(
     if beside := _mesh_beside(a, b):
         mesh, bodies, count, swapped = beside
         face = np.empty(count, dtype=np.int32)
-        mesh._mesh.meets(*bodies, face, thread_count(threads))
+        mesh._mesh.meets(bodies, face, thread_count(threads))
         return MeshOverlap(face >= 0, _faces_of(face, swapped))
-    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
-    hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
-    _rigid_mesh.meets(
-        *native(core_a), radius_a, *native(core_b), radius_b, hit, thread_count(threads)
-    )
+    count, first, second = _both(a, b)
+    hit = np.empty(count, dtype=np.uint8)
+    _rigid.meets(first, second, hit, thread_count(threads))
     met = hit.view(np.bool_)
     return Overlap(met, lambda: _rounded_witness(cast(Solid, a), cast(Solid, b), met, threads))
 
 
 def _rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
     """A common point or a separating plane of each row, up to rounding."""
-    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
+    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     cores = distance(core_a, core_b, threads)
     # Cores that overlap have a common point. Otherwise the point is on the segment between them.
     point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
@@ -134,16 +130,14 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Dist
     if beside := _mesh_beside(a, b):
         mesh, bodies, count, swapped = beside
         out, face = np.empty((count, 10)), np.empty(count, dtype=np.int32)
-        mesh._mesh.distances(*bodies, out, face, thread_count(threads))
+        mesh._mesh.distances(bodies, out, face, thread_count(threads))
         first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
         if swapped:
             first, second, normal = second, first, -normal
         return MeshDistances(out[:, 0], first, second, normal, face)
-    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
-    out = np.empty((rows(core_a, core_b), 10))
-    _rigid_mesh.distances(
-        *native(core_a), radius_a, *native(core_b), radius_b, out, thread_count(threads)
-    )
+    count, one, other = _both(a, b)
+    out = np.empty((count, 10))
+    _rigid.distances(one, other, out, thread_count(threads))
     return Distances(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10])
 
 
@@ -200,32 +194,30 @@ def time_of_impact(
         count = common_length({"bodies": count} | lengths)
         out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
         mesh._mesh.time_of_impact_of_bodies(
-            *bodies, *of_mesh.packed, *of_bodies.packed, out, face, thread_count(threads)
+            bodies, *of_mesh.packed, *of_bodies.packed, out, face, thread_count(threads)
         )
         normal = -out[:, 4:7] if swapped else out[:, 4:7]
         found = np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], normal
         return MeshImpacts(*found, _faces_of(face, swapped))
-    (core_a, radius_a), (core_b, radius_b) = _both(a, b)
-    out = np.empty((common_length({"bodies": rows(core_a, core_b)} | lengths), 7))
-    _rigid_mesh.time_of_impact(
-        *(*native(core_a), radius_a, *native(core_b), radius_b),
-        *(*motion_a.packed, *motion_b.packed, out, thread_count(threads)),
-    )
+    count, first, second = _both(a, b)
+    out = np.empty((common_length({"bodies": count} | lengths), 7))
+    moved = (*motion_a.packed, *motion_b.packed)
+    _rigid.time_of_impact(first, second, *moved, out, thread_count(threads))
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
 
 
-def _both(
-    a: Solid | MeshTree, b: Solid | MeshTree
-) -> tuple[tuple[Bodies, NDArray[np.float64]], tuple[Bodies, NDArray[np.float64]]]:
-    """Core and radii of both sides."""
-    return solid_parts("a", cast(Solid, a)), solid_parts("b", cast(Solid, b))
+def _both(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[int, _rigid.Batch, _rigid.Batch]:
+    """The number of rows, and the native forms of both sides."""
+    (core_a, radius_a), (core_b, radius_b) = (
+        solid_parts(name, cast(Solid, solid)) for name, solid in (("a", a), ("b", b))
+    )
+    return rows(core_a, core_b), core_a.grown(radius_a), core_b.grown(radius_b)
 
 
 def _mesh_beside(
     a: Solid | MeshTree, b: Solid | MeshTree
-) -> tuple[MeshTree, Native, int, bool] | None:
-    """The mesh, the native form of the bodies (kind, packed rows, offsets, radii), their number,
-    and whether the mesh is ``b``; ``None`` if there is no mesh.
+) -> tuple[MeshTree, _rigid.Batch, int, bool] | None:
+    """The mesh, the bodies, their number, and whether the mesh is ``b``; ``None`` without a mesh.
 
     Raises:
         ValueError: both are meshes.
@@ -240,7 +232,7 @@ def _mesh_beside(
     if not isinstance(mesh, MeshTree):
         return None
     core, radius = solid_parts("a" if swapped else "b", cast(Solid, solid), MOST_COORDINATE)
-    return mesh, (*native(core), radius), len(core), swapped
+    return mesh, core.grown(radius), len(core), swapped
 
 
 def _faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:

@@ -21,7 +21,7 @@ from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
 #: Equally likely standard deviations of the force along the normal, in the prior [N].
-SCALES = (10.0, 30.0, 100.0, 300.0)
+SCALES = np.array([10.0, 30.0, 100.0, 300.0])
 #: Standard deviation of the tangential force divided by that of the normal force.
 FRICTION = 0.5
 
@@ -127,9 +127,6 @@ def contact_belief(
     q: ArrayLike,
     residual: Array,
     noise: Array,
-    *,
-    scales: tuple[float, ...] = SCALES,
-    friction: float = FRICTION,
 ) -> ContactBelief:
     """Probability and force of a contact at every surface point, given a residual.
 
@@ -142,8 +139,6 @@ def contact_belief(
         q: positions [rad], shape (n,).
         residual: estimate of tau_ext [N m], shape (n,).
         noise: standard deviation of the residual without contact [N m], shape (n,).
-        scales: standard deviations of the force along the normal [N].
-        friction: standard deviation of the tangential force over that of the normal one.
 
     Raises:
         ValueError: shapes that do not fit, noise that is not above 0, a surface of another arm.
@@ -162,32 +157,32 @@ def contact_belief(
     torque = np.ascontiguousarray(jacobian.transpose(2, 1, 0)) / sigma[:, None, None]  # (n, 3, K)
     # Forces in units of their standard deviations are isotropic.
     normal = np.einsum("nik,ik->nk", torque, inward)
-    torque = friction * torque + (1 - friction) * normal[:, None] * inward
-    log, force = _explain(torque, y / sigma, inward, np.array(scales))
-    force = friction * force + (1 - friction) * (force * inward).sum(axis=0) * inward
+    torque = FRICTION * torque + (1 - FRICTION) * normal[:, None] * inward
+    log, force = _explain(torque, y / sigma, inward)
+    force = FRICTION * force + (1 - FRICTION) * (force * inward).sum(axis=0) * inward
     count = np.bincount(surface.link, minlength=n)
     prior = 1.0 / ((count > 0).sum() * count[surface.link])
     weight = prior * np.exp(log - log.max())
     return ContactBelief(surface.link, point, weight / weight.sum(), force.T, prior)
 
 
-def _explain(torque: Array, y: Array, inward: Array, scales: Array) -> tuple[Array, Array]:
+def _explain(torque: Array, y: Array, inward: Array) -> tuple[Array, Array]:
     """Log evidence (K,) and mean standardised force (3, K) of every point.
 
-    The standardised force is Gaussian with one of ``scales`` as its standard deviation, restricted
-    to forces that push inward. Probability and mean of a Gaussian that one plane truncates have
-    closed forms. The scales are equally likely a priori, and weighted by their evidence.
+    The standardised force is Gaussian with one of :data:`SCALES` as its standard deviation,
+    restricted to forces that push inward. Probability and mean of a Gaussian that one plane
+    truncates have closed forms. The scales are equally likely a priori, and weighted by their
+    evidence.
 
     Args:
         torque: joint torques in units of the noise for a unit force, shape (n, 3, K).
         y: residual in units of the noise, shape (n,).
         inward: unit normals, shape (3, K).
-        scales: shape (S,).
     """
     from scipy.special import log_ndtr
 
     seen = np.tensordot(y, torque, 1)
-    loose = 1 / scales[:, None] ** 2
+    loose = 1 / SCALES[:, None] ** 2
     xx, yy, zz = ((torque[:, i] ** 2).sum(axis=0) + loose for i in range(3))
     xy, xz, yz = ((torque[:, i] * torque[:, j]).sum(axis=0) for i, j in ((0, 1), (0, 2), (1, 2)))
     # Cofactors invert many 3 x 3 matrices in a tenth of the time of factorisations.
@@ -204,7 +199,7 @@ def _explain(torque: Array, y: Array, inward: Array, scales: Array) -> tuple[Arr
     spread = np.sqrt((along * inward[:, None]).sum(axis=0))
     alpha = (mean * inward[:, None]).sum(axis=0) / spread
     pushing = log_ndtr(alpha)
-    log = (mean * seen[:, None]).sum(axis=0) - np.log(determinant) - 6 * np.log(scales)[:, None]
+    log = (mean * seen[:, None]).sum(axis=0) - np.log(determinant) - 6 * np.log(SCALES)[:, None]
     log = 0.5 * log + pushing
     mean += np.exp(-0.5 * alpha**2 - 0.5 * np.log(2 * np.pi) - pushing) / spread * along
     highest = log.max(axis=0)

@@ -20,7 +20,7 @@ from tauguard.detectors.diagnosis.contact_force import (
     moments,
     point_jacobians,
 )
-from tauguard.detectors.diagnosis.post_alarm import AFTER, PostAlarmWindow, PostAlarmWindows
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow, PostAlarmWindows
 from tauguard.detectors.diagnosis.severity import Severity, severity
 from tauguard.detectors.diagnosis.tool_contact import tool_severity
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -86,7 +86,6 @@ def diagnose(
     trace: Trace,
     detection: Detection | None = None,
     robot: str | Path | LinkSurface | None = None,
-    after: float = AFTER,
 ) -> list[Diagnosis]:
     """Diagnose every alarm of a detector on a trace.
 
@@ -96,7 +95,6 @@ def diagnose(
         detection: the alarms of the trace (default: computed).
         robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
             the ``arm.xml`` that is attached to simulated traces).
-        after: length of the observed window [s].
 
     Returns:
         A diagnosis for each alarm, in order.
@@ -110,7 +108,7 @@ def diagnose(
             raise ValueError("the trace has no arm.xml: give a robot file with collision shapes")
         robot = trace.attachments["arm.xml"]
     surface = robot if isinstance(robot, LinkSurface) else link_surface(robot)
-    return Diagnoser.of(alarm.detector.arm, surface).diagnose(trace, found.alarms, after)
+    return Diagnoser.of(alarm.detector.arm, surface).diagnose(trace, found.alarms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,19 +147,17 @@ class Diagnoser:
             surface = surface.only([arm.robot.joints])
         return cls(arm, surface, least, at_tool=at_tool, load_known=load_known)
 
-    def diagnose(
-        self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
-    ) -> list[Diagnosis]:
+    def diagnose(self, trace: Trace, alarms: Iterable[Alarm]) -> list[Diagnosis]:
         """A diagnosis for each alarm, in order.
 
-        The window ends ``after`` [s] after the alarm. With ``at_tool``, the force comes from a
+        The window ends :data:`AFTER` the alarm. With ``at_tool``, the force comes from a
         window from the beginning of the contact, which may precede the alarm, to the alarm's end.
         """
         looked = PostAlarmWindows(self.arm, self.noise_model, trace)
         found, since = [], -np.inf
         for alarm in alarms:
-            whole = looked.whole(alarm, since, after) if self.at_tool else None
-            found.append(self.explain(alarm, looked.at(alarm.start, after), whole))
+            whole = looked.whole(alarm, since) if self.at_tool else None
+            found.append(self.explain(alarm, looked.at(alarm.start), whole))
             since = alarm.end
         return found
 

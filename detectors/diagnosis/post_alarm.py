@@ -77,17 +77,16 @@ class PostAlarmWindows:
             trace.t, trace.q, trace.qd, trace.current, keep=True
         )
 
-    def whole(self, alarm: Alarm, since: float = -np.inf, after: float = AFTER) -> PostAlarmWindow:
+    def whole(self, alarm: Alarm, since: float = -np.inf) -> PostAlarmWindow:
         """The samples of a contact from its beginning until its alarm ends.
 
         Args:
             alarm: an alarm of the trace.
             since: earliest beginning of the contact [s].
-            after: least length of the window after the alarm's start [s].
         """
         before = alarm.start - max(self._begun(alarm.start), since) + BEFORE
         lasts = min(alarm.end - alarm.start, LONGEST)
-        return self.at(alarm.start, max(after, lasts), max(before, BEFORE))
+        return self.at(alarm.start, max(AFTER, lasts), max(before, BEFORE))
 
     def _begun(self, start: float) -> float:
         """Time at which the residual began the rise that caused the alarm [s]."""

@@ -29,16 +29,22 @@ inline void store(const FirstTouch& t, double* row) {
   for (int k = 0; k < 3; ++k) row[1 + k] = t.point[k], row[4 + k] = t.normal[k];
 }
 
-inline Bodies view(int kind, const Packed& data, const Offsets& offsets) {
-  const bool cloud = is_cloud(static_cast<Kind>(kind));
-  return {static_cast<Kind>(kind), data.data(), offsets.data(),
-          cloud ? offsets.shape(0) - 1 : data.shape(0)};
-}
+// A batch of bodies, each grown by a ball: one radius for each row, or one for all. It keeps the
+// arrays of Python.
+struct Batch : Bodies {
+  Batch(int kind, Packed data, Offsets offsets, Radii radii)
+      : Bodies{static_cast<Kind>(kind), data.data(), offsets.data(),
+               is_cloud(static_cast<Kind>(kind)) ? offsets.shape(0) - 1 : data.shape(0)},
+        data_(data),
+        offsets_(offsets),
+        radii_(radii) {}
+  double radius(std::size_t i) const { return radii_.data()[radii_.shape(0) == 1 ? 0 : i]; }
 
-// One radius for each row, or one for all.
-inline double at(const Radii& radii, std::size_t i) {
-  return radii.data()[radii.shape(0) == 1 ? 0 : i];
-}
+ private:
+  Packed data_;
+  Offsets offsets_;
+  Radii radii_;
+};
 
 // A batch of motions: one for all rows of the query, or one per row.
 struct Motions {

@@ -1,4 +1,4 @@
-// The convex half of tauguard.rigid._rigid.
+// Bindings of tauguard.rigid._rigid: overlap and sweeps of convex bodies.
 #include <nanobind/stl/pair.h>
 
 #include "bodies_binding.hpp"
@@ -19,26 +19,24 @@ using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 }  // namespace
 
 void bind_convex(nb::module_& m) {
+  nb::class_<Batch>(m, "Batch")
+      .def(nb::init<int, Packed, Offsets, Radii>(), "kind"_a, "packed"_a, "offsets"_a, "radii"_a);
   m.def("has_avx2", [] { return use_avx2(); });
   m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; }, "allowed"_a);
   m.def(
       "overlap",
-      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
-         int method, int threads, Hits hit) {
+      [](const Batch& a, const Batch& b, int method, int threads, Hits hit) {
         const LongCall call;
-        return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
-                       static_cast<Method>(method), threads, hit.data());
+        return overlap(a, b, hit.shape(0), static_cast<Method>(method), threads, hit.data());
       },
-      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "method"_a, "threads"_a,
-      "hit"_a);
+      "a"_a, "b"_a, "method"_a, "threads"_a, "hit"_a);
   m.def(
       "overlap_boxes",
-      [](Packed a, Packed blocks_a, Packed b, Packed blocks_b, double skew, int threads, Hits hit) {
+      [](const Batch& a, Packed blocks_a, const Batch& b, Packed blocks_b, double skew, int threads,
+         Hits hit) {
         const LongCall call;
-        const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
-        const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
-        return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0),
-                             threads, hit.data());
+        return overlap_boxes(a, blocks_a.data(), b, blocks_b.data(), skew, hit.shape(0), threads,
+                             hit.data());
       },
       "a"_a, "blocks_a"_a, "b"_a, "blocks_b"_a, "skew"_a, "threads"_a, "hit"_a);
   m.def(
@@ -58,33 +56,25 @@ void bind_convex(nb::module_& m) {
       "packed"_a, "blocks"_a);
   m.def(
       "sweep",
-      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
-         Packed displacement, int method, int threads, bool points, Hits hit, Rows out) {
+      [](const Batch& a, const Batch& b, Packed displacement, int method, int threads, bool points,
+         Hits hit, Rows out) {
         const LongCall call;
-        return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(),
-                     hit.shape(0), static_cast<Method>(method), threads, points, hit.data(),
-                     out.data());
+        return sweep(a, b, displacement.data(), hit.shape(0), static_cast<Method>(method), threads,
+                     points, hit.data(), out.data());
       },
-      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "displacement"_a,
-      "method"_a, "threads"_a, "points"_a, "hit"_a, "out"_a);
+      "a"_a, "b"_a, "displacement"_a, "method"_a, "threads"_a, "points"_a, "hit"_a, "out"_a);
   m.def(
       "overlap_cached",
-      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
-         int threads, Rows normals, Hits hit) {
+      [](const Batch& a, const Batch& b, int threads, Rows normals, Hits hit) {
         const LongCall call;
-        return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
-                              threads, normals.data(), hit.data());
+        return overlap_cached(a, b, hit.shape(0), threads, normals.data(), hit.data());
       },
-      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "threads"_a, "normals"_a,
-      "hit"_a);
+      "a"_a, "b"_a, "threads"_a, "normals"_a, "hit"_a);
   m.def(
       "witnesses",
-      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
-         int threads, Hits hit, Rows out) {
+      [](const Batch& a, const Batch& b, int threads, Hits hit, Rows out) {
         const LongCall call;
-        witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads,
-                  hit.data(), out.data());
+        witnesses(a, b, out.shape(0), threads, hit.data(), out.data());
       },
-      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "threads"_a, "hit"_a,
-      "out"_a);
+      "a"_a, "b"_a, "threads"_a, "hit"_a, "out"_a);
 }

@@ -1,4 +1,4 @@
-// tauguard.rigid._rigid_mesh: queries of meshes for batches of poses. Python checks arguments.
+// tauguard.rigid._rigid: queries of convex bodies and of meshes. Python checks arguments.
 #include <nanobind/stl/string.h>
 
 #include "bodies_binding.hpp"
@@ -70,13 +70,15 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 
 }  // namespace
 
+void bind_convex(nb::module_& m);
 void bind_distances(nb::module_& m);
 void bind_bodies(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
 
-NB_MODULE(_rigid_mesh, m) {
-  m.doc() = "Meshes and rigid motion over batches of poses. Arguments are checked in Python.";
+NB_MODULE(_rigid, m) {
+  m.doc() = "Queries of convex bodies and meshes on arrays. Arguments are checked in Python.";
   tauguard::geometry::bind_interrupts();
+  bind_convex(m);
   bind_distances(m);
   bind_volumes(m);
   nb::class_<Mesh> mesh(m, "Mesh");

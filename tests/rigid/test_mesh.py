@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from oracles.triangle_meshes import cube, icosphere, random_poses, soup, transform, triangles_meet
-from tauguard.rigid import MeshTree, Motion, _rigid_mesh
+from tauguard.rigid import MeshTree, Motion, _rigid
 from tauguard.rigid.comparators import ComparedTree
 
 VOLUMES = ["aabb", "obb", "k_dop", "sphere"]
@@ -15,7 +15,7 @@ VOLUMES = ["aabb", "obb", "k_dop", "sphere"]
 
 def native(pairs):
     out = np.empty(len(pairs), dtype=bool)
-    _rigid_mesh.triangles_overlap(np.ascontiguousarray(pairs, dtype=float), out)
+    _rigid.triangles_overlap(np.ascontiguousarray(pairs, dtype=float), out)
     return out
 
 
