@@ -77,7 +77,7 @@ MARGIN, LEAST = 1.7, 0.6
 #: and largest |qdd| of all joints [rad/s^2], and exp(-|qd| / CREEP), the slowness.
 PRIOR = np.array([0.3, 0.02, 0.05, 0.03, 0.3])
 
-#: A friction level from T seconds of motion is multiplied by hypot(1, WIDENING_SECONDS / T).
+#: A friction level from logs of T seconds is multiplied by hypot(1, WIDENING_SECONDS / T).
 WIDENING_SECONDS = 40.0
 
 #: Motion of a joint [s] above a speed [rad/s] at which its own friction counts half.
@@ -175,8 +175,8 @@ def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Arr
     At rest, the level is the joint's friction at 0.1 rad/s under the gravity torque in the logs.
     Without that torque, a joint that carries the arm could have half its friction. In motion, the
     level is the same, or 1.5 times the error if that is larger. Both are multiplied by
-    hypot(1, 40 s / T) for T seconds of motion. Both are weighted means of the joint's own level,
-    with the weight T_j / (T_j + 4 s), and the arm's largest level.
+    hypot(1, 40 s / T) for logs of T seconds in all. Both are weighted means of the joint's own
+    level, with the weight T_j / (T_j + 4 s) for T_j seconds of motion, and the arm's largest level.
     """
     n = arm.robot.joints
     error = 1.5 * np.asarray(arm.noise)

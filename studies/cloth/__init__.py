@@ -32,7 +32,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
     yield from _frames(rows)
     axes = ("microseconds, sum", "candidates")
     for volume, mine in groups(table_rows(rows, "volume"), lambda r: str(r["volume"])).items():
-        question = f"Bounding volumes, a frame of each of {len(mine)} deforming meshes"
+        question = f"Bounding volumes, one step of each of {len(mine)} deforming meshes"
         cost = 1e3 * sum(number(row["frame_ms"]) or 0.0 for row in mine)
         pairs = sum(row["vf_candidates"] + row["ee_candidates"] for row in mine)
         yield Point(question, volume.replace("_", " "), cost, pairs, "", "", *axes)
@@ -55,7 +55,7 @@ def _queries(rows: Sequence[Row]) -> Iterator[Point]:
         rated = [row for row in mine if row["kind"] != "both"]
         early = max(row["toi_error_median"] for row in rated)
         for both in (row for row in mine if row["kind"] == "both"):
-            question = f"a vertex-face or edge-edge query beside {peer}"
+            question = f"a vertex-face or edge-edge query, and {peer}"
             text = f"{_errors(own)}; time within {latest:.0e}"
             yield Point(question, "ab2pf", 1e-3 * both["ab2pf_all_ns"], math.nan, text, "ours")
             text = f"{_errors(rated)}; time early by {early:.0e} (median)"
@@ -64,7 +64,7 @@ def _queries(rows: Sequence[Row]) -> Iterator[Point]:
 
 def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
     """Mean results of each method over all labelled sets, weighted by numbers of queries."""
-    axes = ("microseconds a query", "fraction of wrong answers")
+    axes = ("microseconds per query", "fraction of wrong answers")
     by_method = groups(table_rows(rows, "hard query"), lambda row: str(row["method"]))
     for method, mine in by_method.items():
         n = sum(row["n"] for row in mine)
@@ -81,15 +81,15 @@ def _frames(rows: Sequence[Row]) -> Iterator[Point]:
     largest = max(peers, key=lambda row: number(row["ab2pf_ms"]) or 0.0, default={"scene": None})
     for peer in (row for row in peers if row["scene"] == largest["scene"]):
         own = next(row for row in frames if row["scene"] == peer["scene"])
-        what = f"a frame of {own['scene']}, {own['triangles']:,} triangles"
-        question = f"{what}, beside {peer['peer']}"
+        what = f"one step of {own['scene']}, {own['triangles']:,} triangles"
+        question = f"{what}, and {peer['peer']}"
         ours = 1e3 * (number(peer["ab2pf_ms"]) or 0.0)
         error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
         yield Point(question, "ab2pf", ours, math.nan, error, "ours")
         text = "not judged on frames"
         yield Point(question, peer["peer"], 1e3 * peer["peer_ms"], math.nan, text, "peer")
     scenes: Any = {row["scene"] for row in frames}
-    question = f"A frame of each of {len(scenes)} deforming meshes, one thread"
+    question = f"One step of each of {len(scenes)} deforming meshes, one thread"
     axes = ("microseconds, sum", "collisions missed or late")
     by_method = groups(frames, lambda r: f"{r['method']}, {r['volume'].replace('_', ' ')}")
     for method, mine in by_method.items():

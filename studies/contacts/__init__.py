@@ -27,14 +27,14 @@ PEERS = ("MuJoCo", "mujoco", "plain", "speculative", "ipc")
 def points(rows: Sequence[Row]) -> Iterator[Point]:
     """The error of the first reported contact, and the fraction of scenes with tunnelling."""
     question = "Contact checkers: when the first contact is reported"
-    axes = ("microseconds a step", "error of the first report [ms]")
+    axes = ("microseconds per step", "error of the first report [ms]")
     for row in table_rows(rows, "scenes"):
         cost, error = number(row.get("us_per_step")), number(row.get("first_error_ms"))
         if cost and error is not None:
             role = "peer" if row["checker"].startswith(PEERS) else ""
             yield Point(question, row["checker"], cost, abs(error), "", role, *axes)
     question = "Steps over fast contacts, random scenes"
-    axes = ("time over the longest fixed step that holds", "fraction of scenes with tunnelling")
+    axes = ("time / time of the longest safe fixed step", "fraction of scenes with tunnelling")
     thrown = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     for method, own in groups(thrown, lambda row: str(row["method"])).items():
         known = [row["over_fixed"] for row in own if row["over_fixed"] is not None]

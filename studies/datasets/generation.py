@@ -53,7 +53,7 @@ def draw(rows: list[Row], figure: Any) -> None:
         axes.barh(names, width, 0.4, left=left, label=part)
         left = left + width
     axes.plot([row["rollout [us]"] for row in own], names, "kD", label="mujoco.rollout")
-    axes.set(xlabel="microseconds a sample", ylabel="episodes")
+    axes.set(xlabel="microseconds per sample", ylabel="episodes")
     axes.legend()
 
 

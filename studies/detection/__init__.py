@@ -60,23 +60,21 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         its = number(row["sklearn_us"]) or 0.0
         yield Point(question, "scikit-learn's predict", its, math.nan, "the reference", "peer")
     for row in table_rows(rows, "kernel"):
-        axes = ("microseconds a sample", "rms error of the output")
+        axes = ("microseconds per sample", "rms error of the output")
         label, cost_us = f"{row['support_vectors']} support vectors", number(row["us"]) or 0.0
         yield Point("Reduced sets of the SVR", label, cost_us, row["error_rms"], "", "", *axes)
     counted = table_rows(rows, "false alarms")
     for row in (row for row in counted if row["found"]["hours"] >= HOURS):
-        axes, label = (
-            ("asked for, an hour", "counted, an hour"),
-            f"{row['detector']}, {row['threshold']}",
-        )
-        question = "False alarms of arms on which nothing was set"
+        axes = ("requested rate [1/h]", "counted rate [1/h]")
+        label = f"{row['detector']}, {row['threshold']}"
+        question = "Rates of false alarms on arms that were not used for settings"
         yield Point(question, label, row["asked"], row["found"]["value"], "", "", *axes)
     cost = {row["detector"]: number(row["us"]) for row in table_rows(rows, "step")}
     for row in table_rows(rows, "hourly"):
         us, found = cost.get(row["detector"]), number(row["sensitivity"])
         if row["speed"] == 0 and us is not None and found is not None:
-            question = "Detectors online, aimed at 0.25 false alarms an hour"
-            axes = ("microseconds a sample", "fraction missed from 16 N m up")
+            question = "Detectors online, thresholds for 0.25 false alarms per hour"
+            axes = ("microseconds per sample", "fraction missed from 16 N m up")
             yield Point(question, row["detector"], us, 1 - found, "", "", *axes)
 
 

@@ -43,20 +43,20 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         wrong, of = _count([row.get(errors) for row in convex])
         if times and of:
             cost, text = 1e-3 * sum(times) / len(times), f"{wrong:,} wrong of {of:,}"
-            axes = "microseconds a pair, mean over kinds", "fraction of wrong answers"
+            axes = "microseconds per pair, mean over kinds", "fraction of wrong answers"
             yield Point("overlap of two convex bodies", method, cost, wrong / of, text, role, *axes)
     for row in table_rows(rows, "time of impact"):
         missed, of = _count([row["missed"]])
         error, role = row["toi_error_max"], "ours" if row["method"] == "tauguard" else "peer"
-        question = f"time of impact of two turning {row['bodies']}"
+        question = f"time of impact of two rotating {row['bodies']}"
         text = f"{missed} missed of {of:,}; time within {error:.0e}"
-        axes = "microseconds a pair that meets", "largest error of the time [steps]"
+        axes = "microseconds per pair that meets", "largest error of the time [steps]"
         yield Point(question, row["method"], number(row["us_hit"]) or 0.0, error, text, role, *axes)
     yield from _distances(table_rows(rows, "distance"))
     for row in table_rows(rows, "figure 1.1 volumes"):
         question, cost = "bounding volumes of pieces of a mesh", 1e-3 * row["test_ns"]["median"]
         text = f"{row['volume']}, {row['tightness']:.2g} times the hull's volume"
-        axes = "microseconds a test", "separate hulls with overlapping volumes"
+        axes = "microseconds per test", "separate hulls with overlapping volumes"
         yield Point(question, text, cost, row["false_hits"]["value"], "", "", *axes)
     meshes = groups(table_rows(rows, "table 2.2 static"), lambda row: str(row["volume"]))
     for volume, own in meshes.items():
@@ -77,7 +77,7 @@ def _distances(rows: Sequence[Row]) -> Iterator[Point]:
             error = min(1.0, max(known))  # coal's error is not bounded
             wrong, of = _count([row[f"{key}wrong_sign"] for row in own])
             text = f"within {error:.0e} of the size; {wrong:,} wrong signs of {of:,}"
-            axes = "microseconds a pair, geometric mean", "largest error, fraction of the size"
+            axes = "microseconds per pair, geometric mean", "largest error, fraction of the size"
             role, question = "peer" if key else "ours", f"signed distance of two bodies, {name}"
             yield Point(question, method, cost, error, text, role, *axes)
 
@@ -95,4 +95,4 @@ def _mesh(rows: Sequence[Row], method: str, time: str, role: str) -> Point:
     differ, of = _count([rows[0]["disagree"]])
     text, axes = f"{differ:,} answers differ of {of:,}", "fraction of answers that differ"
     question = "overlap of two meshes"
-    return Point(question, method, cost, differ / of, text, role, "microseconds a pose", axes)
+    return Point(question, method, cost, differ / of, text, role, "microseconds per pose", axes)
