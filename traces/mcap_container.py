@@ -71,7 +71,7 @@ class Contents:
         self.schemas: dict[int, records.Schema] = {}
         self.counts: dict[int, int] = {}  #: messages of each channel, as the summary says
         self._chunks: list[tuple[int, memoryview]] = []
-        self._single = b""  # messages outside of chunks
+        self._single = bytearray()  # messages outside of chunks
         self._data = data
         self._end = len(data), 0  # of the data section, and its checksum
         for offset, opcode, body in walk(data):
@@ -221,7 +221,7 @@ def rows_of(data: bytes) -> list[Block]:
     ]
 
 
-def singles(data: bytes) -> Iterator[Block]:
+def singles(data: bytes | bytearray) -> Iterator[Block]:
     """The messages of any chunk, one at a time."""
     at = 0
     while at < len(data):

@@ -6,6 +6,8 @@ import json
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import Writer as PlainWriter
 from mcap_ros2.writer import Writer
 
 from tauguard.datasets import PRESETS, ColumnMap, read_log
@@ -245,6 +247,22 @@ def test_a_bag_is_read_by_its_data_not_by_its_index(tmp_path):
     (tmp_path / "chunk.mcap").write_bytes(without(data, Opcode.CHUNK))
     with pytest.raises(ValueError, match=r"chunk\.mcap: .*damaged"):
         read_log(tmp_path / "chunk.mcap")
+
+
+def test_a_bag_without_chunks_reads_the_same(tmp_path):
+    rosbag(tmp_path / "whole.mcap", 12)
+    with open(tmp_path / "whole.mcap", "rb") as old, open(tmp_path / "bare.mcap", "wb") as new:
+        writer = PlainWriter(new, use_chunking=False)
+        writer.start("ros2")
+        for schema, channel, one in make_reader(old).iter_messages():
+            if not one.sequence:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                topic = writer.register_channel(channel.topic, channel.message_encoding, kind)
+            writer.add_message(topic, one.log_time, one.data, one.publish_time, one.sequence)
+        writer.finish()
+    whole, bare = (read_log(tmp_path / f"{name}.mcap").trace for name in ("whole", "bare"))
+    np.testing.assert_array_equal(bare.t, whole.t)
+    np.testing.assert_array_equal(bare.current, whole.current)
 
 
 def test_a_recording_of_our_own(tmp_path):
