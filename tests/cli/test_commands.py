@@ -213,7 +213,7 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     paths = write_dataset(episodes, tmp_path, workers=1)
     model, robot = tmp_path / "model.skops", tmp_path / "arm.xml"
     robot.write_text(cura6.arm_xml())
-    run("train", "--traces", str(tmp_path), "--model", str(model))
+    run("train", "--traces", str(tmp_path), "--model", str(model), "--folds", "1")
     found = tmp_path / "found.json"
     flags = ("--robot", str(robot), "--model", str(model), "--json", str(found))
     run("detect", str(paths[0]), *flags)
