@@ -75,7 +75,9 @@ class MeshCcd {
     double value[Ends::line];
   };
   void copy(const double* x_t0, const double* x_t1, std::size_t n);
-  double edge(const std::int32_t* vertices) const;  // the largest coordinate of an edge
+  // A length as a fraction of an edge (of its largest coordinate), at most 1, in the mean of the
+  // edges: a few long ones do not count. NaN without edges.
+  double over_edges(double length) const;
   bool is_fast() const;
   void place(double min_distance);
   void descend(bool fresh, std::size_t limit);

@@ -153,13 +153,14 @@ def test_front_shrinks_again_after_a_collision_is_over():
     assert after - before < 0.1 * (during - before)
 
 
-def test_a_far_and_large_triangle_hardly_adds_candidates():
+@pytest.mark.parametrize("volume", ["moving_k_dop14", "auto"])
+def test_a_far_and_large_triangle_hardly_adds_candidates(volume):
     faces, x_t0, x_t1 = sheet(24, np.random.default_rng(9))
-    near = MeshCCD(faces, volume="moving_k_dop14").candidates(x_t0, x_t1)
+    near = MeshCCD(faces, volume=volume).candidates(x_t0, x_t1)
     far = np.array([[4e3, 0, 0], [4e3, 4e3, 0], [4e3, 0, 4e3]])  # a step of 16 bits is an edge
     n = len(x_t0)
     faces = np.concatenate([faces, [[n, n + 1, n + 2]]])
-    both = MeshCCD(faces, volume="moving_k_dop14")
+    both = MeshCCD(faces, volume=volume)
     found = both.candidates(np.concatenate([x_t0, far]), np.concatenate([x_t1, far]))
     for alone, together in zip(near, found, strict=True):
         assert 0 < len(together) < 1.2 * len(alone)
