@@ -14,6 +14,10 @@
 // go is not a new contact. Joints that the contact turned get a higher bound, because their
 // controllers act.
 //
+// While the signal at rest is above half of its bound, the baseline follows more slowly, so that a
+// push that grows slowly is found. It does not during a contact, whose release it helps to see, nor
+// soon after, nor while a joint moves.
+//
 // In motion the signal is the residual without slow errors. The bound is linear in speed,
 // accelerations and slowness; slowness covers friction between static and sliding near standstill.
 // A joint that starts gets a higher bound, and so does one that is faster or accelerates harder
@@ -63,7 +67,10 @@ class Regimes {
   static constexpr double settling = 0.3;    // of the observer at the beginning [s]
   static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
-  static constexpr double follow = 0.15;     // time constant of the baseline [s]
+  static constexpr double follow = 0.15;     // time constant of the baseline [s] ...
+  static constexpr double wary = 0.5;        // ... while the signal is below this of the bound ...
+  static constexpr double slower = 2.0;      // ... and its factor above that, if no joint moves ...
+  static constexpr double ended = 0.3;       // ... from this time after a contact on [s]
   static constexpr double after = 1.0;       // time after a contact: only change away counts [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`
@@ -144,8 +151,8 @@ class Regimes {
       double signal = left[j];
       if (one.rest) {
         if (!was || age_ < settling) one.base = one.before = residual[j];
-        signal = changed(one, residual[j], dt);
         bound[j] = of_.rest[j] + std::max(of_.stop[j] * stirred_, of_.turned[j] * one.own);
+        signal = changed(one, residual[j], bound[j], dt);
       } else {
         bound[j] = moving(j, qd[j], qdd[j], hardest) + spread[j];
       }
@@ -216,12 +223,15 @@ class Regimes {
   }
 
   // The signal of a standing joint. Soon after a contact, a change back to the former level is 0.
-  static double changed(Joint& one, double residual, double dt) {
+  double changed(Joint& one, double residual, double bound, double dt) const {
     const double side = one.most;
     if (one.since < after && (residual - one.base) * side < 0.0 &&
         (residual - one.home) * side > 0.0)
       one.base = one.before = residual;
-    const double change = residual - one.base, keep = std::exp(-dt / follow);
+    const double change = residual - one.base;
+    const bool grows = !touched_ && one.since >= ended && std::fabs(change) > wary * bound;
+    const double factor = grows ? 1.0 + (slower - 1.0) * (1.0 - stirred_) : 1.0;
+    const double keep = std::exp(-dt / (factor * follow));
     one.base = residual - change * keep;
     one.before = one.base + (one.before - one.base) * keep;
     return change;

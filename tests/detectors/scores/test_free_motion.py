@@ -150,6 +150,15 @@ def test_what_a_push_leaves_is_taken_up(alarm):
     assert found.alarms[0].end < 13.5
 
 
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_a_push_that_grows_slowly_is_found(alarm, joint):
+    """In 0.3 s to twice the bound at rest; a baseline of 0.15 s alone would take it up."""
+    torque = np.where(np.arange(3) == joint, 2.0 * alarm.detector.bound.rest, 0.0)
+    push = Added(16.0, 1.5, tuple(torque), "push")
+    found = alarm.detect(add_contact(record(7, dwell=(6.0, 24.0)), GAIN, push)).alarms
+    assert any(16.0 < one.start < 16.6 for one in found)
+
+
 @pytest.mark.parametrize("size", [0.6, 2.0])
 def test_a_push_beside_a_biased_current_is_found(fitted, size):
     alarm = CollisionAlarm(fitted, 1.0, CONFIRMATION)  # of a load that is not told
