@@ -27,6 +27,8 @@ AMPERES = 100.0
 PLATEAU, ABOVE = 5, 3.0
 #: The clock was set back if time steps back fewer times than this, and more rows than this follow.
 FEW = 5
+#: If more than this fraction of the rows repeat a time, the time is rounded, not repeated.
+COARSE = 0.95
 #: Rows that repeat the previous state are left out if they are at least this fraction of all rows:
 #: the recorder is then faster than its robot. A standing arm repeats some values by chance.
 REPEATED = 0.2
@@ -191,6 +193,11 @@ def increasing(
         raise ValueError(
             f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
             "--mend repeat"
+        )
+    if same.size > COARSE * len(t):
+        raise ValueError(
+            f"{same.size} of {len(t)} rows repeat the time before: the time has too few digits; "
+            "write more of them, or say --mend clock=HZ (rows per second) instead"
         )
     if same.size:
         notes.append(

@@ -344,6 +344,8 @@ def _result(
     )
     weights: Array = solution[system.friction : system.gain].reshape(n, -1)
     loads: NDArray[Any] = solution[system.load :].reshape(-1, INERTIAL)
-    identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(rms, 1e-6))
+    # A joint that never moves has no residual in motion: the largest of the others stands for it.
+    noise = np.maximum(np.where(rms > 0, rms, rms.max()), 1e-6)
+    identified = ArmModel(found, gain, replace(friction, weights=weights), noise)
     unknown = np.full((n, INERTIAL), np.nan)
     return Identified(identified, loads, rms, "gains", np.zeros(n), (), unknown)

@@ -285,3 +285,14 @@ def test_a_wrong_preset_names_the_one_that_fits(tmp_path):
     np.savetxt(tmp_path / "b.csv", np.zeros((9, 31)), delimiter=",")
     with pytest.raises(ValueError, match="the columns of the preset ur10e"):
         read_log(tmp_path / "b.csv", "ur5")
+
+
+def test_a_time_of_too_few_digits_is_named(tmp_path):
+    """Seconds since 1970 in six digits: nearly every row repeats the time before."""
+    t = 1.7e9 + 0.01 * np.arange(300)
+    rows = [f"{a:.6g},{0.03 * k:.2f},2,3,0,5,6\n" for k, a in enumerate(t)]
+    path = write(tmp_path, "t,a,b,va,vb,ia,ib\n" + "".join(rows))
+    columns = dataclasses.replace(TWO, repair=frozenset({"repeat"}))
+    with pytest.raises(ValueError, match=r"299 of 300 rows repeat .* too few digits; .* clock=HZ"):
+        read_log(path, columns)
+    assert len(read_log(path, columns, mend=["clock=100"]).trace.t) == 300

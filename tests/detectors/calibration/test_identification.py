@@ -27,6 +27,7 @@ from tests.detectors.synthetic_arm import (
     ROTOR,
     VISCOUS,
     XML,
+    held_joint,
     nominal,
     record,
     true_model,
@@ -269,3 +270,10 @@ def test_an_interval_of_the_bodies_holds_the_truth_and_shrinks_with_more_logs():
     both = shown & np.isfinite(one.inertial_error)
     assert (three.inertial_error[both] <= one.inertial_error[both] * 1.001).all()
     assert np.isnan(three.inertial_error[0, 0])  # the mass on a vertical axis loads nothing
+
+
+def test_the_noise_of_a_joint_that_never_moves_is_that_of_the_others():
+    """With a tiny noise every contact would be one of that joint."""
+    held = identify(ArmModel(nominal(), GAIN), [Recording(held_joint(seed)) for seed in range(2)])
+    assert held.rms[2] == 0
+    assert held.arm.noise[2] == held.arm.noise[:2].max()
