@@ -14,14 +14,28 @@ constexpr double touching = 1e-6;
 // apart at the start. `left_over` is below the least distance that a sweep of the last eroded
 // shapes leaves (first_contact leaves 128).
 constexpr double rounded = 512, left_over = 64;
+// Relative rounding of sums of ways (a generous bound), and the longest chord of a rotation.
+constexpr double slack = 1e-12, whole_chord = 2;
+// When eroded shapes are tried for an overlap, as fractions of the rest of the step.
+constexpr double later[] = {1.0, 0.5, 0.25};
 
-bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
+// By how much two shapes are further apart at time t than required; above 0, they are apart. `n`
+// becomes the direction from a to b in which this was found.
+double gap_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs, Vec3* n) {
   a.move_to(t), b.move_to(t);
   const double radii = a.radius() + b.radius();
   const double needed = radii + share * (a.reach() + b.reach() + radii) +
                         roundoffs * unit_roundoff * (a.magnitude() + b.magnitude());
   const Distance d = distance_of(a, b, Vec3{}, needed);
-  return !d.overlap && d.lower > needed;
+  *n = d.n;
+  return d.overlap ? -INFINITY : d.lower - needed;
+}
+
+bool overlap_at(SupportShape& a, SupportShape& b, double t) {
+  a.move_to(t), b.move_to(t);
+  const double radii = a.radius() + b.radius();
+  const Distance d = distance_of(a, b, Vec3{}, radii);
+  return d.overlap || d.upper < radii;
 }
 
 // The memory of a pair from earlier steps. apart: the eroded shapes of some level were apart.
@@ -29,33 +43,56 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
 enum : char { unknown, apart, sunk };
 
 // `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never
-// touches before a shallower one, so each sweep continues where the last one ended.
-template <class MakeA, class MakeB>
-bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* hit) {
-  double close = touching;
+// touches before a shallower one, so each sweep continues where the last one ended. Nothing is
+// swept if the pair certainly stays apart at the shallowest level at which it is apart at the
+// start: because of earlier steps (`lasts(level)`), or by its gap at the start (`stays(level, gap,
+// n)`).
+template <class MakeA, class MakeB, class Lasts, class Stays>
+bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts,
+            const Stays& stays, char* known, Hit* hit) {
+  double close = touching, gap = 0;
+  Vec3 n{};
   const auto touch = [&](int level, double from) {
     SupportShape a = a_at(level), b = b_at(level);
     return first_contact(a, b, 0, from, close);
   };
   const auto separate = [&](int level, double t) {
     SupportShape a = a_at(level), b = b_at(level);
-    return apart_at(a, b, t, resting, rounded);
+    gap = gap_at(a, b, t, resting, rounded, &n);
+    return gap > 0;
+  };
+  // Whether the shapes meet after `from`. If they overlap at a later time, no sweep is needed.
+  const auto meet = [&](int level, double* from) {
+    for (const double share : later) {
+      SupportShape a = a_at(level), b = b_at(level);
+      if (overlap_at(a, b, *from + share * (1 - *from))) return true;
+    }
+    const Touch touched = touch(level, *from);
+    if (touched.hit) *from = touched.t;
+    return touched.hit;
   };
   // If the shapes of the last level have never met, they may be as near as rounding allows, but
   // must not meet now.
   const auto hardly = [&] {
     SupportShape a = a_at(levels - 1), b = b_at(levels - 1);
-    return apart_at(a, b, 0, 0, left_over);
+    return gap_at(a, b, 0, 0, left_over, &n) > 0;
   };
   int level = 0;
-  while (level < levels && !separate(level, 0)) ++level;
+  for (; level < levels; ++level) {
+    if (lasts(level)) return *known = apart, false;
+    if (separate(level, 0)) break;
+  }
   if (level == levels && *known == apart && hardly()) level = levels - 1, close = 0;
   const bool lost = level == levels && *known == apart;
   *known = level == levels ? sunk : apart;
   hit->level = hit->deepest = level, hit->t = 0;
   if (level == levels) return lost;
+  if (close > 0 && stays(level, gap, n)) return false;
   double from = 0;
   if (level == 0) {
+    // Most pairs that touch do so until the end, and nothing deeper meets. Then the time of the
+    // touch is not needed.
+    if (levels > 1 && !separate(0, 1) && !touch(1, 0).hit) return false;
     const Touch whole = touch(0, 0);
     if (!whole.hit) return false;
     from = hit->t = whole.t;
@@ -63,9 +100,8 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
   }
   const int trigger = level;
   for (; level < levels; ++level) {
-    const Touch deeper = touch(level, from);
-    if (!deeper.hit) break;
-    hit->deepest = level, from = deeper.t;
+    if (!meet(level, &from)) break;
+    hit->deepest = level;
   }
   if (level > trigger) return hit->level = trigger, true;
   return hit->level == 0 && separate(0, 1);  // touched and parted again, or only came close
@@ -74,80 +110,185 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
 }  // namespace
 
 int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
-  const double extent = norm(in_body.at) + shape.extent() + shape.radius;
-  entries_.push_back({std::move(shape), in_body, body, extent});
-  whole_.push_back(0), boxes_.emplace_back();
+  const double size = shape.extent() + shape.radius;
+  const bool plane = shape.core == Core::half_space;
+  entries_.push_back({std::move(shape), in_body, body, norm(in_body.at) + size, size});
+  boxes_.emplace_back(), boxed_.push_back(0);
   if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
   const std::size_t n = static_cast<std::size_t>(body) + 1;
   if (n > still_.size()) {
     const double none[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    still_.resize(n, 0), fresh_.resize(n, 1), last_.resize(24 * n, NAN);
     motions_.resize(n, RigidMotion(none, none + 1, none + 1));
+    stamps_.resize(n, 0), moved_.resize(n, 0), ways_.resize(n), still_.resize(n, 0);
+    extents_.resize(n, 0);
+    last_.resize(24 * n, NAN);
   }
+  extents_[body] = std::max(extents_[body], plane ? INFINITY : entries_.back().extent);
   return static_cast<int>(entries_.size()) - 1;
 }
 
 void Verdict::add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b) {
-  whole_[a[0]] = whole_[b[0]] = 1;
+  reserves_.push_back({entries_[a[0]].body, entries_[b[0]].body});
   pairs_.push_back({std::move(a), std::move(b), unknown});
 }
 
 void Verdict::add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
                             std::vector<std::int32_t> elements, int corners,
                             std::vector<std::uint8_t> skip) {
-  whole_[a[0]] = 1;
   std::vector<char> known(skip.size(), unknown);
   flex_pairs_.push_back({std::move(a), std::move(radii), std::move(elements), corners,
                          std::move(skip), std::move(known)});
 }
 
-SupportShape Verdict::mover(int entry, const Vec3& origin) const {
+const RigidMotion& Verdict::motion(int body) {
+  if (moved_[body] != stamps_[body]) {
+    const double* x = last_.data() + 24 * body;
+    motions_[body] = motion_between(x, x + 3, x + 12, x + 15);
+    moved_[body] = stamps_[body];
+  }
+  return motions_[body];
+}
+
+const Aabb& Verdict::box(int entry) {
+  const int body = entries_[entry].body;
+  if (boxed_[entry] != stamps_[body]) {
+    boxes_[entry] = swept(mover(entry, Vec3{}), motion(body));
+    boxed_[entry] = stamps_[body];
+  }
+  return boxes_[entry];
+}
+
+SupportShape Verdict::mover(int entry, const Vec3& origin) {
   const Entry& e = entries_[entry];
-  return SupportShape(e.shape, e.in_body, motions_[e.body], origin);
+  return SupportShape(e.shape, e.in_body, motion(e.body), origin);
 }
 
 // The largest displacement of a point of the shape relative to a point that moves by `drift`.
-double Verdict::travel(int entry, const Vec3& drift) const {
+double Verdict::travel(int entry, const Vec3& drift) {
   const Entry& e = entries_[entry];
-  const RigidMotion& motion = motions_[e.body];
-  if (motion.speed == 0) return norm(motion.linear - drift);
-  return norm(motion.linear - drift) + motion.speed * e.extent;
+  const RigidMotion& own = motion(e.body);
+  if (own.speed == 0) return norm(own.linear - drift);
+  return norm(own.linear - drift) + own.speed * e.extent;
 }
 
 void Verdict::update(const Poses& p) {
+  const auto distance = [](const double* from, const double* to, int count) {
+    double sum = 0;
+    for (int k = 0; k < count; ++k) sum += (to[k] - from[k]) * (to[k] - from[k]);
+    return std::sqrt(sum);
+  };
+  // In a rotation of at most half a turn no point is further from its start or from its end than
+  // the chord 2 sin(angle / 2), per metre. The norm of the matrices' difference is sqrt(2) times
+  // that.
+  const auto chord = [&](const double* from, const double* to) {
+    return M_SQRT1_2 * distance(from, to, 9);
+  };
   for (const int b : bodies_) {
-    double now[24];
+    double now[24], *last = last_.data() + 24 * b;
     std::copy_n(p.xpos_t0 + 3 * b, 3, now), std::copy_n(p.xmat_t0 + 9 * b, 9, now + 3);
     std::copy_n(p.xpos_t1 + 3 * b, 3, now + 12), std::copy_n(p.xmat_t1 + 9 * b, 9, now + 15);
     const double* turn = p.turn ? p.turn + 3 * b : nullptr;
-    fresh_[b] = turn || !std::equal(now, now + 24, last_.begin() + 24 * b);
-    if (!fresh_[b]) continue;
-    std::copy_n(now, 24, last_.begin() + 24 * b);
-    motions_[b] = motion_between(now, now + 3, now + 12, now + 15, turn);
-    still_[b] = motions_[b].speed == 0 && std::equal(now, now + 12, now + 12);
-    if (turn && motions_[b].speed > M_PI)
-      last_[24 * b] = NAN;  // poses alone do not determine the number of turns
+    // Poses alone do not determine the number of turns.
+    const bool fresh = turn || ways_[b].chord >= whole_chord || !std::equal(now, now + 24, last);
+    Way way;
+    if (!fresh && still_[b]) {
+      ways_[b] = way;
+      continue;
+    }
+    stamps_[b] += fresh;
+    still_[b] = std::equal(now, now + 12, now + 12);
+    way.linear = distance(now, now + 12, 3), way.chord = chord(now + 3, now + 15);
+    if (turn) {
+      motions_[b] = motion_between(now, now + 3, now + 12, now + 15, turn);
+      moved_[b] = stamps_[b];
+      still_[b] = still_[b] && motions_[b].speed == 0;
+      if (motions_[b].speed > M_PI) way.chord = whole_chord;
+    }
+    double linear = way.linear, chords = way.chord;
+    if (stamps_[b] > 1 && !std::equal(now, now + 12, last + 12))
+      linear += distance(last + 12, now, 3), chords += chord(last + 15, now + 3);
+    way.since = (chords > 0 ? linear + chords * extents_[b] : linear) * (1 + slack);
+    ways_[b] = way;
+    std::copy_n(now, 24, last);
   }
-  for (std::size_t e = 0; e < entries_.size(); ++e)
-    if (whole_[e] && fresh_[entries_[e].body])
-      boxes_[e] = swept(mover(static_cast<int>(e), Vec3{}), motions_[entries_[e].body]);
+}
+
+// A bound on the way of the pair's points in the step, relative to their bodies' origins. A
+// plane that rotates has none.
+double Verdict::turning(const Pair& pair) const {
+  double sum = 0;
+  for (const int entry : {pair.a[0], pair.b[0]}) {
+    const Entry& e = entries_[entry];
+    const Way& w = ways_[e.body];
+    if (e.shape.core == Core::half_space && w.chord > 0) return INFINITY;
+    sum += w.chord * e.extent;
+  }
+  return sum;
+}
+
+// By how much the balls around both whole shapes are further apart than required at the end of the
+// step.
+double Verdict::gap_of_balls(const Pair& pair) const {
+  const Entry* const e[] = {&entries_[pair.a[0]], &entries_[pair.b[0]]};
+  Vec3 centre[2], up{};
+  for (int i = 0; i < 2; ++i) {
+    const double *x = last_.data() + 24 * e[i]->body + 12, *r = x + 3;
+    const Vec3 &at = e[i]->in_body.at, *rows = e[i]->in_body.row;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 row = geometry::load(r + 3 * k);
+      centre[i][k] = x[k] + dot(row, at);
+      if (i == 0) up[k] = dot(row, Vec3{rows[0][2], rows[1][2], rows[2][2]});
+    }
+  }
+  const Vec3 between = centre[1] - centre[0];
+  const bool plane = e[0]->shape.core == Core::half_space;
+  const double needed = 2 * resting * (e[0]->extent + e[1]->extent) +
+                        rounded * unit_roundoff * (norm(centre[0]) + norm(centre[1]));
+  return (plane ? dot(up, between) : norm(between)) - e[0]->size - e[1]->size - needed;
+}
+
+// Whether the shapes of a level stay apart in the step, if their gap along n at the start is `gap`.
+// If so, what is left of the gap at the end becomes the pair's reserve.
+bool Verdict::stays_apart(std::size_t number, int level, double gap, const Vec3& n) {
+  const Pair& pair = pairs_[number];
+  const double* const x[] = {last_.data() + 24 * entries_[pair.a[0]].body,
+                             last_.data() + 24 * entries_[pair.b[0]].body};
+  Vec3 drift[2];
+  for (int i = 0; i < 2; ++i) drift[i] = geometry::load(x[i] + 12) - geometry::load(x[i]);
+  const double closing = dot(n, drift[0] - drift[1]), turned = turning(pair) * (1 + slack);
+  const double error = slack * (norm(drift[0]) + norm(drift[1]));
+  if (!(gap > std::max(0.0, closing) + turned + error)) return false;
+  reserves_[number].level = level, reserves_[number].left = gap - closing - turned - error;
+  return true;
 }
 
 void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
+  Reserve& reserve = reserves_[number];
+  const double way = ways_[reserve.a].since + ways_[reserve.b].since;
+  reserve.left = (reserve.left - way) * (1 - 4 * unit_roundoff);  // less by more than rounding
+  const auto lasts = [&](int level) { return level == reserve.level && reserve.left > 0; };
+  if (lasts(0)) return;
+  if (still_[reserve.a] && still_[reserve.b]) return;
   Pair& pair = pairs_[number];
   const Entry &a = entries_[pair.a[0]], &b = entries_[pair.b[0]];
-  if (still_[a.body] && still_[b.body]) return;
-  if (!boxes_[pair.a[0]].overlaps(boxes_[pair.b[0]])) return void(pair.known = apart);
+  if (const double gap = gap_of_balls(pair); gap > way) {
+    reserve.level = 0, reserve.left = gap;
+    return void(pair.known = apart);
+  }
+  if (!box(pair.a[0]).overlaps(box(pair.b[0]))) return void(pair.known = apart);
   const bool plane = a.shape.core == Core::half_space;
-  const Vec3 origin = motions_[plane ? b.body : a.body].x0;
+  const Vec3 origin = motion(plane ? b.body : a.body).x0;
   Hit hit{static_cast<std::int32_t>(number), -1, 0, 0, 0, 0};
-  if (!judged([&](int level) { return mover(pair.a[level], origin); },
-              [&](int level) { return mover(pair.b[level], origin); },
-              static_cast<int>(pair.a.size()), &pair.known, &hit))
+  if (!judged(
+          [&](int level) { return mover(pair.a[level], origin); },
+          [&](int level) { return mover(pair.b[level], origin); }, static_cast<int>(pair.a.size()),
+          lasts,
+          [&](int level, double gap, const Vec3& n) { return stays_apart(number, level, gap, n); },
+          &pair.known, &hit))
     return;
-  const Vec3 drift = plane ? Vec3{} : motions_[a.body].linear;
+  const Vec3 drift = plane ? Vec3{} : motion(a.body).linear;
   hit.way = travel(pair.b[0], drift);
-  if (!plane && motions_[a.body].speed != 0) hit.way += travel(pair.a[0], drift);
+  if (!plane && motion(a.body).speed != 0) hit.way += travel(pair.a[0], drift);
   hits->push_back(hit);
 }
 
@@ -156,7 +297,7 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
   constexpr std::size_t block = 32;  // simplices that share a box
   FlexPair& pair = flex_pairs_[number];
   const std::size_t count = pair.skip.size();
-  const Aabb& near = boxes_[pair.a[0]];
+  const Aabb& near = box(pair.a[0]);
   const double radius = pair.radii[0] * (1 + 4 * unit_roundoff);
   const auto box_of = [&](std::size_t begin, std::size_t end) {
     Aabb box;
@@ -165,7 +306,9 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
     box.widen(radius);
     return box;
   };
-  const Vec3& drift = motions_[entries_[pair.a[0]].body].linear;
+  const RigidMotion& motion = this->motion(entries_[pair.a[0]].body);
+  const Vec3& drift = motion.linear;
+  const double turned = motion.speed * entries_[pair.a[0]].extent;
   for (std::size_t begin = 0; begin < count; begin += block) {
     const std::size_t end = std::min(count, begin + block);
     if (!near.overlaps(box_of(begin, end))) continue;
@@ -177,6 +320,14 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
         stop[i] = x_t1 + 3 * pair.elements[pair.corners * e + i];
       }
       const Vec3 origin = geometry::load(start[0]);
+      const auto stays = [&](int, double gap, const Vec3& n) {
+        double closing = 0, most = norm(drift);
+        for (int i = 0; i < pair.corners; ++i) {
+          const Vec3 moved = geometry::load(stop[i]) - geometry::load(start[i]);
+          closing = std::max(closing, dot(n, drift - moved)), most = std::max(most, norm(moved));
+        }
+        return gap > (closing + turned) * (1 + slack) + 2 * slack * most;
+      };
       Hit hit{static_cast<std::int32_t>(pairs_.size() + number),
               static_cast<std::int32_t>(e),
               0,
@@ -187,13 +338,13 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
                   [&](int level) {
                     return SupportShape(start, stop, pair.corners, pair.radii[level], origin);
                   },
-                  static_cast<int>(pair.a.size()), &pair.known[e], &hit))
+                  static_cast<int>(pair.a.size()), [](int) { return false; }, stays, &pair.known[e],
+                  &hit))
         continue;
       for (int i = 0; i < pair.corners; ++i) {
         const Vec3 moved = geometry::load(stop[i]) - geometry::load(start[i]) - drift;
         hit.way = std::max(hit.way, norm(moved));
       }
-      const RigidMotion& motion = motions_[entries_[pair.a[0]].body];
       if (motion.speed != 0) hit.way += travel(pair.a[0], drift);
       hits->push_back(hit);
     }
@@ -225,6 +376,7 @@ std::vector<int> Verdict::sunk_pairs() const {
 
 void Verdict::forget() {
   for (Pair& pair : pairs_) pair.known = unknown;
+  for (Reserve& reserve : reserves_) reserve.left = -INFINITY;
   for (FlexPair& pair : flex_pairs_) std::fill(pair.known.begin(), pair.known.end(), unknown);
 }
 

@@ -4,6 +4,11 @@
 // only the middle remains. A pair is judged at the shallowest level at which its shapes are apart
 // at the start. As long as the shapes of the last level never meet, no part of one partner has
 // passed through the other.
+//
+// Most pairs are far apart for many steps. A pair that is found apart keeps a reserve: a lower
+// bound of the gap of its shapes. Each step reduces the reserve by an upper bound of the way of
+// both partners. As long as it is above 0, the shapes cannot have met, and the pair is not looked
+// at.
 #pragma once
 
 #include "sweep.hpp"
@@ -54,11 +59,24 @@ class Verdict {
     Shape shape;
     LocalFrame in_body;
     int body;
-    double extent;
+    double extent;  // bound on the distance of the shape's points from the body's origin
+    double size;    // the same from the shape's own origin; 0 for a plane
   };
   struct Pair {
     std::vector<std::int32_t> a, b;
     char known;  // memory of earlier steps
+  };
+  // The shapes of `level` are apart at the end of the last judged step, by at least `left` [m].
+  struct Reserve {
+    std::int32_t a, b;  // bodies of the pair
+    std::int32_t level = 0;
+    double left = -INFINITY;
+  };
+  // Bounds on the way of a body's points. The way in the step: of the origin [m], and the chord of
+  // the rotation, per metre of distance from the origin. `since`: the way of any point since the
+  // end of the last judged step [m], which an edit or a rollback may have moved.
+  struct Way {
+    double linear = 0, chord = 0, since = 0;
   };
   struct FlexPair {
     std::vector<std::int32_t> a;
@@ -70,21 +88,30 @@ class Verdict {
   };
 
   void update(const Poses& poses);
-  SupportShape mover(int entry, const Vec3& origin) const;
-  double travel(int entry, const Vec3& drift) const;
+  const RigidMotion& motion(int body);
+  const Aabb& box(int entry);
+  SupportShape mover(int entry, const Vec3& origin);
+  double travel(int entry, const Vec3& drift);
+  double turning(const Pair& pair) const;
+  double gap_of_balls(const Pair& pair) const;
+  bool stays_apart(std::size_t pair, int level, double gap, const Vec3& n);
   void judge_rigid(std::size_t pair, std::vector<Hit>* hits);
   void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
   std::vector<Entry> entries_;
   std::vector<Pair> pairs_;
+  std::vector<Reserve> reserves_;  // for each of `pairs_`
   std::vector<FlexPair> flex_pairs_;
-  std::vector<char> whole_;           // for each entry: whether it is a shape of level 0
-  std::vector<Aabb> boxes_;           // for each entry; only those of level 0 are used
-  std::vector<int> bodies_;           // bodies with shapes
-  std::vector<RigidMotion> motions_;  // by body
-  std::vector<char> still_,
-      fresh_;                 // for each body: unmoved in this step; its boxes are out of date
-  std::vector<double> last_;  // 24 numbers for each body: both poses of the last step
+  std::vector<Aabb> boxes_;            // for each entry, of the step with the stamp `boxed_`
+  std::vector<std::uint64_t> boxed_;   // for each entry
+  std::vector<int> bodies_;            // bodies with shapes
+  std::vector<RigidMotion> motions_;   // for each body, of the step with the stamp `moved_`
+  std::vector<std::uint64_t> stamps_;  // for each body: number of its different motions so far
+  std::vector<std::uint64_t> moved_;   // for each body
+  std::vector<Way> ways_;              // for each body
+  std::vector<double> extents_;  // for each body: bound on its shapes' points; of a plane, infinite
+  std::vector<char> still_;      // for each body: unmoved in this step
+  std::vector<double> last_;     // 24 numbers for each body: both poses of the last step
 };
 
 }  // namespace tauguard::contacts
