@@ -154,7 +154,8 @@ class MeshCCD:
             fresh: Start the traversal at the root instead of the last frame's front. The result is
                 the same.
             limit: Largest number of collisions of each kind (some 300 bytes each). The number of
-                overlapping pairs of leaves (16 bytes each) is limited to 8 times this number.
+                pairs of tree nodes in the traversal (16 bytes each) is limited to 8 times this
+                number.
 
         Raises:
             ValueError: as :meth:`candidates`.

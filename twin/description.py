@@ -18,7 +18,7 @@ QUANTITIES = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"
 def write_twin(
     twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: str
 ) -> tuple[Path, Path]:
-    """Write the description, and the bodies and left-over errors in the same folder.
+    """Write the TOML file and, beside it, a URDF or MJCF file and a CSV file of left-over errors.
 
     Args:
         twin: identified twin.
@@ -28,11 +28,11 @@ def write_twin(
         scale: what determined the scale of the torques, for a comment.
 
     Returns:
-        The file of the bodies, and the file of the left-over errors.
+        The URDF or MJCF file, and the CSV file.
 
     Raises:
         ValueError: ``out`` does not end in .toml.
-        OSError: cannot be written.
+        OSError: a file cannot be written.
     """
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
@@ -49,7 +49,7 @@ def write_twin(
 
 
 def _without_losses(bodies: Path) -> None:
-    """Remove friction from the file of the bodies, because the description contains it."""
+    """Remove damping and friction from the URDF or MJCF file; the TOML file states them."""
     text = re.sub(r"<dynamics\b[^>]*/>", "", bodies.read_text())
     write_atomic(bodies, re.sub(r'\s(?:damping|frictionloss)="[^"]*"', "", text))
 

@@ -9,30 +9,29 @@
 namespace tauguard::cloth {
 namespace {
 
-// Numbers of entries in a chunk: of the last front, with about one test per entry, and of the first
-// cut, with a whole descent per entry.
+// Numbers of entries in a chunk. An entry of the last step's front (`kept_grain`) needs about one
+// test, an entry of the first front (`root_grain`) a whole descent.
 constexpr std::size_t kept_grain = 1024, root_grain = 16;
-constexpr int first_depth = 5;  // the first cut has all pairs of this depth
+constexpr int first_depth = 5;  // the first front has all pairs of nodes of this depth
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
-// Number of entries of the new cut so far, over all chunks.
+// Number of entries of `cut` so far, over all chunks.
 struct Total {
   std::size_t limit;
   std::atomic<std::size_t> entries{0};
   void add(std::size_t more) {
-    if ((entries += more) > limit) throw TooMany("pairs of leaves (8 times limit)", limit);
+    if ((entries += more) > limit) throw TooMany("pairs of tree nodes (8 times limit)", limit);
   }
 };
 
-// Processes one chunk of the old cut, and writes a new one if the cut changes there.
+// Processes one chunk of the front, and writes a new one to `cut` if its entries change.
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
       : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
 
-  // Two nodes of the same depth are both split. Otherwise only the deeper one is; the other is a
-  // leaf.
+  // Splits each node that is not a leaf. If the depths differ, the node of less depth is a leaf.
   int children(NodePair p, NodePair* child) const {
     const int gap = depth(p.a) - depth(p.b);
     const bool split_a = gap >= 0 && !a_.is_leaf(p.a), split_b = gap <= 0 && !b_.is_leaf(p.b);
@@ -45,8 +44,8 @@ class Walk {
     return n;
   }
 
-  // Processes `n` entries of the old cut, at most a chunk. If all children of a pair are
-  // consecutive entries and the pair itself is apart, the pair replaces them.
+  // Processes `n` entries of the front, at most a chunk. If consecutive entries are all children of
+  // one pair, and neither they nor the pair overlap, the pair replaces them.
   void move(const NodePair* entry, int n) {
     bool meet[kept_grain];
     for (int i = 0; i < n; ++i) {
@@ -96,7 +95,7 @@ class Walk {
   bool both_leaves(NodePair p) const { return a_.is_leaf(p.a) & b_.is_leaf(p.b); }
   NodePair leaf_numbers(NodePair p) const { return {p.a - a_.leaves(), p.b - b_.leaves()}; }
 
-  // Starts the new cut; it differs from the old one from entry `i` on.
+  // Starts `cut` with the entries before `i`, which stay.
   void differ(const NodePair* entry, int i) {
     if (!differs) cut.assign(entry, entry + i);
     differs = true;
@@ -125,7 +124,8 @@ class Walk {
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
   }
 
-  // The number of next entries that are all children of one pair, if all of them are apart; else 0.
+  // The number of next entries if they are all children of one pair, and neither they nor the pair
+  // overlap; else 0.
   int apart_siblings(const NodePair* entry, const bool* meet, int n) {
     const NodePair up = parent(*entry);
     // First children have even numbers, so an odd one cannot start a run of siblings.

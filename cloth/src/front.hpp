@@ -1,11 +1,11 @@
 // The bounding-volume traversal tree of two feature trees (or one with itself) and its front.
 //
-// The nodes of this tree are pairs of nodes of the feature trees. Two nodes of the same depth are
-// both split to get the children of the pair; otherwise only the node that is not a leaf is. The
-// front is a cut: every pair of leaves is below exactly one entry. In coherent motion the entries
-// hardly change from step to step, so the descent starts from the last front and not from the root
-// (Li & Chen 1998; Tang et al. 2010). The overlapping pairs of leaves do not depend on the cut,
-// because a child is within its parent.
+// The nodes of this tree are pairs of nodes of the feature trees. To get the children of a pair,
+// each of its nodes that is not a leaf is split. The front is a cut through this tree: every pair
+// of leaves is an entry of the front, or below exactly one. In coherent motion the entries hardly
+// change from step to step, so the descent starts from the last front and not from the root (Li &
+// Chen 1998; Tang et al. 2010). The overlapping pairs of leaves do not depend on the front, because
+// a child is within its parent.
 #pragma once
 
 #include <cstddef>
@@ -22,11 +22,11 @@ struct NodePair {
 
 class Front {
  public:
-  // Discards the cut; the next update starts near the root.
+  // Discards the front; the next update starts near the root.
   void reset() { cut_.clear(); }
   // Updates the front for the present volumes and returns the overlapping pairs of leaf numbers. To
   // test a tree against itself, pass it twice; each unordered pair is visited once. Throws TooMany
-  // if the cut has more than `limit` entries; call reset then.
+  // if the front has more than `limit` entries; call reset then.
   const std::vector<NodePair>& update(const FeatureTree& a, const FeatureTree& b, int threads,
                                       std::size_t limit);
 

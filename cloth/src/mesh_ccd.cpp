@@ -24,7 +24,7 @@ constexpr std::size_t sampled = 1024;  // number of vertices, and of edges, in t
 // Bounds of features have 16 bits if a step of theirs is, on average, at most this fraction of an
 // edge. With longer steps too many volumes that are apart overlap in 16 bits.
 constexpr double fine = 1.0 / 64;
-// The limit on leaf pairs of a step is this many times the limit on collisions.
+// The limit on entries of a front is this many times the limit on collisions.
 constexpr std::size_t leaf_pairs = 8;
 
 // The mean of size(vertices) over some of the features; NaN if there are none.

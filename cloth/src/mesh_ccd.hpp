@@ -51,8 +51,8 @@ class MeshCcd {
 
   // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied. fresh: start
   // the traversal at the root instead of the last front. Throws std::invalid_argument if features
-  // have vertices beyond n or a position is not finite, and TooMany if there are more than 8
-  // `limit` pairs of leaves. The object can be used after an exception.
+  // have vertices beyond n or a position is not finite, and TooMany if a front has more than 8
+  // `limit` entries. The object can be used after an exception.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
                bool fresh, std::size_t limit);
   // The positions of the last prepare.

@@ -28,7 +28,7 @@ struct Row {
 Aabb swept(SupportShape mover, const RigidMotion& motion);
 
 // Poses of the bodies at both ends of a step, (nbody, 3) and (nbody, 9). `turn`, if given, is an
-// estimate of the bodies' rotation vectors (nbody, 3) [rad], which determines the full turns.
+// estimate of the bodies' rotation vectors (nbody, 3) [rad], for the number of full turns.
 struct Poses {
   const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;
   const double* turn = nullptr;
@@ -48,11 +48,11 @@ struct Surface {
 class Geoms {
  public:
   void add(Shape shape, int body, const LocalFrame& in_body);
-  // Sets the surface of the last geom.
+  // Sets the surface of the geom that was added last.
   void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
-  // Updates motions and swept boxes of bodies that moved in this step or since the last one.
+  // Updates motions and swept boxes, except of bodies at rest in this and the last step.
   void update(const Poses& poses);
   bool still(int geom) const { return still_[body_[geom]]; }  // at rest in this step
   bool as_before(int geom) const {

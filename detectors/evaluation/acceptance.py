@@ -14,8 +14,9 @@ from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import friction_levels
 from tauguard.report import poisson_rate
 
-#: Largest held-out error, in friction levels of the joint; the estimator of a detector reduces it.
-#: It is at most 1.3 on three real arms, for a wrist that moves in only one log.
+#: Largest accepted RMS error of a calibration in a held-out log, in friction levels of the joint.
+#: On three real arms the error is at most 1.3, for a wrist that moves in only one log. A detector's
+#: estimator then reduces it.
 HELD_OUT = 2.0
 #: Accepted false alarms per hour of logs without a contact.
 ASKED = 10.0
@@ -37,25 +38,25 @@ def check_own_alarms(logs: Sequence[CrossValidatedLog], asked: float = ASKED) ->
         return
     own = ", ".join(f"{log.name}: {times(log)}" for log in logs if log.alarms)
     raise ValueError(
-        f"{alarms} alarms in {seconds / 60:.1f} min of logs without a contact, each judged by the "
-        f"others ({own}): at least {low:.0f} an hour where {asked:g} are accepted; if "
-        "something touched the arm there, leave these logs out or cut the touches out, else give "
-        "more logs of such motion"
+        f"{alarms} alarms in {seconds / 60:.1f} min of collision-free logs, each log judged by "
+        f"thresholds from the others ({own}): at least {low:.0f} an hour where {asked:g} are "
+        "accepted; if something touched the arm at these times, leave out these logs or cut out "
+        "the touches; if nothing did, give more logs of similar motion"
     )
 
 
 def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
-    """Refuse logs whose held-out error exceeds the bounds for half of the time in motion.
+    """Refuse logs whose residual exceeds the other logs' bounds for half of the time in motion.
 
     Raises:
         ValueError: names the logs.
     """
     if beyond := [log for log in logs if log.level > 1]:
-        own = ", ".join(f"{log.name} ({log.level:.1f} times)" for log in beyond)
+        own = ", ".join(f"{log.name} (median {log.level:.1f} times the bound)" for log in beyond)
         raise ValueError(
-            "judged by the other logs, the error is beyond the bound for half of the time in which "
-            f"joints move, in {own}: a load that was not given, or a motion that the others do not "
-            "show"
+            "with bounds from the other logs, the residual exceeds its bound for half of the time "
+            f"in which joints move, in {own}; possible causes: a load that was not given, or a "
+            "motion that the others do not show"
         )
 
 
@@ -81,8 +82,8 @@ def check_held_out(
     log, joint = divmod(int(np.argmax(over)), over.shape[1])
     if over[log, joint] > HELD_OUT:
         raise ValueError(
-            f"predicted by the other logs, {arm.robot.joint_names[joint]} in {names[log]} is off "
-            f"by {held[log][joint]:.3g} N m (root mean square), more than {HELD_OUT:g} times "
-            f"its friction of {level[joint]:.3g} N m: other poses or loads than the others show, "
-            "or a contact; give more logs, or leave this one out"
+            f"predicted by the other logs, {arm.robot.joint_names[joint]} in {names[log]} has a "
+            f"torque error of {held[log][joint]:.3g} N m (root mean square), more than "
+            f"{HELD_OUT:g} times its friction of {level[joint]:.3g} N m; possible causes: poses or "
+            "loads that the others do not show, or a contact; give more logs, or leave this one out"
         )

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 #: Meaning of the words in the charts.
 LEGEND = (
-    "  sensitivity: collisions that raise an alarm within 0.5 s (a longer clamp: while it is held)",
-    "  specificity: 2 s without a collision that raise no alarm; ppv: tp / (tp + fp)",
-    "  delay: from the first touch to the alarm; p95: 19 of 20 are faster",
+    "  sensitivity: share of collisions with an alarm within 0.5 s, or before a longer clamp ends",
+    "  specificity: share of cases without an alarm; a case is 2 s without a collision",
+    "  ppv: tp / (tp + fp); delay: from the first touch to the alarm; p95: 19 of 20 are faster",
     "  peak |tau_ext|: largest torque at joints 1-4 that the collision reached",
 )
 
@@ -93,11 +93,12 @@ def diagnosis_text(found: Mapping[str, Any]) -> str:
         lines.append(
             f"  {label:<26}  median {own['median']:.1f} {unit}, p95 {own['p95']:.1f} {unit}"
         )
-    for name, label in (("impulse", "impulse in its 90 %"), ("peak", "peak force in its 90 %")):
+    for name, label in (("impulse", "impulse"), ("peak", "peak force")):
         width = found[f"{name}_width"]["median"]
-        lines.append(f"  {label:<26}  {rate(found[f'{name}_held'])}, upper / lower {width:.1f}")
+        within = f"{label} in 90 % interval"
+        lines.append(f"  {within:<27} {rate(found[f'{name}_held'])}, upper / lower {width:.1f}")
     if found["false_alarms_called_payload"]["n"]:
-        lines.append(f"  false alarms, called load   {rate(found['false_alarms_called_payload'])}")
+        lines.append(f"  false alarms called a load  {rate(found['false_alarms_called_payload'])}")
     return "\n".join(lines)
 
 

@@ -11,9 +11,9 @@
 
 namespace tauguard::detectors {
 
-// One step of the filter that pulls r towards dp/dt - tau - beta with the rate `gain`: exact for an
-// input that is constant over the step, with the trapezoidal mean of beta. Stable for any gain x
-// dt. decay = 1 - exp(-gain dt).
+// One step of the filter dr/dt = gain (dp/dt - tau - beta - r), with decay = 1 - exp(-gain dt). It
+// is exact if dp/dt - tau - beta is constant over the step, and stable for any gain x dt. `beta` is
+// averaged over both ends of the step; tau has its value of the beginning.
 inline double observer_step(double r, double decay, double dt, double p, double p_before,
                             double beta, double beta_before, double tau_before) {
   return r + decay * ((p - p_before) / dt - (tau_before + (beta + beta_before) / 2) - r);
@@ -44,7 +44,8 @@ class Observer {
     started_ = true;
   }
 
-  // The residual at the sample (q, qd), `dt` s after the last one; the next step uses tau.
+  // The residual at the sample (q, qd), `dt` s after the last one. tau is the torque from this
+  // sample on: only the next step uses it.
   const double* step(const double* q, const double* qd, const double* tau, double dt) {
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (dt != decay_dt_) {

@@ -2,19 +2,21 @@
 //
 // Choose D + 1 affinely independent vertices of A. The unknowns are the values p_i >= 0 of the
 // separating function at these vertices. F_i are the barycentric coordinates of their simplex,
-// scaled by its determinant. Every vertex gives a row:
+// scaled by its determinant. Every other vertex gives a row of D + 1 entries F_i(b) or -F_i(a):
 //   sum p_i F_i(b) < 0      for a vertex b of B,
 //   -sum p_i F_i(a) <= 0    for any other vertex a of A.
-// Eliminating p_k, with p_k >= 0, removes entry k from all rows. Each row with a positive entry k
-// is kept, and is also combined with each row that has a negative entry k. Every row is the
-// difference of a point of B and a point of A. After s eliminations a row is redundant if it is
-// made of more than s + 1 inequalities (Chernikov 1960), or if these include all inequalities of
-// another row (Kohler 1967).
-//   * If a row has only positive entries, no plane exists, and the bodies share a point.
-//   * Otherwise back-substitution gives a plane, which is then checked against all vertices.
-// Let E bound the error of every entry. Combinations leave 2 E instead of 0 in the eliminated
-// column, so that the test for positive entries holds there in spite of rounding. If entries are
-// too small for that, or if the check rejects the plane, the pair is undecided.
+// To eliminate p_k, each row with a positive entry k is combined with p_k >= 0 and with each row
+// that has a negative entry k. The combinations replace these rows; rows with a zero entry k stay.
+// So every row is w F(b) - v F(a), for a point b of B, a point a of A, and w, v >= 0. After s
+// eliminations a row is redundant if it is made of more than s + 1 inequalities (Chernikov 1960),
+// or if these include all inequalities of another row (Kohler 1967).
+//   * If all entries of a row are positive, b lies in the hull of a and the chosen vertices, so the
+//     bodies share a point, and no plane exists.
+//   * Otherwise back-substitution gives a plane, which is then checked against all vertices. If the
+//     check rejects it, the pair is undecided.
+// Let E bound the error of every entry. An entry counts as positive if it is above E. To pass this
+// test in spite of rounding, combinations leave 2 E instead of 0 as entry k. An entry k from 0 to
+// 4 E is too small for that and is treated as zero.
 #pragma once
 
 #include <algorithm>
@@ -104,7 +106,7 @@ class HullElimination {
         normal_[i] = -normal_[i];
         own = -own;
       }
-      // As for a tetrahedron's facets (convex_abfme.hpp), with all lengths bounded by `reach`.
+      // As tetrahedron_error() in convex_abfme.hpp, but all lengths are bounded by `reach`.
       error_ = 512 * unit * (D == 3 ? reach_ * reach_ * reach_ : reach_ * reach_);
       if (!(own > 8 * error_)) return false;
     }

@@ -25,14 +25,14 @@ class Incomplete(RuntimeError):
 
 @dataclass(frozen=True)
 class Point:
-    """Time and error of one method: a point in a figure and a line of the report's first page."""
+    """Time and error of one method, for a figure and for the table on the report's first page."""
 
-    question: str  #: the figure's title
+    question: str  #: title of the figure
     method: str
     cost: float  #: time [us], or the quantity of ``cost_axis``
-    error: float  #: in the unit of ``error_axis``; NaN: shown in the table only
+    error: float  #: in the unit of ``error_axis``; NaN: not in the figure
     error_text: str = ""  #: the error as text, for the table
-    role: str = ""  #: "ours" or "peer": shown in the table; "": shown in the figure only
+    role: str = ""  #: "ours" or "peer" of a line of the table; "": not in the table
     cost_axis: str = "microseconds"
     error_axis: str = "error"
 
@@ -95,7 +95,7 @@ def groups(rows: Sequence[T], key: Callable[[T], str]) -> dict[str, list[T]]:
 
 
 def number(value: object) -> float | None:
-    """The number, or the middle of a rate or a time; ``None`` for anything else."""
+    """A number, the value of a rate, or the median of a time; ``None`` for anything else."""
     if isinstance(value, Mapping):
         value = value.get("median", value.get("value"))
     return float(value) if isinstance(value, int | float) else None

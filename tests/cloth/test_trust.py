@@ -276,9 +276,9 @@ def test_a_result_beyond_the_limit_is_refused_and_a_larger_limit_allows_it():
     assert pairs(ccd.find(x, x, limit=len(whole.ee))) == pairs(whole)
 
 
-def test_pairs_of_leaves_are_bounded_too():
+def test_pairs_of_tree_nodes_are_bounded_too():
     faces, x = np.arange(60_000).reshape(-1, 3), np.zeros((60_000, 3))
-    with pytest.raises(ValueError, match="limit: more than 8000 pairs of leaves"):
+    with pytest.raises(ValueError, match="limit: more than 8000 pairs of tree nodes"):
         MeshCCD(faces).find(x, x, limit=1000)
 
 

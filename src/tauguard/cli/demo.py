@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
-#: Rate of false alarms on the training motions for which the threshold is set [1/h]. An alarm stops
+#: The threshold is set for this rate of false alarms on the training motions [1/h]. An alarm stops
 #: a robot: one false alarm per hour may be acceptable in practice, ten are too many.
 FALSE_ALARMS_PER_HOUR = 1.0
 
@@ -113,7 +113,7 @@ def judged_figures(
 
 
 def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
-    """Requested rate of false alarms, and the rates that the training motion allows [1/h]."""
+    """Requested rate of false alarms, and 95 % interval of the rate on training motion [1/h]."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 
     expected = ExpectedRate.of(scores)

@@ -198,7 +198,7 @@ def labelled_motion(
 
 
 def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
-    """The requested rate of false alarms, and the interval of rates that the motion allows."""
+    """The requested rate of false alarms, and the 95 % interval of the rate on training motion."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
 
@@ -277,7 +277,7 @@ def sifted_logs(
 
 
 def odd_notes(sifted: CrossValidation) -> list[str]:
-    """A line on each log that stands out, or whose torques differ throughout."""
+    """A line on each log with far more alarms than the others, or with other torques throughout."""
     from tauguard.detectors.evaluation.card_page import times
 
     notes = []
@@ -288,13 +288,14 @@ def odd_notes(sifted: CrossValidation) -> list[str]:
             else "something touched the arm"
         )
         notes.append(
-            f"{log.name} stands out: {times(log)}, judged by the other logs, which have "
-            f"{_others(sifted.kept)}: {cause}, or a motion that they do not show. It is left out; "
-            f"if nothing touched the arm, keep it with --accept {log.name}"
+            f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
+            f"have {_others(sifted.kept)}. Possible causes: {cause}, or a motion that they do not "
+            "show. The log is left out of the training; if nothing touched the arm, keep it with "
+            f"--accept {log.name}"
         )
     notes += [
-        f"{log.name} stands out ({times(log)}) and is kept as --accept says: a contact in it "
-        "raises the bounds, and others like it are then missed"
+        f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "
+        "contact, the thresholds rise, and similar contacts are missed"
         for log in sifted.accepted
     ]
     notes += [

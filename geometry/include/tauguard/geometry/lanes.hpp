@@ -1,6 +1,7 @@
 // Several numbers side by side, in the compiler's vector types. One source is compiled for the
 // baseline processor and, by target attributes, for wider vector units; the program chooses at run
-// time. Without fused multiply-adds and reassociation every variant gives the same bits.
+// time. Every variant gives the same bits, because the compiler may neither fuse multiply-adds nor
+// reassociate.
 #pragma once
 
 #include <cstdint>
