@@ -219,7 +219,7 @@ def parse_load(text: str) -> Load:
         ValueError: the text has another form.
     """
     if text == "unknown":
-        raise ValueError("--payload unknown: leave it out instead")
+        raise ValueError("--payload unknown: for an unknown load, do not give this flag")
     return _load(text, text, "KG or KG,X,Y,Z, 0 for nothing")
 
 

@@ -29,7 +29,7 @@ def on_cluster(
 
     Raises:
         ValueError: Ray is not installed.
-        OSError: no cluster answers at the address, or it gave up on a task.
+        OSError: no cluster answers at the address, or the cluster gave up on a task.
     """
     try:
         import ray

@@ -40,9 +40,9 @@ class ColumnMap:
     qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
     degrees: bool = False  #: angles, their speeds and accelerations are in degrees
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
-    current_scale: float | tuple[float, ...] = 1.0  #: A in one unit; may be per joint
+    current_scale: float | tuple[float, ...] = 1.0  #: amperes per logged unit, also per joint
     torque_scale: float | tuple[float, ...] = 1.0
-    """N m in one unit; may be per joint; -1 if the log's sign is opposite to the robot's."""
+    """N m per logged unit, also per joint; negative if the log's sign is not that of the robot."""
     clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
     decimal: str = "."  #: decimal mark

@@ -177,7 +177,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def foreign(folder: Path) -> list[str]:
-    """Other files in the folders of shards and arms; a program that reads all files reads them."""
+    """Files in the folders of shards and arms that do not belong to the dataset."""
     known = {
         path(split, number)
         for split, number in shards(configuration_in(folder))
@@ -197,7 +197,7 @@ def unchecked(folder: Path) -> list[str]:
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
-    """Properties whose planned counts are not as stated; classes that are off balance (SLACK)."""
+    """Properties whose planned counts are not as ``stated``, and classes that are off balance."""
     lines = []
     for name, classes in stated.items():
         if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):

@@ -28,7 +28,8 @@ WORDS = {
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
 #: Unit of a time column by its usual step: smallest step of each unit, and the unit [s].
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
-#: Words in names of commands and estimates, then also of the tool's signals: no joint sensors.
+#: Words in names of commands and estimates; ``_OTHER``: also of other signals that are not measured
+#: at the joints.
 _COMMANDS = "target|desired|des|command|commanded|cmd|goal|ref|reference|ext|external"
 _OTHER = re.compile(
     f"(^|_)({_COMMANDS}|control|gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
@@ -227,7 +228,7 @@ def _time_scale(name: str, t: Array) -> float:
 def _units(
     groups: Mapping[str, Sequence[str]], numbers: Callable[[Sequence[str]], Array]
 ) -> tuple[bool, float, float]:
-    """Units by names, else by values: whether angles are degrees; currents [A]; torques [N m].
+    """Units by names, else by values: whether angles are degrees, unit of currents, of torques.
 
     Raises:
         ValueError: columns in different or unknown units, or angles neither in radians nor in

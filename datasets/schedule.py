@@ -110,7 +110,7 @@ def _fraction(fraction: float) -> tuple[bool, ...]:
 def _collisions(
     split: Split, seed: list[int], draw: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
-    """The collisions of an episode; values go on where the last episode with collisions ended."""
+    """The collisions of an episode; their values continue those of the last such episode."""
     before = (
         draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
     )

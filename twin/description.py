@@ -98,7 +98,7 @@ def _bodies(twin: Twin) -> list[str]:
     if half is None:
         return []
     units = ["kg"] + ["kg m"] * 3 + ["kg m^2"] * 6
-    lines = ["# inertial numbers of the moved links that the logs show, with 95 % intervals"]
+    lines = ["# inertial numbers of the moved links that the logs identify, with 95 % intervals"]
     for name, values, widths in zip(
         twin.arm.robot.joint_names, twin.arm.robot.inertial, half, strict=True
     ):

@@ -17,9 +17,9 @@ from tauguard.twin.signals import Motion
 STRIBECK = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: Candidates of the relative rise of friction at the median load.
 LOADS = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.8])
-#: Speeds over which friction rises, as with the lubricant of a gear [rad/s].
+#: Speed constants of the friction terms that rise with speed, as of a gear's lubricant [rad/s].
 SLOPES = (0.03, 0.1, 0.3, 1.0)
-#: Least motion of a joint that is fitted [s].
+#: A joint is fitted if it moves for at least this time [s].
 LEAST = 1.0
 #: Standard deviation of the priors, relative to the median friction.
 BELIEF = 0.3
@@ -33,11 +33,11 @@ SHOWN = 0.5
 class FrictionFit:
     """Friction of one joint."""
 
-    coulomb: float  #: level at speed [N m]
-    static: float  #: level at rest [N m]
-    load: float  #: relative rise of the level per rigid-body torque [1/(N m)]
+    coulomb: float  #: Coulomb friction [N m]
+    static: float  #: friction at rest [N m]
+    load: float  #: relative rise of the friction per rigid-body torque [1/(N m)]
     viscous: float  #: [N m s/rad]
-    slope: tuple[float, ...]  #: rises of the level over each of :data:`SLOPES` [N m]
+    slope: tuple[float, ...]  #: rise of the friction over each speed of :data:`SLOPES` [N m]
     stribeck_velocity: float  #: [rad/s]
     priors: tuple[str, ...] = ()  #: fields that the logs do not identify
 
@@ -78,16 +78,16 @@ def fit_friction(
 def _solve(
     qd: Array, load: Array, left: Array, stribeck: float, rise: float, usual: float
 ) -> tuple[Array, float, Bools]:
-    """Coefficients, norm of the residual including the priors, and whether two are identified.
+    """Coefficients, norm of the residual including the priors, and two flags.
 
-    The last two coefficients are a positive and a negative offset. The two flags are for static
-    friction minus Coulomb friction, and for viscous friction.
+    The last two coefficients are a positive and a negative offset. The flags say whether static
+    friction minus Coulomb friction, and viscous friction, are identified.
     """
     sign, slip, one = np.sign(qd), np.exp(-((qd / stribeck) ** 2)), np.ones_like(qd)
     more, rises = 1 + rise * np.abs(load), [np.tanh(qd / speed) for speed in SLOPES]
     level = [more * part for part in (sign * (1 - slip), sign * slip, *rises)]
     table = np.stack([*level[:2], qd, *level[2:], one, -one, left], axis=1)
-    products = table.T @ table  # a small system of the same norms
+    products = table.T @ table  # its Cholesky factor is a small system with the same residuals
     products[np.diag_indices_from(products)] *= 1 + 1e-9
     # Rows of the priors: static minus Coulomb friction, viscous friction, slopes.
     about = np.zeros((2 + len(SLOPES), table.shape[1]))

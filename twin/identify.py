@@ -15,16 +15,16 @@ from tauguard.twin.drive_fit import SLOPES, FrictionFit, fit_friction
 from tauguard.twin.play import friction_torque, modelled
 from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 
-#: Candidates and prior of the angle over which friction reverses with the joint [rad].
+#: Candidates and prior of the presliding angle, over which friction reverses its sign [rad].
 PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
-#: Speeds between which the angle is identified [rad/s]; a controller holds a slower joint.
+#: Speeds between which this angle is identified [rad/s]; a controller holds a slower joint.
 TURNING = (0.005, 0.1)
 #: Prior of the gear ratio.
 GEAR = 101.0
 #: Least half width of an interval, relative to the largest value of any joint, for the error of the
 #: friction law.
 FORM = 0.02
-#: Samples of the running median of the model's error.
+#: Length of the running median of the model's error, in samples.
 MEDIAN = 9
 #: The identified numbers that have an interval.
 NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
@@ -40,7 +40,7 @@ class Twin:
     notes: tuple[str, ...]  #: quantities that the logs do not identify, one line each
     intervals: dict[str, Array] = field(default_factory=dict)
     """Half the width of the 95 % interval of each of :data:`NUMBERS`, shape (n,) each, and of
-    ``inertial``, shape (n, 10); NaN: a prior, 0: given."""
+    ``inertial``, shape (n, 10). NaN: the value is a prior; 0: the value was given."""
 
     def number(self, name: str) -> Array:
         """One of :data:`NUMBERS`, shape (n,)."""
@@ -172,8 +172,8 @@ def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -
 
     The running median of the error is interpolated. The deviation from the median is moved to the
     nearest new time. There its impulse, error times interval, is kept, so that jitter of the time
-    stamps causes no impulse that the real arm did not have. For the median this would turn jitter
-    into an error.
+    stamps causes no impulse that the real arm did not have. The median is interpolated, because
+    keeping its impulse would turn jitter into an error.
 
     Args:
         arm: calibrated.
@@ -201,7 +201,7 @@ def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -
 
 
 def _sensors(traces: Sequence[Trace], n: int) -> Sensors:
-    """Quantisation and times of the samples; the noise is part of the left-over errors."""
+    """Quantisation and times of the samples; the remaining errors contain the noise."""
     one = max(traces, key=lambda trace: len(trace.t))
     steps = np.concatenate([np.diff(trace.t) for trace in traces])
     usual = float(np.median(steps))

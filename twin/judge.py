@@ -25,8 +25,8 @@ from tauguard.traces import Trace
 from tauguard.twin.play import played, residual_of
 from tauguard.twin.signals import SLOW
 
-#: Times [s]: length of the classifier's windows, of the spans of peaks, of groups of windows in one
-#: fold, and of the beginning of a log, in which the estimator settles.
+#: Length of a classifier's window, of a span whose peak is used, and of a group of windows in one
+#: fold; time at a log's beginning that is left out, because the estimator settles [s].
 WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
 #: Units of position [rad] and velocity [rad/s] in the distance between two windows.
 PLACE, SPEED = 0.1, 0.2
@@ -240,7 +240,7 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
 
 
 def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArray[np.int64], Bools]:
-    """The nearest earlier window that each one repeats, -1 without one; and whether any does.
+    """Each window's nearest earlier window of the same motion (-1: none); whether it has any.
 
     Of equal places only the first and the last window count: if those are too near in time, so are
     the windows between. More and more neighbours are looked up, until an earlier one is among them.

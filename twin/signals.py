@@ -18,7 +18,7 @@ SLOW = 0.02
 SMOOTHING = 0.02
 #: Least length of a gap at which a log is split, in sample intervals.
 GAP = 4.0
-#: Time around a log's last stop that is left out [s].
+#: Time before and after a log's last stop that is left out [s].
 STOP = 0.05
 
 

@@ -14,8 +14,8 @@ from tauguard.detectors.calibration.recording import Load, Recording
 
 #: Logs are of two arms if calibrations from each of two groups of logs reduce the sum of the logs'
 #: residuals by this factor, compared with one calibration from all logs. The factor is 1.0 to 1.2
-#: for groups of one arm by program (UR5, UR3, UR10e), and 2.9 to 66 for two arms, or if a load in
-#: some logs was not given.
+#: for one arm's logs grouped by program (UR5, UR3, UR10e), and 2.9 to 66 for two arms, or if a load
+#: in some logs was not given.
 TWO = 2.0
 ROUNDS = 4
 Errors = Callable[[int, Sequence[int]], float]

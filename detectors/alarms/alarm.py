@@ -58,11 +58,11 @@ class CollisionAlarm(Frozen):
         if np.isnan(self.threshold):
             raise ValueError("threshold: not a number")
         if self.floor is not None and (self.normalisation is None or floor_of(self) is None):
-            raise ValueError("floor: of a detector without one, or of a score not normalised")
+            raise ValueError("floor: needs a detector with plain thresholds and a normalisation")
 
     @property
     def settle(self) -> float:
-        """Seconds at the beginning without an alarm."""
+        """Time until the detector has settled, in which it raises no alarm [s]."""
         return self.detector.settle
 
     @property
@@ -166,7 +166,7 @@ class AlarmStream:
     """
 
     def __init__(self, alarm: CollisionAlarm) -> None:
-        """Begin anew."""
+        """Start before the first sample."""
         detector = alarm.detector
         self._dt, self._first = detector.dt, True
         self.native = _observer.Alarm(

@@ -77,7 +77,7 @@ class BothStreams:
     """Free motion and the learned alarm, sample by sample."""
 
     def __init__(self, detector: BesideFreeMotion) -> None:
-        """Begin anew."""
+        """Start before the first sample."""
         self._free = detector.free.stream()
         self._learned = AlarmStream(detector.learned)
         self._threshold = detector.learned.threshold

@@ -18,7 +18,7 @@ from tauguard.traces.trace import Detection, Trace
 
 STRANGE = 0.2  # fraction of a log in alarm above which it may be the log of another arm
 
-BEFORE = 0.2  # time before an alarm at which the residual that changes is taken [s]
+BEFORE = 0.2  # changes of residuals are measured from this time before an alarm [s]
 
 AROUND = 1.0  # time before and after an alarm in which a contact may change the torques [s]
 

@@ -165,7 +165,7 @@ class Spans:
     _last: float = -np.inf  #: the last finite time [s]
 
     def add(self, t: float, answer: Answer) -> None:
-        """One sample's answer; ``t`` is its time [s]."""
+        """Add the answer of the sample at the time ``t`` [s]."""
         if t < self._last - MERGED:
             self._open.clear()
         self._last = t if np.isfinite(t) else self._last

@@ -42,10 +42,10 @@ HELD_OUT = 0.34
 #: Number of folds of the cross-validation.
 FOLDS = 3
 
-#: Probability that the highest score of a log unlike the others is above the least threshold beside
-#: free motion. The highest of N + 1 logs is the new one with probability 1 / (N + 1). It exceeds
-#: the others' highest k times with 1 / k of that: scores have no scale, and on real arms it was up
-#: to 3.1 times. So the least threshold is 1 / (UNLIKE (N + 1)) times the highest score of N logs.
+#: Accepted probability that a new log's highest score exceeds the least threshold that is used
+#: beside free motion. A new log has the highest score of N + 1 logs with probability 1 / (N + 1). A
+#: score k times the highest of N logs is assumed to be k times less probable (k was up to 3.1 on
+#: real arms). So the least threshold is 1 / (UNLIKE (N + 1)) times the highest score of N logs.
 UNLIKE = 0.05
 
 
@@ -168,7 +168,7 @@ def train_beside(
         else:
             notes.append(
                 f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "
-                f"because {seconds:.1f} s of motion are left without it, expected {LEAST:g} s"
+                f"because the rest has {seconds:.1f} s of motion, expected {LEAST:g} s or more"
             )
         fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
         found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]], CONFIRMATION)
@@ -179,7 +179,7 @@ def train_beside(
     least = beyond * max(one.peak for one in scores)
     if least > alarm.threshold:
         kind = "halves of a log" if halved else "logs"
-        few = "; few logs make it rarely fire: more, separate logs lower it" if beyond > 1 else ""
+        few = "; it is high because there are few logs: add separate logs" if beyond > 1 else ""
         notes.append(
             f"the learned score's threshold is {beyond:.2g} times the highest score of "
             f"{len(scores)} {kind}, whatever --false-alarms-per-hour{few}"

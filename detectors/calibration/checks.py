@@ -77,15 +77,15 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     return found
 
 
-#: By what is exchanged: the least motion of both joints [s], and by how much an exchange then has
-#: to lower the logarithm of the unexplained variance. In right logs of four real and nine simulated
-#: arms, an exchange of currents lowers it by 0.05 at most, one of columns by 0.83. Exchanged
-#: currents mostly give 2.9 or more, exchanged columns of a wrist's joints less than the limit.
+#: An error is reported if exchanging two joints' currents, or all their columns, lowers the
+#: logarithm of the unexplained variance by the second number; the first is the least motion of both
+#: joints [s]. In correct logs of 13 arms, currents lower it by 0.05 at most, columns by 0.83. Truly
+#: exchanged currents mostly give 2.9 or more, columns of a wrist's joints less than the limit.
 EXCHANGED = {"currents": (6.0, 1.0), "columns": (20.0, 1.25)}
-#: Least motion [s] for exchanged columns if the arm is calibrated: right logs then lower it by 0.11
-#: at most, exchanged columns by 2.4 or more in nearly all cases.
+#: Least motion [s] for exchanged columns if the arm is calibrated. The logarithm is then lowered by
+#: at most 0.11 in correct logs, and by 2.4 or more in nearly all logs with exchanged columns.
 EXCHANGED_KNOWN = 6.0
-#: As EXCHANGED, for one joint whose columns are negated. In right logs, negating lowers the
+#: As EXCHANGED, for one joint whose columns are negated. In correct logs, negating lowers the
 #: logarithm by 0.3 (currents) and 0.94 (columns) at most. Negated currents give 0.7 to 8, negated
 #: columns of joints that carry the arm mostly 3 or more.
 NEGATED = {"currents": (6.0, 1.0), "columns": (6.0, 2.0)}
@@ -124,19 +124,19 @@ def misread(arm: ArmModel, logs: Mapping[str, Recording]) -> str:
     names = arm.robot.joint_names
     if a == b:
         return (
-            f"the {what} of {names[a]} seem to have the opposite sign: negated they fit the arm of "
-            "the robot file better; use the signs of the robot file's axes"
+            f"the {what} of {names[a]} seem to have the opposite sign: if negated, they fit the "
+            "arm of the robot file better; use the signs of the robot file's axes"
         )
     return (
-        f"the {what} of {names[a]} and {names[b]} seem exchanged: the other way round they fit "
-        "the robot file's arm better; give the columns in the order of the robot file's joints"
+        f"the {what} of {names[a]} and {names[b]} seem exchanged: if swapped, they fit the arm of "
+        "the robot file better; give the columns in the order of the robot file's joints"
     )
 
 
 def _misreadings(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
-    """Change of log unexplained variance over its limit, two joints (or one twice), and what.
+    """Change of the logarithm of the unexplained variance / limit, two joints, kind of column.
 
-    Columns of two joints are exchanged, those of one joint negated.
+    The columns of two different joints are exchanged; for equal joints they are negated.
     """
     if not traces:
         return

@@ -100,7 +100,7 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
     """Refuse less motion than ``least`` [s].
 
     Raises:
-        ValueError: says how much there is.
+        ValueError: there is less motion; the message says how much.
     """
     if (seconds := motion_length(recordings)) < least:
         still = "" if seconds else "no joint moves: "
@@ -111,7 +111,7 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
 
 
 def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:
-    """Whether there are several, and without any one of them :data:`LEAST` of motion is left."""
+    """Whether :data:`LEAST` of motion is left without any one of several recordings."""
     rests = ([*recordings[:k], *recordings[k + 1 :]] for k in range(len(recordings)))
     return len(recordings) > 1 and all(motion_length(rest) >= LEAST for rest in rests)
 
@@ -149,7 +149,7 @@ def pieces(
 ) -> list[Recording]:
     """Halve the longest recording repeatedly until there are at least ``count`` recordings.
 
-    It ends earlier if the halves would be shorter than ``shortest`` [s].
+    Halving ends earlier if the halves would be shorter than ``shortest`` [s].
     """
     parts = list(recordings)
     while len(parts) < count:

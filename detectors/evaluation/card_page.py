@@ -22,7 +22,7 @@ SHORTEST, SHORT = 300.0, 1800.0
 CLOCK = 1e6
 #: Largest number of alarms of a log whose times are listed.
 LISTED = 6
-#: Field of the card in each column of table and picture, and its regime in ``card.unseen``.
+#: For each column of table and picture: the field of the card, and the key of ``card.unseen``.
 COLUMNS = {
     "standing": ("standing", "standing for 2 s"),
     "just stopped": ("stopped", "just stopped"),
@@ -162,7 +162,7 @@ def _alarms(card: ThresholdCard) -> str:
     high = card.false_alarms_per_hour["high"]
     said = f"alarms in these logs: {card.alarms} in {card.seconds / 60:.1f} min, each "
     said += "log" if len(card.logs) > 1 else "part"
-    said += " under calibration and bounds from the others"
+    said += " with calibration and bounds from the others"
     if own := [f"{log.name} ({times(log)})" for log in card.logs if log.alarms]:
         said += f": {', '.join(own)}; where something touched the arm, leave that log out"
     return said + rate_text(

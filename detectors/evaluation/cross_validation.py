@@ -68,7 +68,7 @@ class CrossValidatedLog:
     begin: float  #: first time of the log [s]
     seconds: float  #: length of the log [s]
     alarms: tuple[Alarm, ...]  #: with times of the log
-    level: float  #: median over samples of the largest residual over bound of joints in motion
+    level: float  #: median, over samples in motion, of the joints' largest ratio residual / bound
 
     @property
     def throughout(self) -> bool:
@@ -160,8 +160,8 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
 
 
 def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, ...], float]]:
-    """Alarms and level of each part, with calibration and bounds from the other turns' parts."""
-    if not any(moves(part.trace) for part in parts):  # one bound for all, from calmest pieces
+    """Alarms and level of each part, with calibration and bounds from parts of other folds."""
+    if not any(moves(part.trace) for part in parts):  # one bound, from the calmest pieces of all
         still = standing_detector(arm, parts)
         return [_alarms_and_level(with_load_of(part, still).judge(part.trace)) for part in parts]
     numbers = [k for k, part in enumerate(parts) if moves(part.trace)]

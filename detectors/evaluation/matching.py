@@ -107,7 +107,7 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
 
 
 def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:
-    """A detector's alarms on recordings, matched with their truth; one recording in memory.
+    """A detector's alarms on recordings, matched with their truth, one recording at a time.
 
     Raises:
         ValueError: a trace without truth, or with other joints or sample rate than the detector's.

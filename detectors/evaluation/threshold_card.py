@@ -55,13 +55,13 @@ class ThresholdCard:
     """Force at the last link's origin that is found in half, and in 95 %, of all poses and
     directions [N]; infinite: none. Keys: "standing" (pushed within 0.1 s), "slowly" (standing,
     pushed over 1 s), "stopped" (or held by static friction), "moving"."""
-    moment: float  #: moment on the last link found in motion, in half of them [N m]
+    moment: float  #: moment on the last link found in motion, in half of poses and directions [N m]
     seconds: float  #: total length of the logs [s]
     alarms: int  #: number of alarms in all logs, in cross-validation
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
     logs: tuple[CrossValidatedLog, ...]  #: the logs with their alarms in cross-validation
     left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
-    unseen: dict[str, tuple[str, ...]]  #: by regime, joints that are in it in no log
+    unseen: dict[str, tuple[str, ...]]  #: by regime of motion, the joints that no log shows in it
     replay: tuple[int, int]
     """Numbers of events in the logs with constant thresholds of the plain observer's residual:
     contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""

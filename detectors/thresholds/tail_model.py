@@ -98,7 +98,7 @@ def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SH
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
-        allowed: above 0. From ``count`` on, the result is the peak that so many peaks exceed.
+        allowed: above 0. If it is ``count`` or more, the result is the peak that so many exceed.
         count: number of peaks in the tail; at most N - 1 are used.
         usual: shape of the tail unless the peaks show another one.
 

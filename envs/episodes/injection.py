@@ -194,7 +194,7 @@ class Aim:
     def _reaches(
         self, plan: CollisionPlan, path: _LinkPath, number: int, point: Array, push: Array
     ) -> bool:
-        """Whether some force in the plan's range gives a torque in its severity range here."""
+        """Whether some force in the plan's range gives a torque in its severity range at a row."""
         if plan.severity is None or plan.force is None:
             return True
         levers = [0.0]

@@ -28,7 +28,7 @@ class Wrenches:
 
     @classmethod
     def from_contacts(cls, contact: Array) -> Wrenches:
-        """From the contact sensors, whose columns are: found, force by the link, torque, point."""
+        """Wrenches from sensors, whose columns are: found, force by the link, torque, point."""
         return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
 
     def rows(self) -> NDArray[np.intp]:

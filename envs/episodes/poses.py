@@ -15,7 +15,7 @@ class Poses:
     """Forward kinematics of a scene over tables of joint positions, run natively."""
 
     def __init__(self, scene: Scene) -> None:
-        """For the arm of ``scene``; all other bodies are at their initial place."""
+        """Prepare the arm of ``scene``; all other bodies are at their initial place."""
         self._scene, self._data = scene, mujoco.MjData(scene.model)
         self._physics = make_physics(scene.model, self._data)
         self._qpos = scene.qpos_adr.tolist()

@@ -220,7 +220,7 @@ class Simulation:
         tau_ext = labels.external_torque(Poses(scene), rollout.q, wrenches)
         truth = _truth(motion.t, scene, rollout, wrenches, tau_ext, payload, injected)
         if (merged := len(injected) - len(truth.collisions)) > 0:
-            self.missed.append(f"{merged} within 0.5 s of another on the link: they count as one")
+            self.missed.append(f"{merged} within 0.5 s of another collision: they count as one")
         sensors, rng = scene.drive.sensors, self._sensor_rng
         q, qd, current = rollout.q, rollout.qd, rollout.current
         if sensors is not None:

@@ -33,7 +33,7 @@ ENTRIES = [
 MEANS = {"iccd": 2.3, "vcd": 1.34}
 #: The peer, and the target of the ratio of times, peer / ab2pf, on a frame of cloth-ball.
 PEER = ("ipctk LBVH + AdditiveCCD", 10)
-#: A time of impact is late if it is this much [step] after that of ab2pf, which may be early by it.
+#: A time of impact is late if it exceeds that of ab2pf by this, the largest error of ab2pf [step].
 LATE = 1e-9
 RECORDED = "cloth-ball"  #: the recorded scene with a target
 

@@ -1,8 +1,7 @@
 """Guarded steps on random scenes, beside plain steps, MuJoCo's own modes and fine fixed steps.
 
-The tunnelling oracle checks every scene, at one time step of 0.5 to 10 ms. Only the seed
-determines the scenes. Table ``overhead`` has scenes without fast
-contacts.
+The tunnelling oracle checks every scene, at one time step of 0.5 to 10 ms. The scenes depend only
+on the seed. Table ``overhead`` has scenes without fast contacts.
 """
 
 import time
@@ -104,15 +103,10 @@ def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     return rows + [_overhead(scene, 60 if quick else 300) for scene in examples]
 
 
-def draw_scene(family: str, seed: int, number: int) -> Drawn:
-    """Draw scene ``number`` of a family for this seed."""
-    place = list(FAMILIES).index(family)
-    return FAMILIES[family][0](np.random.default_rng([seed, place, number]))
-
-
 def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
     family, seed, number, methods, fixed = job
-    scene = draw_scene(family, seed, number)
+    rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
+    scene = FAMILIES[family][0](rng)
     runs = {method: play(scene, method, scene.timestep) for method in methods}
     return Played(scene.timestep, runs, fixed_steps(scene, fixed) if fixed else {})
 

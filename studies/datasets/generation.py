@@ -58,7 +58,7 @@ def draw(rows: list[Row], figure: Any) -> None:
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:
-    """Time per sample without and with collisions, and the speed of generating half of each.
+    """Time per sample without and with collisions, and generation rate of equal numbers of both.
 
     The seed was not used in development. All arms of the first split and the arm of the last split
     take part.

@@ -46,7 +46,7 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Time and error: a simulated millisecond, the SVR's sum of a sample, and all detectors."""
+    """Time and error of a simulated millisecond, of the SVR's kernel sum, and of all detectors."""
     for row in table_rows(rows, "real time"):
         question = "1 ms of arm, drives, observer and detector"
         error = f"score within {row['difference_to_online']:.0e} of the offline one"

@@ -2,7 +2,7 @@
 
 Every arm differs from the nominal arm by errors of measured magnitude. Its detectors are trained on
 its own 15 slices with the dissertation's payloads, and their thresholds come from other motion of
-that arm. They are tested on motions with other payloads, of which no detector is told.
+that arm. They are tested on motions with other payloads, which no detector is given.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -130,7 +130,7 @@ def measure(
     """Rows of the tables that :data:`NOTES` names; ``detector`` is one more, as module:Class."""
     size = QUICK if quick else FULL
     if detector is not None and detector not in size.detectors:
-        make_detector(detector)  # names what is wrong before anything is simulated
+        make_detector(detector)  # raises for a bad name before anything is simulated
         size = replace(size, detectors=(*size.detectors, detector))
     cache = JobCache.of(keep, "detection", seed, size)
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
@@ -168,7 +168,7 @@ def _rest(found: list[Row], names: Sequence[str], more: Iterator[list[Row]]) -> 
 def _fleets(
     size: Size, seed: int, arms: Sequence[int], cache: JobCache, each: Each
 ) -> dict[int, Fleet]:
-    """The detectors of every arm, with alarms from motion of the same arm."""
+    """The detectors of every arm, with thresholds from motion of the same arm."""
     # Two jobs per arm: neighbours in the list share their front end, so they stay together.
     half = -(-len(size.detectors) // 2)
     halves = [own for own in (size.detectors[:half], size.detectors[half:]) if own]
@@ -193,7 +193,7 @@ def _train(job: tuple[int, int, tuple[str, ...], Training]) -> dict[str, FittedD
 
 
 def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tallies:
-    """One speed: an arm's free motion, or (arm 0) the collisions of all arms."""
+    """Results at one speed on an arm's free motion, or (arm 0) on the collisions of all arms."""
     (size, seed, speed, arm), fleets = job
     test = stream(seed, TEST)
     if arm:

@@ -1,7 +1,7 @@
 """Simulated arms: their training slices, collisions of fixed severity, and collision-free motion.
 
 Every speed has as many collisions in each stratum of achieved peak |tau_ext| over joints 1-4, so
-that severe collisions cannot flatter a detector. Plans that found no target, or whose collision
+that many severe collisions cannot raise a result. Plans that found no target, or whose collision
 fell into another stratum, are drawn again with another seed until the strata are full.
 """
 

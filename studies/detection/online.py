@@ -1,4 +1,4 @@
-"""What one sample costs: simulated and detected in batch, then online, method by method.
+"""Computing time of one sample: simulation and detection in batch, then each method online.
 
 scikit-learn's ``SVR.predict`` gets the same windows as the kernel sum, one row per call. Its time
 includes a kernel row that NumPy computes, which is faster than scikit-learn's callable kernels.

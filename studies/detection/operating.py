@@ -1,7 +1,7 @@
 """Detectors of one arm at operating points: training, thresholds, and counted alarms.
 
 Hours of motion at 1 kHz do not fit the memory: an episode is simulated, scored by every detector,
-reduced to alarms at the operating points, and forgotten.
+reduced to alarms at the operating points, and deleted.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Operated:
         return {point: alarm.threshold for point, alarm in self.alarms.items()}
 
     def sustained(self, trace: Trace) -> dict[str, Array]:
-        """The score that each point's alarm compares with its threshold, (T,); -inf at first."""
+        """The score that each alarm compares with its threshold, (T,); -inf before it settles."""
         score, early = self.detector.scores(trace), trace.t - trace.t[0] < BEGIN
         known: dict[int, Array] = {}  # most points have the same score
         for alarm in self.alarms.values():
@@ -119,8 +119,8 @@ def operated(
     There are three points. At the first two, the network's threshold is its residual current. Every
     other detector gets the lowest threshold at which it is expected to be as specific as the
     network at every speed, so that rows compare speed by speed. The third point is a rate of false
-    alarms over all speeds, which the normalised score spreads evenly. Its threshold bounds those of
-    the first two, so at one speed a detector may be less specific than the network.
+    alarms over all speeds; normalised scores give a similar rate at each speed. Its threshold
+    limits those of the first two, so at one speed a detector may be less specific than the network.
     ``free`` is by speed [%], then by detector. Without a ``network`` there is the third point only.
     """
     found = {}

@@ -2,7 +2,7 @@
 
 Every arm has its own detectors and thresholds from its own collision-free motion with the training
 payloads. Alarms are counted on other motion of that arm, with payloads that were in no recording.
-One arm says little about a rate, because a bad moment returns in all of its motion.
+One arm says little about a rate, because its model errors recur in all of its motion.
 """
 
 from collections.abc import Iterator, Sequence

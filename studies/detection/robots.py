@@ -83,7 +83,7 @@ def _descriptions(keep: str | None) -> Iterator[Path]:
 
 
 def conditions(name: str, folder: Path) -> Conditions:
-    """The file that a robot is tested with; one with losses is written into ``folder``.
+    """Conditions of a robot's test; a file of the robot with losses is written into ``folder``.
 
     The package's own arms and descriptions (TOML) are taken as they are.
     """

@@ -21,7 +21,7 @@ DISSERTATION = {
     50.0: ((59, 6, 90, 180), (59, 6, 89, 181), (56, 9, 16, 178), (58, 7, 15, 181)),
     60.0: ((59, 6, 87, 167), (59, 6, 87, 167), (59, 6, 12, 166), (59, 6, 12, 166)),
 }
-#: Which method of the dissertation each detector stands beside: its SVR (0) or network (1).
+#: The dissertation's method with which each detector is compared: its SVR (0) or network (1).
 BESIDE = {"srq-svr": 0, "srq-svr-plain": 0, "current-network": 1}
 #: The lowest torque of the 65 tested collisions [N m].
 LOWEST = 4.0
@@ -150,9 +150,9 @@ def _dissertation(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
 def headline(found: Sequence[Row]) -> list[Row]:
     """A row per operating point and speed, from 16 N m up.
 
-    One detector is the best for all cells: its smallest rate over the cells is the largest (then
-    the sum of its rates). ``met`` says whether both of its rates reach 0.98 and both of SVR-SRQ's
-    reach those of the dissertation's SVR in that cell.
+    The best detector, the same in all cells, has the largest minimum of its rates over the cells
+    (if equal, the largest sum). ``met`` says whether both of its rates reach 0.98 and both of
+    SVR-SRQ's reach those of the dissertation's SVR in that cell.
     """
     by_name = groups(table_rows(found, "speed"), lambda row: str(row["detector"]))
 
@@ -191,15 +191,12 @@ def _values(row: Row) -> tuple[float, float]:
 def printed(found: Sequence[Row]) -> list[Row]:
     """The tables to print: speeds are columns, and the headline comes last."""
     compact = {"speed": _cells, "hourly": _hourly, "strata": _torques}
-    shown: list[Row] = []
+    same, shown = ("detector", "threshold_a", "point"), list[Row]()
     for name, make in compact.items():
-        shown += [make(own) for own in groups(table_rows(found, name), _line).values()]
+        lines = groups(table_rows(found, name), lambda r: str([r.get(key) for key in same]))
+        shown += [make(own) for own in lines.values()]
     rest = [row for row in found if row["study"] not in (*compact, "headline")]
     return shown + rest + table_rows(found, "headline")
-
-
-def _line(row: Row) -> str:
-    return str([row.get(key) for key in ("detector", "threshold_a", "point")])
 
 
 def _threshold(row: Row) -> str:

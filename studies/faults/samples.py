@@ -36,8 +36,8 @@ LASTS, AFTER = 1.0, 2.5
 #: Faults that a sample and its neighbours show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {
-    "clean": "unchanged logs: seconds in the state fault, all of them wrong, and alarms beside "
-    "those of `detect`.",
+    "clean": "unchanged logs: seconds in the state fault, all of them wrong, and alarms that "
+    "`detect` does not give.",
     "faults": "a fault of 1 s at random moments and at collisions; delays [ms] from its first "
     "sample. silent_s: time in the state free. missed: collisions within a fault during which "
     "the state stayed free; of_struck: collisions that the same samples show without the fault. "

@@ -69,7 +69,7 @@ class JobCache:
 
     @classmethod
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> JobCache:
-        """A cache in ``keep``, with a folder for each study, seed and :func:`build` of the size.
+        """A cache in ``keep``, with a folder for each study, seed and hash (:func:`build`).
 
         After a change of native code or of the study itself, use another folder: such a change is
         not detected.

@@ -158,7 +158,7 @@ def _labelled(
 def sensor_spans(t: Array, force: Array) -> list[tuple[int, int]]:
     """First and last row of each push that a sensor shows: from 4 N on until below 2 N.
 
-    A push begins at least 0.3 s after the end of the one before. ``t`` [s] and the size of the
+    A push begins at least 0.3 s after the end of the previous one. ``t`` [s] and the norm of the
     force [N] have shape (T,).
     """
     found: list[tuple[int, int]] = []
@@ -179,10 +179,6 @@ def _by_sensor(table: np.ndarray) -> tuple[Push, ...]:
     for start, end in sensor_spans(t, force):
         peak = start + int(np.argmax(force[start:end]))
         if force[peak] > 5:
-            moving = bool((np.abs(_speeds(table)[start:peak]) > 0.05).any())
+            moving = any((np.abs(table[f"qd{k}"][start:peak]) > 0.05).any() for k in range(1, 7))
             found.append(Push(float(t[start]), float(t[peak]), moving))
     return tuple(found)
-
-
-def _speeds(table: np.ndarray) -> np.ndarray:
-    return np.column_stack([table[f"qd{k}"] for k in range(1, 7)])

@@ -1,10 +1,10 @@
-"""Forces of pushes by a detector and by a twin, compared with a force sensor.
+"""Forces of pushes, estimated by a detector and simulated by a twin, beside a force sensor.
 
 A UR5 stands still and is pushed at the tool, where a sensor measures the force. Detector and twin
 come from its logs without contact. A row of table ``force`` compares one alarm with the sensor:
 peak, impulse and contact time as ``detect --at-tool`` gives them, from the beginning of the contact
 (perhaps before the alarm) to the end of the alarm. A row of ``pushed twin`` is one push: the twin
-has the arm's pose and gets the sensor's force, and its joint torques stand beside the arm's.
+has the arm's pose and gets the sensor's force, and its joint torques are compared with the arm's.
 
 How the sensor was mounted is not documented. Its rotation relative to the flange is fitted to the
 joint torques of every second push; rows say which. Its lever is not fitted, because in the one pose

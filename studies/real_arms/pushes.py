@@ -5,10 +5,10 @@ the other folds, and gets the log's load if it is known. For logs with pushes a 
 on all collision-free logs. For a Panda's touches it is trained on the untouched beginnings of the
 other logs. An alarm finds a push if it begins after 0.15 s before the start and before the peak of
 the force (or the end of a labelled touch, or the first half second of a push that lasts seconds).
-``by chance`` is the number of pushes that the same alarms find after a random shift of all.
+``by chance`` is the number of pushes that the alarms find if a random time is added to all of them.
 
-Beside ours stand the observers of :mod:`studies.real_arms.observers`, with our calibration, and
-Franka's own estimate of the external torque with the thresholds of libfranka's examples.
+Our detector is compared with the observers of :mod:`studies.real_arms.observers`, which use our
+calibration, and with Franka's estimate and the torque thresholds of libfranka's examples.
 
 The results are optimistic: the constants of the bound were chosen on the logs of UR10e, UR5, UR3
 and the Panda. On a new arm they are a little worse.

@@ -21,10 +21,9 @@ def within(question: str, bound: float, times: Sequence[float], quick: bool) -> 
 def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
     """Require the largest error, or number of errors, to be at most ``bound``."""
     known = [value for value in values if value is not None]
-    most = max(known, default=None)
-    if most is None:
+    if not known:
         return answer(question, f"at most {bound:g}", "not measured")
-    return answer(question, f"at most {bound:g}", f"{most:.3g}", most <= bound)
+    return answer(question, f"at most {bound:g}", f"{max(known):.3g}", max(known) <= bound)
 
 
 def count(rate: Row) -> float:

@@ -54,7 +54,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
         error("time of impact: largest error", 1e-7, [row["toi_error_max"] for row in own]),
         within("time of impact: us a hit", 20, [row["us_hit"]["median"] for row in own], quick),
         error("bodies with radii: met before, by coal", 0, [row["met_before"] for row in radii]),
-        error("and coal's distance at the time", 1e-6, [row["distance_at_toi"] for row in radii]),
+        error("radii: coal's distance at the hit", 1e-6, [row["distance_at_toi"] for row in radii]),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Model only what a scene needs: what a part costs, and what leaving it out does to a detector.
+"""Computing time of each part of a simulation, and a detector trained without the part.
 
 The shipped detector and its threshold are trained on recordings whose simulation lacks one part. It
 is then judged on other motion, twice: in the same poorer simulation (what a user would believe) and
@@ -28,8 +28,8 @@ PER_HOUR = 10.0
 OTHERS = ("model errors", "payloads")
 #: Loads with which a detector is judged [g].
 PAYLOADS = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
-#: Numbers of episodes: to train on with 5 collisions each and without (40 s), to judge on with 8
-#: collisions each and without (50 s).
+#: Numbers of episodes: for training with 5 collisions each, and without (40 s); for the test with 8
+#: collisions each, and without (50 s).
 FULL, QUICK = (12, 18, 9, 24), (2, 3, 1, 1)
 NOTES = {
     "needs": "srq-svr trained on simulations without a part for 10 false alarms per hour, and "

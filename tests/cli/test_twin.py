@@ -115,9 +115,9 @@ def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, c
         monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
     run(folder, "train", "--twin", made, "--free", folder / "free", "--model", model)
     said = capsys.readouterr().out
-    assert "free-motion and srq-svr, of 3 logs and" in said
+    assert "free-motion and srq-svr, trained on 3 logs and" in said
     assert "threshold is 5 times the highest score of 3 logs, whatever --false-alarms" in said
-    assert "more, separate logs lower it" in said
+    assert "it is high because there are few logs: add separate logs" in said
     alarm = load_model(model)
     assert alarm.detector.arm.robot.joint_names == ("a", "b", "c")
     found = alarm.detector
@@ -181,7 +181,7 @@ def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):
     run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
     said = capsys.readouterr().out
     assert "c: hardly moves; its friction is a prior" in said
-    assert "not judged: each third log without a load is left out to judge, and there is" in said
+    assert "not judged: every third log, if it has no load, is left out for the test, and" in said
     assert "# c: hardly moves" in (tmp_path / "t.toml").read_text()
 
 
@@ -219,6 +219,6 @@ def test_short_logs_make_a_twin_without_intervals(folder, tmp_path, capsys):
     logs, out = [tmp_path / f"log{seed}.csv" for seed in (1, 2)], tmp_path / "t.toml"
     run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", out)
     said = capsys.readouterr().out
-    assert "intervals lack a part of the logs: 6.9 s of motion, from each log's first to" in said
+    assert "a twin for the intervals is missing: 6.9 s of motion, from each log's first to" in said
     (viscous,) = (line for line in out.read_text().splitlines() if line.startswith("viscous"))
     assert viscous.endswith("# N m s/rad")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tauguard.cli.free_logs import FreeLogs
     from tauguard.detectors.calibration.identification import Identified
 
-#: A lower torque per current unit [N m/A] suggests that the columns hold torques (about 1 then).
+#: Below this torque per unit of the current columns [N m/A], the columns probably hold torques.
 SMALL_GAIN = 2.0
 SOURCES = {
     "torques": "the logs' torques",
@@ -74,7 +74,7 @@ def command(
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
-    beside = robot if robot.exists() else Path(robot.name)  # of an arm by name: the working folder
+    beside = robot if robot.exists() else Path(robot.name)  # for an arm by name: the working folder
     robot = bodies_file(robot)
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains cannot be combined with --scale {scale}, which finds the gains")
@@ -95,9 +95,9 @@ def command(
 
 
 def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, list[Array]]:
-    """The calibrated arm, and the residual RMS of each log without its own calibration [N m].
+    """The calibrated arm, and each log's residual RMS with a calibration from the other logs [N m].
 
-    Each RMS has shape (n,); there are none if too few logs are given to leave one out.
+    Each RMS has shape (n,). With too few logs to leave one out, the list is empty.
 
     Raises:
         ValueError: exchanged joints, other bodies than the robot file's, a wrong load, or bursts of
@@ -152,7 +152,7 @@ def summary(names: list[str], found: Identified, held: list[Array], target: Path
 
 
 def report(result: dict[str, Any], found: Identified) -> None:
-    """Print the results; of a joint that moves in no log, only the gain and the mass."""
+    """Print the results. For a joint that moves in no log, only gain and mass are printed."""
     from tauguard.cli.help_text import print_notes
     from tauguard.report import table
 

@@ -132,8 +132,8 @@ def asked_and_found(summary: dict[str, Any]) -> str:
     return (
         f"  false alarms per hour: asked {wanted['per_hour']:g}; found {found['value']:.1f}, "
         f"95 % interval {other}, from {found['n']} alarms in {60 * found['hours']:.0f} min\n"
-        f"  ({60 * wanted['hours']:.0f} min of training motion set the threshold and are "
-        f"consistent with {own} per hour. The tested motions are different ones.)"
+        f"  (The threshold was set on {60 * wanted['hours']:.0f} min of training motion, with a "
+        f"95 % interval of {own} per hour. The test motions are different.)"
     )
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
-#: Default length of the beginning that a detector without a model learns from [s].
+#: Without a model, the detector is trained on this length of the log's beginning [s].
 QUIET = 20.0
 
 
@@ -210,7 +210,7 @@ def explained(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Diagnosis of each alarm and notes; without a chain of links in the file, only torques."""
+    """Diagnoses of alarms, and notes. Without a chain of links in ``robot``, only torques."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
@@ -226,12 +226,12 @@ def explained(
         contact_torque = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
         return [
             {"summary": one.text(trace.joint_names), **torques(one)} for one in contact_torque
-        ], (f"{error}: links and forces are not looked for",)
+        ], (f"{error}: links and forces are not estimated",)
     notes: tuple[str, ...] = ()
     if sticks:
         notes = (
-            f"{robot.name}: no shape found of {', '.join(sticks)}: thin capsules stand in "
-            "for them to find link and force. Put the meshes into the file's folder or a "
+            f"{robot.name}: no shape found of {', '.join(sticks)}: thin capsules replace them "
+            "when link and force are estimated. Put the meshes into the file's folder or a "
             "folder above it for better results",
         )
     found_causes = Diagnoser.of(detector.arm, surface, at_tool, load_known).diagnose(trace, alarms)

@@ -117,7 +117,7 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     for leak in report["leaks"]:
         lines.append(f"LEAK: {leak}")
     if not report["leaks"]:
-        lines.append("splits share no motion, and nothing declared unseen is in the first split")
+        lines.append("no motion is in two splits, and no value declared unseen in the first one")
     if damaged is None:
         lines.append("files not checked (--verify reads every byte)")
     elif damaged:

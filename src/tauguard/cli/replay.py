@@ -67,7 +67,7 @@ def newest(path: Path) -> Path:
 
 
 def _fits(recording: Path, file: Path) -> bool:
-    """Whether both files exist and the recording is not older."""
+    """Whether both files exist and ``recording`` is not older than ``file``."""
     both = recording.exists() and file.exists()
     return both and recording.stat().st_mtime >= file.stat().st_mtime
 

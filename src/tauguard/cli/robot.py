@@ -73,7 +73,7 @@ def command(
 
 
 def largest_force(scene: Scene) -> float:
-    """The largest force of the arm alone on a skull, the stiffest body region [N]."""
+    """The largest force that the arm without a load can exert on a skull, a stiff region [N]."""
     from tauguard.models import BODY_REGIONS, derive
 
     facts = scene.facts

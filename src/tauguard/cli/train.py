@@ -56,8 +56,8 @@ def command(
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Recordings with
             labelled collisions are refused; collisions without a label raise the threshold.
-        false_alarms_per_hour: rate that the threshold aims at on motion like the training's
-            (default: 10), or guarantees with --calibration. With --free, training fails if
+        false_alarms_per_hour: accepted rate on motion like the training's (default: 10). With
+            --calibration the threshold guarantees this rate. With --free, training fails if
             cross-validation shows a higher rate.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
@@ -165,7 +165,7 @@ def labelled_motion(
     from tauguard.detectors.thresholds.guarantee import check_guarantee
     from tauguard.report import two_digits
 
-    # Name what cannot be used or guaranteed before the training, which takes minutes.
+    # Check inputs and guarantee first, because the training takes minutes.
     method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ValueError(
@@ -206,8 +206,8 @@ def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -
     low, high = map(two_digits, expected.interval(alarm.threshold))
     minutes = max(1, round(60 * expected.hours))
     return (
-        f"aimed at {rate:g} false alarms per hour; the {minutes} min of motion "
-        f"that set the threshold are consistent with {low} to {high} (95 %)"
+        f"requested: {rate:g} false alarms per hour; 95 % interval of the rate in the {minutes} "
+        f"min of motion on which the threshold was set: {low} to {high}"
     )
 
 
@@ -299,8 +299,8 @@ def odd_notes(sifted: CrossValidation) -> list[str]:
         for log in sifted.accepted
     ]
     notes += [
-        f"{log.name}: its torques differ from the other logs' all along: did the arm carry "
-        f"something (then give --payload {log.name}=KG or =unknown)?"
+        f"{log.name}: its torques differ throughout from those of the other logs: did the arm "
+        f"carry something (then give --payload {log.name}=KG or =unknown)?"
         for log in sifted.kept
         if log.throughout
     ]

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
 
-#: Number of episodes with contacts, each of a twin with other model errors; contacts in each.
+#: Number of simulated episodes, each with other model errors of the twin; contacts per episode.
 STRUCK, CONTACTS = 24, 6
-#: Duration of a hand's push [s]; fraction of the strikes that become pushes; fraction of the pushes
-#: that meet a standing arm.
+#: Range of a push's duration [s]; fraction of the planned strikes that are replaced by pushes;
+#: fraction of these pushes that occur while the arm stands.
 PUSH, PUSHED, STANDING = (0.1, 1.2), 0.5, 0.5
 #: Speeds of the episodes in turn, in percent of the joints' largest speeds.
 SPEEDS = (10.0, 30.0, 60.0)
@@ -79,8 +79,8 @@ def twin_contacts(
     save_model(CollisionAlarm(both, 1.0, CONFIRMATION, inputs=usual), model)
     count = sum(len(trace.truth.collisions) for trace in struck if trace.truth)
     print(
-        f"{model}: {both.name}, of {len(logs)} logs and {count} contacts of the twin; the learned "
-        f"score's threshold is {learned.threshold:.3g}"
+        f"{model}: {both.name}, trained on {len(logs)} logs and {count} contacts of the twin; the "
+        f"learned score's threshold is {learned.threshold:.3g}"
     )
     print(f"{detector}: {aimed_at(learned, scores, per_hour)}")
     print_notes(notes)

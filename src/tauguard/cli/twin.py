@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
     from tauguard.twin import Likeness, Twin
 
-#: Number of parts of the logs; leaving out each in turn gives the intervals.
+#: Number of parts into which the logs are divided for the jackknife that gives the intervals.
 PARTS = 5
 #: Half width of a 95 % interval in standard deviations.
 WIDE = 1.96
@@ -142,7 +142,7 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
 
 
 def sure_of(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]:
-    """The twin with intervals from twins that lack a part of the logs, and its notes."""
+    """The twin with intervals from twins identified without a part of the logs, and its notes."""
     from tauguard.detectors.calibration.recording import pieces
     from tauguard.twin import with_intervals
 
@@ -150,7 +150,7 @@ def sure_of(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]
     rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
     others, lacking = _made_of_each(given, rest, limit)
     twin = with_intervals(twin, others)
-    return twin, [*twin.notes, *(f"intervals lack a part of the logs: {why}" for why in lacking)]
+    return twin, [*twin.notes, *(f"a twin for the intervals is missing: {why}" for why in lacking)]
 
 
 def judged(
@@ -208,7 +208,7 @@ def report(
 
     if likeness is None:
         why = f"without {', '.join(logs)}, the other logs make no twin ({'; '.join(reasons)})"
-        few = "each third log without a load is left out to judge, and there is none"
+        few = "every third log, if it has no load, is left out for the test, and there is none"
         print(f"not judged: {why if logs else few}; give more logs, or --judge")
         return []
     kinds = {
