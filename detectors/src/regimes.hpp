@@ -21,7 +21,8 @@
 // In motion the signal is the residual without slow errors. The bound is linear in speed,
 // accelerations and slowness; slowness covers friction between static and sliding near standstill.
 // A joint that starts gets a higher bound, and so does one that is faster or accelerates harder
-// than the training logs show: friction and inertia beyond them are extrapolated.
+// than the training logs show: friction and inertia beyond them are extrapolated. The parts due to
+// acceleration decay as the residual does: the observer still shows an error when its jerk is over.
 //
 // A joint that moves in no training log has `low` and `high`, the positions at which it stood.
 // While it moves, and soon after, nothing is judged. While it stands elsewhere, moving joints are
@@ -74,6 +75,7 @@ class Regimes {
   static constexpr double after = 1.0;       // time after a contact: only change away counts [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`
+  static constexpr double lag = 1.0 / 30.0;  // time constant of the observer [s]
   static constexpr double farthest = 3.0;    // largest addition, in units of `beyond`
   static constexpr double released = 0.5;    // a contact ends below this fraction of its peak
   static constexpr double kept = 1.0;        // time without a change that can end a contact [s]
@@ -151,10 +153,11 @@ class Regimes {
       double signal = left[j];
       if (one.rest) {
         if (!was || age_ < settling) one.base = one.before = residual[j];
+        one.shaken = one.hard = 0.0;
         bound[j] = of_.rest[j] + std::max(of_.stop[j] * stirred_, of_.turned[j] * one.own);
         signal = changed(one, residual[j], bound[j], dt);
       } else {
-        bound[j] = moving(j, qd[j], qdd[j], hardest) + spread[j];
+        bound[j] = moving(j, qd[j], qdd[j], hardest, dt) + spread[j];
       }
       const bool judged = unknown_for_ <= 0.0 && (one.rest || !elsewhere_);
       ratio[j] = judged ? std::fabs(signal) / bound[j] : 0.0;
@@ -187,18 +190,20 @@ class Regimes {
     double own = 0.0;                 // fraction of `turned` that is added to the bound
     double above = 0.0;               // weighted time above the bound [s]
     int count = 0;                    // number of successive samples above the bound
+    double shaken = 0.0, hard = 0.0;  // parts of the bound due to acceleration [N m], [beyond]
     int close = 0;                    // and above `near` times the bound, in motion
     bool rest = false, held = false;  // held: takes part in a contact
   };
 
-  double moving(std::size_t j, double qd, double qdd, double hardest) const {
+  double moving(std::size_t j, double qd, double qdd, double hardest, double dt) {
     const double* per = &of_.moving[RegimeBounds::terms * j];
-    const double speed = std::fabs(qd);
-    const double linear = per[0] + per[1] * speed + per[2] * std::fabs(qdd) + per[3] * hardest +
-                          per[4] * std::exp(-speed / creep);
-    const double more = std::max(speed / of_.fast[j] - 1.0, 0.0) +
-                        harder * std::max(std::fabs(qdd) / of_.hard[j] - 1.0, 0.0);
-    return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-joints_[j].moved / starts) +
+    Joint& one = joints_[j];
+    const double speed = std::fabs(qd), keep = std::exp(-dt / lag);
+    one.shaken = std::max(per[2] * std::fabs(qdd) + per[3] * hardest, keep * one.shaken);
+    one.hard = std::max(harder * (std::fabs(qdd) / of_.hard[j] - 1.0), keep * one.hard);
+    const double linear = per[0] + per[1] * speed + per[4] * std::exp(-speed / creep) + one.shaken;
+    const double more = std::max(speed / of_.fast[j] - 1.0, 0.0) + one.hard;
+    return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-one.moved / starts) +
            of_.beyond[j] * std::min(more, farthest);
   }
 
