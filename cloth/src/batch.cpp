@@ -15,8 +15,8 @@ TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
   return (Double4)((std::int64_t{0x7fe} << 52) - exponent);
 }
 
-// Computes the Bernstein coefficients of the cubics and their error bounds. Let u = 2^-53 and M the
-// product of the largest |p|, |q| and |r|. The errors are at most
+// Computes the Bernstein coefficients of the cubics p . (q x r) and their error bounds. Let u =
+// 2^-53 and M the product of the largest |p|, |q| and |r|. The errors are at most
 //   u           of a difference (relative),
 //   48 u M      of a triple product: 6 terms, each with 3 u of its factors and 5 u of arithmetic,
 //   108 u M     of a mixed product p . (q0 x r1 + q1 x r0), which has 12 terms,
@@ -100,11 +100,11 @@ TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Grou
 }
 
 // Decides whether features touch at the start if their four vertices have one equal coordinate, or
-// if vertices of both coincide. In the first case they touch if the origin is on one side of an
-// edge of the hull and on the other side of no edge. With u = 2^-53, the relative error is 3 u for
-// a product of two differences and 4 u = 2^-51 for the difference of two products. A side is
-// exactly 0 if both products have a zero factor, which is frequent for faces with edges along the
-// axes.
+// if a vertex of one is a vertex of the other. In the first case they touch if the origin is on one
+// side of an edge of the hull and on the other side of no edge. With u = 2^-53, the relative error
+// is 3 u for a product of two differences and 4 u = 2^-51 for the difference of two products. A
+// side is exactly 0 if both products have a zero factor, which is frequent for faces with edges
+// along the axes.
 template <bool vf, bool packed>
 TAUGUARD_INLINE void at_start(const Ends& x, const std::int32_t* rows, const std::int32_t* queries,
                               int n, AtStart* found) {

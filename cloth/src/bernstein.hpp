@@ -183,8 +183,8 @@ Bernstein<degree> reversed(const Bernstein<degree>& f) {
   return r;
 }
 
-// The r of m f = q l + r (1 - t)^(n - 1), with m > 0 and with l and r of degree 1. Where q is zero,
-// f has the sign of r. The last coefficient of q must not be zero.
+// The remainder r in m f = q l + r (1 - t)^(n - 1), with m > 0 and with l and r of degree 1. Where
+// q is zero, f has the sign of r. The last coefficient of q must not be zero.
 inline std::array<FixedInt<14>, 2> remainder(const Bernstein<3>& f, const Bernstein<2>& q) {
   const auto& [q0, q1, q2] = q.c;
   const auto& [f0, f1, f2, f3] = f.c;

@@ -23,10 +23,10 @@ struct CandidateBlock {
   std::uint64_t adjacent = 0, kept_apart = 0;
 };
 
-// Which vertices are tested against isolated features. Isolated edges and isolated vertices are
-// numbered after the triangles (topology.hpp); `first` is the lowest of these numbers. `point`
-// marks the isolated vertices. Only isolated vertices are tested against isolated features, and
-// each pair of isolated vertices is tested once.
+// Isolated edges and vertices, which belong to no triangle (topology.hpp). They are numbered after
+// the triangles; `first` is the lowest of these numbers. `point` marks the isolated vertices. Only
+// isolated vertices are tested against isolated features, and each pair of isolated vertices is
+// tested once.
 struct Isolated {
   std::int32_t first;
   const std::uint8_t* point;  // null: there are none

@@ -307,7 +307,7 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
       if (new_id[id] < 0) {
         put(leaf, lane, -1, features);
       } else {
-        id = new_id[id];  // it has the same vertices
+        id = new_id[id];  // the new number of the same feature
       }
     }
   for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];

@@ -38,8 +38,8 @@ class FeatureTree {
   // Places every feature by the centroid that its vertices have at the start of the step. The upper
   // levels of the tree divide the groups, the lower ones divide space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
-  // Computes the bounds of every leaf and node for this step, those of features in 16 bits or as
-  // floats.
+  // Computes the bounds of every leaf and node for this step. Bounds of features have 16 bits or
+  // are floats.
   void refit(const Projection& points, bool in_short, int threads);
   // Replaces the features by `features`. Old feature i becomes new_id[i]; -1 removes it. New
   // features are placed near features that share their vertices. False if there are not enough free

@@ -118,7 +118,7 @@ class Walk {
     for (int i = 0; i < n; ++i) descend(child[i]);
   }
 
-  // The parent of a pair: the deeper node came from a split, or both nodes if their depth is equal.
+  // The parent of a pair, with the parent of the deeper node, or of both nodes at equal depth.
   NodePair parent(NodePair p) const {
     const int gap = depth(p.a) - depth(p.b);
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};

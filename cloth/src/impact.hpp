@@ -20,7 +20,7 @@ struct ImpactArrays {
 
 inline Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }
 
-// Weights on a degenerate face (b, c, d), of the point on the longest edge that is nearest to `a`.
+// Weights of the point nearest to `a` on the longest edge of a degenerate face (b, c, d).
 inline void on_longest_edge(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* w) {
   const Vec3 ends[3][2] = {{b, c}, {b, d}, {c, d}};
   constexpr int weight[3][2] = {{1, 2}, {1, 3}, {2, 3}};

@@ -16,8 +16,8 @@ namespace tauguard::cloth {
 namespace {
 
 // Whether the direction m separates the features by more than the minimum distance at times a and
-// b: all gaps are on the same side. Rounding errors in units of |m|_1 big: u of a difference, 3 u
-// of a dot product, 6 u of the interpolation. Together they are 10 u; the bound is 16 u.
+// b: all gaps along m have the same sign. Rounding errors in units of |m|_1 big: u of a difference,
+// 3 u of a dot product, 6 u of the interpolation. Together they are 10 u; the bound is 16 u.
 bool separated(const Query& k, Vec3 m, double a, double b) {
   const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
   const double margin = 16 * unit_roundoff * m1 * k.big +
@@ -38,7 +38,7 @@ bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
   return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
          (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
 }
-// Whether the direction between two vertices, or between a vertex and an edge, separates them.
+// Whether a direction between two vertices, or a vertex and an edge, separates the features.
 bool edge_direction(const Query& k, double t, double a, double b) {
   const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
   for (int i = 0; i < k.gaps; ++i) {

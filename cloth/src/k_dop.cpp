@@ -81,8 +81,8 @@ void Projection::set(const Ends& x, std::size_t n, VolumeKind kind, double min_d
 
   for (int a = 0; a < axes; ++a) {
     const int terms = std::abs(axis[a][0]) + std::abs(axis[a][1]) + std::abs(axis[a][2]);
-    // Half of the distance in scaled units, times |axis| / 2^(terms - 1). If it is too large for
-    // float32, it becomes infinite; then nothing is apart, which is conservative.
+    // Half of the minimum distance in scaled units, times |axis| / 2^(terms - 1). If it is too
+    // large for float32, it becomes infinite; then nothing is apart, which is conservative.
     const double margin =
         0.5 * min_distance * first * second * std::sqrt(double(terms)) / (1 << (terms - 1));
     const double padded = margin * (1 + 0x1p-20) + 0x1p-22;

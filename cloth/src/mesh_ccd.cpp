@@ -15,14 +15,14 @@ namespace {
 constexpr std::size_t chunk_pairs = 512;  // number of leaf pairs in a chunk
 // A tree is rebuilt if the sum of its leaves' extents has grown by this factor since the build.
 constexpr double worn = 2;
-// Volumes are moving in steps in which vertices move, on average, by more than this fraction of an
-// edge. In slower steps the second interval costs more than the candidates that it saves
-// (measured on meshes of 20,000 to 90,000 triangles: equal between 0.37 and 0.42). Features at rest
-// count: their second interval costs as much and saves less.
+// Volumes are moving (k_dop.hpp) in steps in which vertices move, on average, by more than this
+// fraction of an edge. In slower steps the second interval costs more than the candidates that it
+// saves (measured on meshes of 20,000 to 90,000 triangles: equal between 0.37 and 0.42). Features
+// at rest count: their second interval costs as much and saves less.
 constexpr double fast = 0.39;
 constexpr std::size_t sampled = 1024;  // number of vertices, and of edges, in these means
-// Bounds of features have 16 bits if a step of theirs is, on average, at most this fraction of an
-// edge. With longer steps too many volumes that are apart overlap in 16 bits.
+// Bounds of features have 16 bits if their resolution is, on average, at most this fraction of an
+// edge. With a coarser one too many volumes that are apart overlap in 16 bits.
 constexpr double fine = 1.0 / 64;
 // The limit on entries of a front is this many times the limit on collisions.
 constexpr std::size_t leaf_pairs = 8;

@@ -40,7 +40,7 @@ class MeshCcd {
  public:
   enum class Kind { vf, ee };
 
-  // adaptive: choose in each step whether the volumes are moving.
+  // adaptive: choose in each step whether the volumes are moving (k_dop.hpp).
   MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, bool adaptive,
           int threads);
 
@@ -75,8 +75,8 @@ class MeshCcd {
     double value[Ends::line];
   };
   void copy(const double* x_t0, const double* x_t1, std::size_t n);
-  // A length as a fraction of an edge (of its largest coordinate), at most 1, in the mean of the
-  // edges: a few long ones do not count. NaN without edges.
+  // The mean over the edges of length / (largest coordinate of the edge), where quotients above 1
+  // count as 1. So a few long edges have little effect. NaN without edges.
   double over_edges(double length) const;
   bool is_fast() const;
   void place(double min_distance);

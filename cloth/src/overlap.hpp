@@ -20,7 +20,7 @@ using Mask = std::uint32_t;  // one bit per lane
 // A block has 16 volumes, [axis][end of the step][low, high][lane]. A node has one volume,
 // [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) on every axis.
 //
-// A bound is a float, or 16 bits if a float is too precise to be worth its time. The conversion is
+// A bound is a float, or an integer of 16 bits where that precision suffices. The conversion is
 // monotone, so that volumes that overlap also overlap in 16 bits.
 inline constexpr int shorts_of_unit = 32000;  // a projection is at most 1 (k_dop.hpp)
 TAUGUARD_INLINE void convert(geometry::Float4 x, float* to) { std::memcpy(to, &x, sizeof x); }
@@ -29,7 +29,7 @@ TAUGUARD_INLINE void convert(geometry::Float4 x, std::int16_t* to) {
   x = most * x;
   x = x < most ? x : geometry::Float4{} + most;
 #if defined(__x86_64__)
-  const __m128i whole = _mm_cvttps_epi32(x);  // -2^31 for less than that
+  const __m128i whole = _mm_cvttps_epi32(x);  // -2^31 for any x below -2^31
   _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packs_epi32(whole, whole));
 #else
   for (int i = 0; i < 4; ++i) to[i] = static_cast<std::int16_t>(x[i] > -most ? x[i] : -most);

@@ -64,7 +64,7 @@ inline std::pair<Shape, LocalFrame> shape_of(int core, const Doubles& size, doub
   return {std::move(shape), frame};
 }
 
-// Binds the guarded stepper.
+// Adds the guarded stepper (stepper.hpp) to the Python module.
 void bind_guard(nb::module_& m);
 
 }  // namespace tauguard::contacts

@@ -11,7 +11,7 @@
 
 namespace tauguard::contacts {
 
-// Bits of MuJoCo's mjtState: the parts of a state that determine a step; those for the kinematics.
+// Bits of MuJoCo's mjtState: `integration` for all that determines a step, `pose` for kinematics.
 struct Signatures {
   int integration, pose;
 };

@@ -71,7 +71,7 @@ void Mocap::write(const Poses& poses) {
   }
 }
 
-// Computes the kinematics of `other` for its joint positions and these mocap poses.
+// Computes the kinematics of `other` for its joint positions and the given mocap poses.
 void Mocap::stand(const Poses& poses) {
   for (std::size_t m = 0; m < poses.size(); ++m) {
     std::copy_n(poses[m].pos, 3, e_.other_mocap_pos + 3 * m);

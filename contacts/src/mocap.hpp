@@ -26,21 +26,22 @@ class Mocap {
     a(start_), a(time_);
   }
 
-  // Takes the present poses as the start of the next step's motion.
+  // Stores the present poses as the start of the motion in the next step.
   void remember();
   // Begins a step at the present state. False if the user changed the state since the last step.
   bool begin();
   bool moves() const { return moves_; }  // whether some mocap body moves in this step
 
-  // Sets the part of the motion for the next attempt, from and to fractions of the step. The data
-  // must be at the start of this part.
+  // Sets the part of the motion in the next attempt: `from` and `to` are fractions of the step. The
+  // data must be at the start of this part.
   void sub_step(double from, double to);
   // Write poses to the data: of the sub-step's start, of its end, or as commanded by the user.
   void depart() { write(from_); }
   void arrive() { write(to_); }
   void command() { write(commanded_); }
 
-  // Poses at the start. In a whole step the data has mocap poses of the end, so `other` is read.
+  // Poses at the start. In a whole step they are in `other`, because the data has the poses of the
+  // end.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
   const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
   const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }

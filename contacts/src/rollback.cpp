@@ -24,7 +24,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
   push_ = s_.push / whole_;
-  if (hits.empty()) {  // held pairs were pushed out too fast; nothing else is wrong
+  if (hits.empty()) {  // no hits: contacts added too much energy, so nothing is pushed out
     push_ = 0;
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
@@ -98,8 +98,8 @@ std::vector<Held> Stepper::held(double length) const {
   return out;
 }
 
-// Whether the hits are acceptable: no pair passes through, and a pair becomes deeper only if it is
-// held and the sub-step is already short.
+// Whether the hits are acceptable: no pair passes through, every pair is held (rows.hpp), and the
+// sub-step is already short.
 bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
@@ -141,8 +141,8 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     again();
   }
   if (!mocap_.moves()) return change;
-  // A mocap body may pass through bodies that were slowed down. Then they get their full speed
-  // again: too much energy is the smaller error.
+  // If a moving mocap body passes through a body that was slowed down, all bodies get their full
+  // speed again: too much energy is the smaller error.
   if (passes()) go(1), note_passed(), again();
   return change;
 }

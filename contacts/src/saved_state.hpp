@@ -1,4 +1,5 @@
-// Saves a guard's memory of earlier steps as bytes, so that a copy can continue with equal bits.
+// Saves a guard's memory of earlier steps as bytes, so that a copied guard continues with equal
+// bits.
 #pragma once
 
 #include <cstring>

@@ -163,7 +163,7 @@ bool Stepper::step(const std::function<void()>& each) {
   return false;
 }
 
-// Accepts the plain step. True if the parameters of some pair were restored.
+// Accepts the plain step. True if the contact parameters of some pair were restored.
 bool Stepper::stands() {
   watched_ = std::max(watched_ - 1, 0);
   if (!guarded_count_) return false;
@@ -242,8 +242,8 @@ void Stepper::note_lost(const std::vector<PairHit>& hits) {
     if (hit.lost) passed_[hit.pair] = 1;
 }
 
-// Removes hits of pairs that are no longer guarded. Also removes hits that touched and parted
-// within the step if MuJoCo listed a contact.
+// Removes hits of pairs that are no longer guarded. Also removes pairs that touched and separated
+// within the step if MuJoCo listed a contact of the pair.
 std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
   hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
@@ -273,14 +273,14 @@ std::vector<char> Stepper::listed() const {
   return seen;
 }
 
-// Releases the pairs that have separated. Returns the pairs whose parameters were restored.
+// Releases the pairs that have separated. Returns those whose contact parameters were restored.
 std::vector<int> Stepper::release() {
   std::vector<int> out;
   if (!guarded_count_) return out;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
-    // Pairs with a moving mocap body are always released: the mocap body sinks into other bodies
-    // within a whole step, and a stiff contact would eject them.
+    // Pairs with a moving mocap body are always released: in a whole step the mocap body sinks into
+    // other bodies, and a stiff contact would eject these.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

@@ -1,5 +1,5 @@
-// The guarded step: a plain step if no pair passes through. Otherwise it is rolled back and
-// repeated in sub-steps that stop the approach (rows.hpp).
+// The guarded step. A step of MuJoCo is rolled back if a pair goes too deep or separates unnoticed,
+// or if contacts add too much energy. Sub-steps that stop the approach repeat it (rows.hpp).
 #pragma once
 
 #include <cmath>
@@ -12,13 +12,13 @@
 
 namespace tauguard::contacts {
 
-// A pair that a step brings into contact. For a flex, `time` is the earliest time and `deepest` the
-// deepest level over the flex's simplices. The shapes of each level are eroded by a larger depth
-// (verdict.hpp).
+// A pair whose eroded shapes meet in a step, or that touches and separates in it. Level k erodes by
+// a depth that grows with k (verdict.hpp). For a flex, `time` is the earliest time and `deepest`
+// the deepest level over its simplices.
 struct PairHit {
   int pair, deepest;  // number of the pair; deepest level whose eroded shapes met
   bool passed;        // the eroded shapes of the last level met: the pair would have passed through
-  bool lost;          // those of the last level meet at the start of the step: no longer guarded
+  bool lost;          // even these shapes overlap at the start of the step: no longer guarded
   bool brushed;       // the pair touched and separated within the step; no eroded shapes met
   double time;        // first touch, as a fraction of the step; 0 if the pair touched at the start
   double way;         // upper bound on how far the two shapes approach each other in the step [m]
@@ -54,10 +54,10 @@ struct Settings {
 
 class Stepper {
  public:
-  // Appends the crossings of flexes with flexes in a step.
+  // Appends the pairs of flexes that cross in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
-  // The pairs that impact zones stopped. ImpactZone(hits, qpos, length) repeats a sub-step of
-  // `length` [s] from `qpos` with the pairs of the hits in impact zones.
+  // Result of ImpactZone(hits, qpos, length), which repeats a sub-step of `length` [s] from `qpos`
+  // and joins the pairs of the hits to impact zones. `pairs`: all pairs in these zones.
   struct Stopped {
     std::vector<int> pairs;
     double work;  // work of mocap bodies [J]
@@ -74,8 +74,8 @@ class Stepper {
   void set_callbacks(TunnellingEvents tunnelling, ImpactZone impact_zone) {
     tunnelling_ = std::move(tunnelling), impact_zone_ = std::move(impact_zone);
   }
-  // Advances by one timestep; `each` is called after every sub-step. Returns true if the report has
-  // nothing but the number of contacts.
+  // Advances by one timestep; `each` is called after every sub-step. Returns true if the number of
+  // contacts is all that the report contains.
   bool step(const std::function<void()>& each);
   std::vector<PairHit> judge();
   std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
@@ -138,12 +138,12 @@ class Stepper {
   std::vector<char> guarded_;
   int guarded_count_ = 0, watched_ = 0, since_ = 0, contacts_ = 0;
 
-  // State of the step that is rolled back.
+  // State of a step while it is repeated in sub-steps.
   Report report_;
   double whole_ = 0, rest_ = 0, push_ = 0;  // whole and remaining time [s]; push-out rate [1/s]
   double least_ = 0;                        // smallest sub-step, as a fraction of the step
   int stops_ = 0;                 // number of impact zones in the last step that was rolled back
-  std::map<int, double> speeds_;  // held pairs, and the bound of their speed of approach [m/s]
+  std::map<int, double> speeds_;  // held pairs; bound on the speed of their approach [m/s]
   std::vector<char> passed_, in_zone_;
 };
 

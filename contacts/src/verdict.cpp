@@ -7,16 +7,16 @@ namespace tauguard::contacts {
 namespace {
 
 // Shapes nearer than the fraction `resting` of their size count as touching at the start. Sweeps
-// report a touch below the fraction `touching`, so a resting pair that separates is no hit.
+// report a touch only below the fraction `touching`, so a resting pair that separates is no hit.
 constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
 // Distances in unit roundoffs of the positions. `rounded` is the margin by which pairs must be
-// apart at the start. `left_over` is below the least distance that a sweep of the last eroded
-// shapes leaves (first_contact leaves 128).
+// apart at the start. A sweep of the shapes of the last level ends at a distance of at least 128
+// (first_contact); `left_over` is below it.
 constexpr double rounded = 512, left_over = 64;
-// Relative rounding of sums of ways (a generous bound), and the longest chord of a rotation.
+// Bound on the relative rounding of sums of distances; longest chord of a rotation of radius 1.
 constexpr double slack = 1e-12, whole_chord = 2;
-// When eroded shapes are tried for an overlap, as fractions of the rest of the step.
+// Times at which eroded shapes are tested for overlap, as fractions of the rest of the step.
 constexpr double later[] = {1.0, 0.5, 0.25};
 
 // By how much two shapes are further apart at time t than required; above 0, they are apart. `n`
@@ -42,11 +42,10 @@ bool overlap_at(SupportShape& a, SupportShape& b, double t) {
 // sunk: the eroded shapes of every level overlapped.
 enum : char { unknown, apart, sunk };
 
-// `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never
-// touches before a shallower one, so each sweep continues where the last one ended. Nothing is
-// swept if the pair certainly stays apart at the shallowest level at which it is apart at the
-// start: because of earlier steps (`lasts(level)`), or by its gap at the start (`stays(level, gap,
-// n)`).
+// Judges a pair with the moving shapes `a_at(level)` and `b_at(level)`. Deeper eroded shapes never
+// touch before shallower ones, so each sweep starts where the last one ended. A pair is judged at
+// the shallowest level at which it is apart at the start. There is no sweep if it certainly stays
+// apart at this level by earlier steps (`lasts(level)`) or by its gap (`stays(level, gap, n)`).
 template <class MakeA, class MakeB, class Lasts, class Stays>
 bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts,
             const Stays& stays, char* known, Hit* hit) {
@@ -177,9 +176,9 @@ void Verdict::update(const Poses& p) {
     for (int k = 0; k < count; ++k) sum += (to[k] - from[k]) * (to[k] - from[k]);
     return std::sqrt(sum);
   };
-  // In a rotation of at most half a turn no point is further from its start or from its end than
-  // the chord 2 sin(angle / 2), per metre. The norm of the matrices' difference is sqrt(2) times
-  // that.
+  // In a rotation of at most half a turn no point is further from its start or its end than the
+  // chord 2 sin(angle / 2), per metre from the axis. The norm of the difference of the rotation
+  // matrices is sqrt(2) times this chord.
   const auto chord = [&](const double* from, const double* to) {
     return M_SQRT1_2 * distance(from, to, 9);
   };
@@ -213,8 +212,8 @@ void Verdict::update(const Poses& p) {
   }
 }
 
-// A bound on the way of the pair's points in the step, relative to their bodies' origins. A
-// plane that rotates has none.
+// A bound on how far rotation moves points of the pair in the step (sum of both partners). Infinite
+// for a rotating plane.
 double Verdict::turning(const Pair& pair) const {
   double sum = 0;
   for (const int entry : {pair.a[0], pair.b[0]}) {
@@ -226,7 +225,7 @@ double Verdict::turning(const Pair& pair) const {
   return sum;
 }
 
-// By how much the balls around both whole shapes are further apart than required at the end of the
+// By how much the balls around both whole shapes are further apart than required, at the end of the
 // step.
 double Verdict::gap_of_balls(const Pair& pair) const {
   const Entry* const e[] = {&entries_[pair.a[0]], &entries_[pair.b[0]]};
@@ -248,7 +247,7 @@ double Verdict::gap_of_balls(const Pair& pair) const {
 }
 
 // Whether the shapes of a level stay apart in the step, if their gap along n at the start is `gap`.
-// If so, what is left of the gap at the end becomes the pair's reserve.
+// If so, the remaining gap at the end becomes the reserve of the pair (verdict.hpp).
 bool Verdict::stays_apart(std::size_t number, int level, double gap, const Vec3& n) {
   const Pair& pair = pairs_[number];
   const double* const x[] = {last_.data() + 24 * entries_[pair.a[0]].body,
@@ -265,7 +264,7 @@ bool Verdict::stays_apart(std::size_t number, int level, double gap, const Vec3&
 void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
   Reserve& reserve = reserves_[number];
   const double way = ways_[reserve.a].since + ways_[reserve.b].since;
-  reserve.left = (reserve.left - way) * (1 - 4 * unit_roundoff);  // less by more than rounding
+  reserve.left = (reserve.left - way) * (1 - 4 * unit_roundoff);  // a margin for rounding
   const auto lasts = [&](int level) { return level == reserve.level && reserve.left > 0; };
   if (lasts(0)) return;
   if (still_[reserve.a] && still_[reserve.b]) return;

@@ -1,14 +1,14 @@
 // Finds the pairs that pass through each other in a step, by their eroded shapes.
 //
-// A shape is eroded by a layer of its surface. Level 0 is the whole shape; of the last level almost
-// only the middle remains. A pair is judged at the shallowest level at which its shapes are apart
-// at the start. As long as the shapes of the last level never meet, no part of one partner has
-// passed through the other.
+// Eroding a shape removes a layer at its surface. Level 0 is the whole shape; the last level leaves
+// almost only the middle. A pair is judged at the shallowest level at which its shapes are apart at
+// the start. As long as the shapes of the last level never meet, no part of one partner has passed
+// through the other.
 //
 // Most pairs are far apart for many steps. A pair that is found apart keeps a reserve: a lower
-// bound of the gap of its shapes. Each step reduces the reserve by an upper bound of the way of
-// both partners. As long as it is above 0, the shapes cannot have met, and the pair is not looked
-// at.
+// bound of the gap of its shapes. Each step reduces the reserve by an upper bound of the distances
+// that points of both partners move. While the reserve is above 0, the shapes cannot have met, so
+// the pair is not tested.
 #pragma once
 
 #include "sweep.hpp"
@@ -72,9 +72,9 @@ class Verdict {
     std::int32_t level = 0;
     double left = -INFINITY;
   };
-  // Bounds on the way of a body's points. The way in the step: of the origin [m], and the chord of
-  // the rotation, per metre of distance from the origin. `since`: the way of any point since the
-  // end of the last judged step [m], which an edit or a rollback may have moved.
+  // Bounds on the displacement of a body's points. In the step: `linear` of the origin [m], `chord`
+  // by rotation, per metre from the origin. `since`: of any point since the end of the last judged
+  // step [m]; this includes edits and rollbacks between the steps.
   struct Way {
     double linear = 0, chord = 0, since = 0;
   };
@@ -106,7 +106,7 @@ class Verdict {
   std::vector<std::uint64_t> boxed_;   // for each entry
   std::vector<int> bodies_;            // bodies with shapes
   std::vector<RigidMotion> motions_;   // for each body, of the step with the stamp `moved_`
-  std::vector<std::uint64_t> stamps_;  // for each body: number of its different motions so far
+  std::vector<std::uint64_t> stamps_;  // for each body: number of changes of its motion so far
   std::vector<std::uint64_t> moved_;   // for each body
   std::vector<Way> ways_;              // for each body
   std::vector<double> extents_;  // for each body: bound on its shapes' points; of a plane, infinite

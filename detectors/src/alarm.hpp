@@ -68,7 +68,7 @@ struct Levels {
   }
 
  private:
-  // Linear between the speeds and constant beyond them, bit-equal to NumPy's interp.
+  // y at the speed `now`: linear between speeds, constant beyond, bit-equal to NumPy's interp.
   double at(double now, const std::vector<double>& y) const {
     const std::size_t last = speed.size() - 1;
     if (std::isnan(now)) return now;

@@ -14,11 +14,11 @@
 // The friction of a joint at rest can hold an unknown torque. If `started` is above 0, a joint
 // corrects the unknowns only after it has moved for that time.
 //
-// If friction has just changed (a joint breaks away, stops or reverses), the error of the model is
-// the fraction `transition` of the change. Its square is added to the variance of a correction.
+// If friction has just changed (a joint breaks away, stops or reverses), the model is assumed to
+// err by `transition` times the change. Corrections add the square of this to the noise variance.
 //
-// With `weighted`, the unexplained residual is multiplied by the standard deviation of its noise,
-// divided by that of noise and payload together.
+// With `weighted`, the unexplained residual is multiplied by s / S. s is the standard deviation of
+// its noise, S that of noise and payload error together.
 //
 // The noise of the residual grows with the speed and with `motion_numbers` more quantities of a
 // joint (only if there are unknowns; M is the mass matrix of arm and estimated payload):
@@ -28,15 +28,15 @@
 // * the recent change of friction (a joint breaks away, stops or reverses);
 // * with `sampled`, half the change of torque since the last sample.
 //
-// Without `sampled`, a measured torque acts until the next sample. With it, for low sample rates,
-// the mean of two samples acts between them. Otherwise the lag of half a sample would cause errors
-// as large as a collision while an arm accelerates. The error of the mean is at most half the
-// difference of the two samples, which occurs if a brake acts just after one of them.
+// Without `sampled`, a measured torque acts until the next sample. With `sampled`, for low sample
+// rates, the mean of two samples acts between them. This avoids a lag of half a sample, by which
+// errors would be as large as a collision while an arm accelerates. The error of the mean is at
+// most half the difference of the samples, if a brake acts just after one of them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 //
-// An estimator without unknowns copies momentum and drive torques from another estimator of the
-// same arm at the same sample, if possible, instead of computing them again.
+// An estimator without unknowns copies momentum and drive torques, if possible, from another
+// estimator of the same arm that has processed the same sample.
 #pragma once
 
 #include <algorithm>
@@ -63,7 +63,7 @@ struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
   std::vector<double> gain;         // of the observer [1/s], n
   std::vector<double> weights;      // friction, n x columns
-  std::vector<double> deviation;    // of the unknowns, 4 + 3 n
+  std::vector<double> deviation;    // standard deviations of the unknowns, 4 + 3 n
   std::vector<double> persistence;  // time constants of the unknowns [s], 4 + 3 n
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
@@ -72,7 +72,7 @@ struct EstimatorSettings {
   double transition = 0.0;     // error just after a change of friction, relative to the change
   double started = 0.0;        // time that a joint has to move before its first correction [s]
   bool weighted = false;       // see above
-  std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
+  std::vector<double> fusion;  // gains (velocity.hpp), 6 n; empty: velocity as measured
   double plain_gain = 100.0;   // [1/s]
   bool sampled = false;        // the mean of two samples' torques acts between them, see above
 };
@@ -108,7 +108,7 @@ class Estimator {
   const std::vector<double>& theta() const { return errors_.state(); }
   const std::vector<double>& plain() const { return plain_; }
   double moved(std::size_t j) const { return moved_[j]; }  // time for which joint j has moved [s]
-  const std::vector<double>& acceleration() const { return acceleration_; }  // sizes [rad/s^2]
+  const std::vector<double>& acceleration() const { return acceleration_; }  // absolute [rad/s^2]
   // Standard deviation of joint j's residual due to the unknowns [N m].
   double spread(std::size_t j) {
     return adapts_ ? std::sqrt(std::max(errors_.variance(j, load(j), own(j)), 0.0)) : 0.0;
@@ -199,7 +199,7 @@ class Estimator {
     if (adapts_) weigh(q);
   }
 
-  // Absolute entries of the mass matrix of arm and estimated payload, and norms of its rows.
+  // Computes |M_jk| of arm and estimated payload, and the norms of the rows of M.
   void weigh(const double* q) {
     Inertial& held = carrying_.joints.back().inertial;
     const Inertial& empty = chain_.joints.back().inertial;
@@ -216,7 +216,7 @@ class Estimator {
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
-  // Drive torques minus friction, and the reduction of each by a unit of the joint's own unknowns.
+  // Drive torques minus friction, and how much a unit of each own unknown of a joint reduces them.
   void drive(const double* q, const double* qd, const double* current) {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {

@@ -86,7 +86,7 @@ class FaultCheck {
     }
     const double dt = t - time_;
     if (dt < 0) {
-      // A late packet or a clock that was reset: earlier samples are not used any more.
+      // A packet came late or the clock was reset: earlier samples are not used any more.
       reset();
       remember(t, q, qd, current);
       begun_ = true;

@@ -1,6 +1,6 @@
 // The free-motion detector: each joint's ratio of signal to bound from the samples of an arm.
 //
-// Samples are averaged over `interval`, because an alarm needs tens of milliseconds above a bound.
+// Samples are averaged over `interval`; an alarm needs tens of milliseconds above a bound anyway.
 // The estimator gets the mean before the last one, with the median of the last three currents.
 #pragma once
 

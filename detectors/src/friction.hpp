@@ -9,8 +9,8 @@
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
 //   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
 //   ripple frequency c, tau |tau| with `saturation`
-// The load is the drive's torque or, with `modelled`, the torque by the arm's model. The drive
-// torque of a joint without gravity is mostly friction, which would be predicted from itself.
+// The load is the drive's torque or, with `modelled`, the torque by the arm's model. With the drive
+// torque, joints without gravity load would have friction predicted from friction.
 #pragma once
 
 #include <algorithm>

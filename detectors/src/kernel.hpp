@@ -1,5 +1,5 @@
-// Scaling of residuals, windows of them, and sums of the SRQ kernel
-// 1 / (1 + |x - z|^2 / sigma^2)^2. Nothing is allocated after construction.
+// Scaling of residuals, windows of scaled residuals, and sums of the squared rational quadratic
+// (SRQ) kernel 1 / (1 + |x - z|^2 / sigma^2)^2. Nothing is allocated after construction.
 //
 // Each lane evaluates one support vector, with the same arithmetic at any vector width, so all code
 // paths give the same bits. A result depends only on its row, so any number of threads and the

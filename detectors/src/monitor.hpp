@@ -52,7 +52,7 @@ class Monitor {
   // The estimator of the detector; null if the detector has none.
   const Estimator* estimator() const { return alarm_.estimator(); }
   bool settled() const { return time_ >= ready_; }
-  // The detector's estimator if it has stepped with the last sample as given, else null.
+  // The detector's estimator; null if the last sample had a fault and was therefore not used.
   const Estimator* fed() const { return bad_ ? nullptr : estimator(); }
 
   const Thought& step(double t, const double* q, const double* qd, const double* current) {
@@ -79,7 +79,7 @@ class Monitor {
     known_ = true;
     time_ = t;
     const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
-    // When an alarm ends, the averages are reset, so that a contact's torques are not a fault.
+    // When an alarm ends, `torques_` forgets it, so that the contact's torques are not a fault.
     if (said_.alarm && !up) torques_.reset();
     const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
     if (t < ready_ && reason_.fault != Fault::none)

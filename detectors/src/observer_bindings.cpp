@@ -24,7 +24,7 @@ constexpr std::size_t grain = 512;  // samples per chunk
 
 namespace {
 
-// Rotation about `axis` by q, in the parent's axes: R (a a^T) + cos q R (1 - a a^T) + sin q R [a].
+// Rotation R (a a^T) + cos q R (1 - a a^T) + sin q R [a] about the axis a, with R = `placement`.
 void fill_rotation(Joint& joint, const double* placement) {
   const double a[3] = {joint.axis.x, joint.axis.y, joint.axis.z};
   const double skew[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};

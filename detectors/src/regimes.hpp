@@ -8,15 +8,15 @@
 //
 // A contact with a standing arm lasts from its beginning to its release. Meanwhile the signal of
 // all joints that stood is the residual minus its level before the contact. The contact is released
-// when the joint with the largest ratio falls below half of that ratio. It is also released when
+// when the joint that had the largest ratio falls below half of it. It is also released when
 // nothing has changed for a second and the remaining signal is within what static friction can
 // keep. For a second after the release only a change away from the former level counts, so letting
 // go is not a new contact. Joints that the contact turned get a higher bound, because their
 // controllers act.
 //
 // While the signal at rest is above half of its bound, the baseline follows more slowly, so that a
-// push that grows slowly is found. It does not during a contact, whose release it helps to see, nor
-// soon after, nor while a joint moves.
+// push that grows slowly is found. During a contact, soon after it, and while a joint moves, the
+// baseline follows at its normal rate; in a contact it helps to detect the release.
 //
 // In motion the signal is the residual without slow errors. The bound is linear in speed,
 // accelerations and slowness; slowness covers friction between static and sliding near standstill.
@@ -29,9 +29,9 @@
 // not judged.
 //
 // A ratio above 1 is reported as 1 until it is confirmed by its duration. In motion and soon after
-// it, the duration is longer, because ripple and jerks exceed a bound for longer than noise at
-// rest. Time counts more from a ratio of 2 on, and twice from 3 on, so that an impact of some tens
-// of ms is confirmed. A gap between samples counts as one sample.
+// it, the required duration is longer, because ripple and jerks exceed a bound for longer than
+// noise at rest. Time counts more above a ratio of 2, and twice from a ratio of 3 on, so that an
+// impact of some tens of ms is confirmed. A gap between samples counts as one sample.
 //
 // A robot's protective stop ends a contact within 30 to 80 ms, before the duration is reached. So
 // if the arm brakes to standstill at once, a joint is confirmed whose signal was near its bound for
@@ -68,25 +68,25 @@ class Regimes {
   static constexpr double settling = 0.3;    // of the observer at the beginning [s]
   static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
-  static constexpr double follow = 0.15;     // time constant of the baseline [s] ...
-  static constexpr double wary = 0.5;        // ... while the signal is below this of the bound ...
-  static constexpr double slower = 2.0;      // ... and its factor above that, if no joint moves ...
-  static constexpr double ended = 0.3;       // ... from this time after a contact on [s]
-  static constexpr double after = 1.0;       // time after a contact: only change away counts [s]
+  static constexpr double follow = 0.15;     // time constant of the baseline [s]
+  static constexpr double wary = 0.5;        // fraction of the bound above which `slower` applies
+  static constexpr double slower = 2.0;      // factor of `follow` while no joint moves
+  static constexpr double ended = 0.3;       // time after a contact without `slower` [s]
+  static constexpr double after = 1.0;       // time after it in which only change away counts [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`
   static constexpr double lag = 1.0 / 30.0;  // time constant of the observer [s]
   static constexpr double farthest = 3.0;    // largest addition, in units of `beyond`
   static constexpr double released = 0.5;    // a contact ends below this fraction of its peak
   static constexpr double kept = 1.0;        // time without a change that can end a contact [s]
-  static constexpr double remembers = 10.0;  // time after such an end: a release is no contact [s]
+  static constexpr double remembers = 10.0;  // replaces `after` after such an end [s]
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation times [s]
-  static constexpr double forget = 1.05;  // factor per sample on the stored shortest interval
+  static constexpr double forget = 1.05;  // growth of the stored shortest interval per sample
   static constexpr int samples = 3;       // least number of samples of the confirmation
-  static constexpr double near = 0.8;     // ratio before a stop that the stop confirms
+  static constexpr double near = 0.8;     // ratio from which a protective stop confirms a joint
   static constexpr double recent = 0.25;  // longest time from such a ratio to the stop [s]
   static constexpr double brakes = 0.2;   // time constant with which a speed is forgotten [s]
-  static constexpr double braking = 0.9, stopped = 0.2;  // fractions of the speed before
+  static constexpr double braking = 0.9, stopped = 0.2;  // fractions of the recent speed
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), joints_(of_.rest.size()) {
     reset();
@@ -191,7 +191,7 @@ class Regimes {
     double above = 0.0;               // weighted time above the bound [s]
     int count = 0;                    // number of successive samples above the bound
     double shaken = 0.0, hard = 0.0;  // parts of the bound due to acceleration [N m], [beyond]
-    int close = 0;                    // and above `near` times the bound, in motion
+    int close = 0;                    // successive samples in motion above `near` times the bound
     bool rest = false, held = false;  // held: takes part in a contact
   };
 
@@ -300,10 +300,10 @@ class Regimes {
   std::vector<Joint> joints_;
   bool touched_ = false;                 // whether there is a contact with joints at rest
   std::size_t lead_ = 0;                 // joint with the largest ratio in the contact
-  double peak_ = 0.0, still_ = 0.0;      // that ratio; time without a change [s]
+  double peak_ = 0.0, still_ = 0.0;      // its ratio; time without a change [s]
   double fastest_ = 0.0, before_ = 0.0;  // speed of the fastest joint, now and recently [rad/s]
   double near_for_ = recent;             // time since a joint in motion was near its bound [s]
-  std::size_t nearest_ = 0;              // this joint
+  std::size_t nearest_ = 0;              // the joint that was near its bound
   double stirred_ = 1.0, usual_ = 1.0;  // recent motion in [0, 1]; sample interval without gaps [s]
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]

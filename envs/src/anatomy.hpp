@@ -45,9 +45,9 @@ constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
 constexpr double startle = 1.6;    // speed of a touched hand's withdrawal, in units of `hand_speed`
-constexpr double quiet = 1.0;      // rest of a hand after that [s]
+constexpr double quiet = 1.0;      // rest of the hand after this withdrawal [s]
 constexpr double step_time = 0.6;  // duration of the step back after a touch [s]
-constexpr double step_lasts = 2.0;  // time that the person then stays back [s]
+constexpr double step_lasts = 2.0;  // time for which the person then stays back [s]
 constexpr double lean_back = 1.2;   // backward lean of a seated person per `step_back` [rad/m]
 constexpr double lean_rate = 1.2;   // largest rate of a lean [rad/s]
 constexpr double felt = 1.0;        // smallest force that a person feels [N]
@@ -60,8 +60,8 @@ constexpr double clearance = 0.005;    // distance of palms and arms from barrie
 constexpr double climb = 0.6;          // speed at which a hand that a barrier stops rises [m/s]
 constexpr double highest_climb = 0.6;  // largest rise of such a hand [m]
 constexpr double descend = 0.2;        // speed at which the hand comes down again [m/s]
-// Before a walk the person takes both hands back [s]. If they are not back after this time, the
-// next attempt begins as much later.
+// Before a walk the person withdraws both hands. If they are not at rest after this time [s], the
+// next attempt begins after the same time.
 constexpr double patience = 2.0;
 
 inline double minimum_jerk(double u) {

@@ -19,7 +19,7 @@ using geometry::load;
 using geometry::norm;
 using geometry::Vec3;
 
-// Distance [m], negative inside, and the direction away from the barrier. Infinite if none is near.
+// Distance [m], negative inside and infinite if no barrier is near; direction away from it.
 struct Gap {
   double distance = std::numeric_limits<double>::infinity();
   Vec3 away{0, 0, 1};

@@ -158,9 +158,8 @@ struct Controls {
     }
   }
 
-  // Limits the distance of the reference from the arm to that at which the servo's stiffness gives
-  // the torque limit, so that a blocked arm does not wind up. Without a servo the reference follows
-  // the arm.
+  // Keeps the reference so near to the arm that the servo's stiffness gives at most the torque
+  // limit. So a blocked arm does not wind up. Without a servo the reference follows the arm.
   void follow(const std::vector<Joint>& joints, const double* q) {
     for (std::size_t i = 0; i < command.origin.size(); ++i) {
       const double window = command.servo || command.brake ? torque_limit[i] / joints[i].kp : 0.0;

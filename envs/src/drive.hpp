@@ -23,8 +23,8 @@ struct Joint {
   double bristle_stiffness = 0.0;         // N m/rad
   double load = 0.0;                      // relative rise of friction per motor torque, 1/(N m)
   double kp = 0.0, kd = 0.0;              // N m/rad, N m s/rad
-  // Above the rated speed the largest torque along the motion falls linearly, to 0 at the no-load
-  // speed and below 0 beyond it [rad/s]. A no-load speed of 0 disables this limit.
+  // Speeds [rad/s]. Above the rated speed the largest torque along the motion falls linearly. It is
+  // 0 at the no-load speed and negative beyond. A no-load speed of 0 disables this limit.
   double rated_speed = 0.0, no_load_speed = 0.0;
   double known_coulomb = 0.0, known_viscous = 0.0;  // compensated by the servo; N m, N m s/rad
   std::vector<double> cycles, amplitude, phase;     // ripple: per motor revolution; A; rad

@@ -300,7 +300,7 @@ class Person : public Posture {
     for (int side = 0; side < 2; ++side) leg(side, side == 0 ? 1.0 : -1.0);
   }
 
-  // The gap between these capsules and the nearest barrier, if it is below `clearance`.
+  // The gap between the given capsules and the nearest barrier, if it is below `clearance`.
   Gap nearest(std::initializer_list<int> segments) const {
     Gap out;
     if (!barriers_) return out;
@@ -317,8 +317,8 @@ class Person : public Posture {
   }
 
   // Corrects an arm that has just been posed towards a goal, starting from the last place of the
-  // palm. A palm that a barrier stops slides along the barrier and climbs over it; it follows its
-  // goal at most at the speed of a startled hand.
+  // palm. A palm that a barrier stops slides along the barrier and climbs over it. The palm then
+  // moves at most at the speed of a startled hand.
   void keep_clear(int side, Vec3 shoulder, Vec3 goal, double sign, Vec3 last, double dt) {
     Vec3 want = goal;
     if (held_up_[side]) {

@@ -82,7 +82,7 @@ class Physics {
     return e_.distance(e_.model, e_.data, first, second, most, points);
   }
 
-  // Moves a geom to another place during its lifetime.
+  // While an object of this class lives, a geom is at another place.
   class Moved {
    public:
     Moved(const Physics& physics, int geom, const double* centre, const double* quat_wxyz)

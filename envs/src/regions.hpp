@@ -27,7 +27,7 @@ struct Region {
   double stiffness = 0;       // stiffness of its contact [N/m]
   double touching = 0;        // duration of the present contact [s]
   double force = 0;           // at the last physics step [N]
-  double advance = 0;         // advance of the arm into it during that contact [m]
+  double advance = 0;         // advance of the arm into the region in this contact [m]
   TAUGUARD_FIELDS(body, joint, qpos, dof, mocap, held, sensor, quasi_static, transient, span, speed,
                   area, least_pressure, stiffness)
 };
@@ -72,8 +72,8 @@ constexpr double merge_gap = 0.5;       // contacts closer than this are one col
 constexpr double transient_time = 0.5;  // longer contacts are quasi-static [s]
 constexpr int sensor_width = 10;        // found, force (3), torque (3), position (3)
 
-// The record of a physics step: net force on the arm [N], and link, point [m] and force [N] of the
-// largest force on a link; without contact link and force are 0, and the point is NaN.
+// The record of a physics step: net force on the arm [N]; link, point [m] and vector [N] of the
+// largest force on a link. Without contact the numbers are 0, except the point, which is NaN.
 constexpr int contact_width = 8;
 
 // Reads the links' contact sensors at time t, and writes tau_ext to tau and the contact to row.
@@ -113,7 +113,7 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
   }
 }
 
-// Speed of a point along a direction [m/s], as a point of the link whose contact is nearest to it.
+// Speed [m/s] along a direction of a point that moves with the link whose contact is nearest to it.
 inline double speed_of(const Kinematics& arms, const double* links, const double* qd, Vec3 point,
                        Vec3 direction) {
   std::size_t link = arms.size();

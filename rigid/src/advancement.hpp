@@ -117,8 +117,8 @@ double safe_step(const Bound& g, double at_zero, double limit, double accuracy) 
 }
 
 // Advances both bodies from `start` until close(t) is true. certified(left) returns a step during
-// which they stay apart. The result is true if they came close, at a time *t that is never late,
-// and false if they stay apart on all of [start, end].
+// which the bodies stay apart; `left` is the remaining time. The result is true if they come close,
+// at a time *t that is never late, else false.
 template <class Body, class Close, class Certified>
 bool advance(Body& a, Body& b, double start, double end, double most_steps, const Close& close,
              const Certified& certified, double* t) {

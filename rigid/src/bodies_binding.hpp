@@ -30,7 +30,7 @@ inline void store(const FirstTouch& t, double* row) {
 }
 
 // A batch of bodies, each grown by a ball: one radius for each row, or one for all. It keeps the
-// arrays of Python.
+// Python arrays alive.
 struct Batch : Bodies {
   Batch(int kind, Packed data, Offsets offsets, Radii radii)
       : Bodies{static_cast<Kind>(kind), data.data(), offsets.data(),

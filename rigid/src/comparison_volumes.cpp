@@ -41,7 +41,7 @@ int pair_index(int x, int y, double sx, double sy, double* flip) {
   return geometry::edge_axis(x, y, sx * sy < 0);
 }
 
-// Interval [lo, hi] that holds the projection of `k` on the direction that `cone` represents.
+// Interval [lo, hi] that contains the projection of `k` on the direction that `cone` represents.
 void bounds(const KDop& k, const KDop::Cone& cone, double* lo, double* hi) {
   *lo = *hi = 0;
   for (int i = 0; i < 3; ++i) {
@@ -54,7 +54,7 @@ void bounds(const KDop& k, const KDop::Cone& cone, double* lo, double* hi) {
 
 }  // namespace
 
-// The pad covers rounding: each result below takes at most 40 operations on values of at most
+// The pad covers rounding: each result below comes from at most 40 operations on values of at most
 // 3 (ra + rb), with ra and rb the radii of the trees, and 40 * 3 * 2^-53 < 2^-45.
 Frame::Frame(const Tree& a, const Tree& b, const Pose& pose) {
   double skew = 0, largest = a.magnitude;
@@ -192,7 +192,7 @@ KDop::Cone KDop::Cone::around(const double* d) {
 
 KDop::Relation::Relation(const Tree& a, const Tree& b, const Pose& pose) : at(a, b, pose) {
   // `pad` is for unit directions. Directions of length up to sqrt 2 and weights with a sum of at
-  // most sqrt 3 increase an error by at most sqrt 6.
+  // most sqrt 3 multiply an error by at most sqrt 6.
   at.pad *= 4;
   for (int k = 0; k < directions; ++k) {
     const auto* axis = geometry::k_dop_axes[k];
@@ -227,7 +227,7 @@ std::vector<Volume> fit_all(const Tree& tree) {
   std::vector<Volume> out(1 + std::size_t(width) * tree.nodes.size());
   const Triangle* t = tree.triangles.data();
   out[0] = Volume::fit({t, t + tree.triangles.size(), tree.centre});
-  // Children come after their parents, so a backward pass knows the triangles of every child.
+  // Children come after their parents, so a backward pass visits the children of a node first.
   std::vector<std::pair<int, int>> run(tree.nodes.size());
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     const Node& node = tree.nodes[n];

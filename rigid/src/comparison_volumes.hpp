@@ -55,8 +55,8 @@ struct KDop {
   static KDop fit(const Cluster& c);
 
   // A direction d as a sum of three of the 18 half-space normals with weights >= 0. By duality the
-  // maximum of d.x over the polytope is at most the sum of weight * bound. The three normals
-  // adjacent to d give the least such bound that needs no linear program.
+  // maximum of d.x over the polytope is at most the sum of weight * bound. The normals adjacent to
+  // d give the least sum that is found without a linear program.
   struct Cone {
     int index[3];
     double weight[3];  // negative: the opposite normal with weight -weight

@@ -243,8 +243,8 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
 //   8 u a^3       in the determinant,
 //   8 u a^2 b     in each of three entries,
 //   8 u a^2 w     in four sums,
-// together 32 u a^2 w; E is twice this bound. Edges. Two such entries are multiplied, with |C| <=
-// a^2 b. In units of u a^4 b w the errors are 42 in the offset's minor, 12 in the determinant's
+// together 32 u a^2 w; E is twice this bound. Edges. Products of two such entries occur, with |C|
+// <= a^2 b. In units of u a^4 b w the errors are 42 in the offset's minor, 12 in the determinant's
 // terms, 24 in the generators' minors and 20 in the sums, together 98; E is 128 u a^4 b w.
 TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
   const Slabs sa(a), sb(b);

@@ -1,5 +1,6 @@
-// A common point of two bodies that touch along a known normal. The contact features of both bodies
-// are their vertices within `tolerance` of the contact plane; they are intersected in that plane.
+// A common point of two bodies that touch along a known normal. The contact feature of a body is
+// the polygon of its vertices within `tolerance` of the contact plane. The point is in the
+// intersection of both polygons.
 #pragma once
 
 #include <algorithm>

@@ -76,7 +76,7 @@ class HullElimination {
     return cross(u, q - o);
   }
 
-  // Chooses vertices of A: each is the farthest from the span of the vertices before.
+  // Chooses D + 1 vertices of A. Each is the farthest from the affine span of those before it.
   bool choose_simplex() {
     chosen_[0] = 0;
     Vec3 along{}, across{};
@@ -117,7 +117,7 @@ class HullElimination {
 
   std::vector<Row> initial_rows() const {
     std::vector<Row> rows;
-    std::size_t name = D + 1;  // names 0 .. D stand for p_i >= 0
+    std::size_t name = D + 1;  // inequalities 0 .. D are p_i >= 0
     const auto push = [&](const Vec3& x, double sign) {
       Row r{};
       for (std::size_t i = 0; i <= D; ++i) r.entry[i] = sign * value(i, x);
@@ -137,7 +137,7 @@ class HullElimination {
       if (!(p.entry[k] > 4 * error_)) continue;
       Row kept = p;
       add(kept.support, k);
-      kept.entry[k] = 2 * error_;  // valid, because it is not above the entry itself
+      kept.entry[k] = 2 * error_;  // a smaller entry is valid, as p_k >= 0
       out.push_back(kept);
       for (const Row& q : rows) {
         if (!(q.entry[k] < 0)) continue;
@@ -169,7 +169,8 @@ class HullElimination {
     return out;
   }
 
-  // Sets p_D = 1, then each p_k to the middle of the interval of stage k, and checks the plane.
+  // Sets p_D = 1 and each p_k to the middle of the interval that `stages[k]` allows. Checks the
+  // plane.
   bool plane_separates(const std::array<std::vector<Row>, D>& stages) const {
     std::array<double, D + 1> p{};
     p[D] = 1.0;

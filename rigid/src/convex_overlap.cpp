@@ -64,8 +64,8 @@ TAUGUARD_INLINE std::size_t run_rows(const Chunk& c) {
   for (std::size_t i = c.begin; i < c.end; ++i) {
     Verdict v = Kernel::decide(c, i);
     if (v == undecided) {
-      // Boxes with parallel edges in deep contact have a faster kernel. The skew covers every
-      // rotation that ORTHONORMAL_TOLERANCE (rigid/shapes.py) accepts.
+      // For boxes with parallel edges in deep contact there is a faster kernel. The skew covers
+      // every rotation that ORTHONORMAL_TOLERANCE (rigid/shapes.py) accepts.
       if (c.a.kind == Kind::boxes && c.b.kind == Kind::boxes)
         v = box_pair(c.a.row(i), c.b.row(i), 1.001e-6);
       if (v == undecided) {

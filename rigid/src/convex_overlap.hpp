@@ -11,8 +11,8 @@ namespace tauguard::rigid {
 
 enum class Method : int { abfme = 0, sat = 1, automatic = 2, textbook_sat = 3, exact = 4 };
 
-// Writes 1 (common) or 0 (separated) for rows [0, n). Every method is exact, except textbook_sat.
-// Returns the number of rows that the filters left undecided.
+// Writes 1 (common point) or 0 (separated) for rows [0, n). Every method is exact, except
+// textbook_sat. Returns the number of rows that the filters left undecided.
 std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method method, int threads,
                     std::uint8_t* hit);
 

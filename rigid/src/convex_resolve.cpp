@@ -91,7 +91,7 @@ double certain_gap(const Points<double>& a, const Points<double>& b, const doubl
   return low - high - 16 * unit * norm1(n) * reach;
 }
 
-// Witness in double precision; false if its error exceeds a few roundings.
+// Common point or separating plane in doubles; false if the error exceeds a few roundings.
 bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                           Verdict known, double* out) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
@@ -131,8 +131,8 @@ bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::s
 
 }  // namespace
 
-// The hulls meet if the basis has four columns a_i - b_j with positive weights: these columns then
-// enclose the origin. Error bounds, where `size` includes the distance of the origin:
+// The hulls meet if the simplex basis has four columns a_i - b_j with positive weights, because
+// these columns enclose the origin. Error bounds, where `size` includes the distance of the origin:
 // * A vertex has an error of u reach, and of 8 u size if it is computed from generators.
 // * A column has a 1-norm of at most 2 size and an error of 16 u size.
 // * A weight is a determinant of three columns. The columns add 3 * 16 * 4 u size^3 to its error,

@@ -1,7 +1,7 @@
-// Overlap by separating axes. All projections share the normals and edge products, only vertices
-// that can be extreme are projected, and four axes are tested at once. Every test has an error
-// bound as in convex_abfme.hpp. For edges e of A and f of B, the projection of a point x on the
-// axis e x f is f . (x cross e), so the product x cross e is computed once for all edges of B.
+// Overlap by separating axes, four axes at once. Normals and edge products are computed once for
+// all projections. Only vertices that can be extreme are projected. Every test has an error bound
+// as in convex_abfme.hpp. For edges e of A and f of B, the projection of a point x on the axis e x
+// f is f . (x cross e), so the product x cross e is computed once for all edges of B.
 #pragma once
 
 #include "convex_abfme.hpp"

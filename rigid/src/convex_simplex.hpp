@@ -18,8 +18,8 @@ namespace tauguard::rigid {
 inline int sign_of(const Dyadic& x) { return x.sign(); }
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Whether x > y, where both are sums of terms of size `scale`. In doubles the price of a column of
-// the basis is zero up to rounding; the margin keeps such a column from entering again.
+// Whether x > y, where both are sums of terms of size `scale`. In doubles there is a margin:
+// columns of the basis have prices of zero up to rounding, and must not enter again.
 inline bool exceeds(const Dyadic& x, const Dyadic& y, const Dyadic&) { return y < x; }
 inline bool exceeds(double x, double y, double scale) { return x - y > 0x1p-46 * scale; }
 inline void grow(Dyadic&, const Dyadic&) {}

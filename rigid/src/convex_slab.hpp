@@ -1,7 +1,7 @@
 // Time of impact of a translating body, by separating axes. On an axis L the projections overlap
-// while low <= t s <= high, with s = L . d. The entry is the first such time. The latest entry over
-// all axes is the time of impact. The bodies are apart until the entry on any axis, also on an axis
-// with rounding errors. So an entry minus its error bound is never late.
+// while low <= t s <= high, with s = L . d. The entry of the axis is the first such t. The latest
+// entry over all axes is the time of impact. The bodies are apart until the entry on any axis, also
+// on an axis with rounding errors. So an entry minus its error bound is never late.
 #pragma once
 
 #include <cmath>
@@ -46,7 +46,7 @@ TAUGUARD_INLINE void load(Kind kind, const double* p, const double* base, SlabBo
 struct Entry {
   double enter =
       -std::numeric_limits<double>::infinity();  // the bodies are certainly apart before this time
-  double leave = std::numeric_limits<double>::infinity();  // and after this time
+  double leave = std::numeric_limits<double>::infinity();  // certainly apart after this time
   double surely_in = enter, surely_out = leave;  // between these times they overlap on every axis
   bool certain = true;                           // false if some axis was too short to decide
   double reliable = enter;                       // `enter` plus twice its error bound

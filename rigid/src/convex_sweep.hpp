@@ -1,8 +1,8 @@
 // Whether a translating body meets another within the step. Body B moves by t d, 0 <= t <= 1. The
-// time t is one more unknown, which is eliminated first: the rows for t = 0 and t = 1 imply all
-// others, so every vertex of B gives two rows, one for each end of the motion. The hull of both
-// ends has facets with normals f x d, for edges f of B, in addition to those of B. The rest is the
-// elimination of convex_abfme.hpp.
+// method is the elimination of convex_abfme.hpp with the unknown t, which is eliminated first. The
+// rows for t = 0 and t = 1 imply all others. So every vertex of B gives two rows, one for each end
+// of the motion. The hull of both ends has the facets of B and facets with normals f x d, for edges
+// f of B.
 #pragma once
 
 #include "convex_sat.hpp"

@@ -7,16 +7,16 @@
 // coordinates of both bodies. Then |y| <= 2 sqrt(3) s, and the error of a product is at most
 // 3 u |n| |y| <= 11 u |n| s.
 //
-// The surface S of all faces is closed, because a step replaces faces by the cone over their rim;
-// it need not be convex. Let c be the centre of the first tetrahedron.
+// The surface S of all faces is closed, because each step of the expansion replaces faces by the
+// cone over their rim; it need not be convex. Let c be the centre of the first tetrahedron.
 // 1. n . c < m for every face ever made. The code computes side = 4 (n . c - n . y) for one corner
 //    y, and 4 max |n . y - n . y'| over the other corners y'. Errors, in units of u |n| s: at most
 //    142 of `side` (84 from its products, 27 from their difference, 31 from the rounding of c), and
 //    at most 112 of the maximum. `unsure` requires that |side| exceeds the maximum by 512. So c is
 //    in no face of the first tetrahedron, and thus inside it.
 // 2. A corner w that replaces a face is further along n than y, up to a rounding error of 28 u |n|
-//    s. Four times this error is within the 512, too. So c is not in the tetrahedron of w and that
-//    face, and the number of times that S winds around c stays odd.
+//    s. The margin of 512 covers four times this error, too. So c is not in the tetrahedron of w
+//    and that face, and the number of times that S winds around c stays odd.
 // 3. If 0 < m for all faces of the final S, no face meets the segment from c to the origin, and S
 //    winds around the origin an odd number of times. Let L be the least m / |n|. No face is nearer
 //    to the origin than L, so S winds in the same way around every point of the ball of radius L. A

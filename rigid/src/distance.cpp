@@ -70,7 +70,7 @@ struct Separating : ToRounding {
   }
 };
 
-// Keeps the best certified lower bound, and ends the descent when it suffices.
+// Keeps the best certified lower bound, and ends the descent when this bound is tight enough.
 struct Bounded {
   Distance& out;
   double needed;
@@ -144,8 +144,8 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& g
   first.weight = 1;
   Bounded watch{out, needed};
   watch.attempt(start, first.w);
-  // A nearest point closer to the origin is zero up to rounding: each coordinate comes from about a
-  // dozen operations, whose errors 64 u covers.
+  // A nearest point closer to the origin than `rounding` counts as zero. About a dozen operations
+  // lead to each coordinate; 64 u covers their errors.
   const double rounding = 64 * unit_roundoff * (a.magnitude() + b.magnitude());
   const Simplex<SourcePoints> s = descend(first, support, watch, rounding * rounding);
   const double square = dot(s.nearest(), s.nearest());

@@ -10,10 +10,11 @@ namespace tauguard::rigid {
 
 // Let one of the bodies have full dimension. Every facet of their difference has the normal of a
 // face of a body, or of a pair of edges. The bodies are apart if and only if one of these normals
-// separates them (Gottschalk, Lin and Manocha 1996). Otherwise the depth is the least height of the
-// difference along a normal. Doubles give each height with an error of at most 128 u / s times the
-// size (facet_depth.hpp). Only facets whose lower bound is at most the least upper bound can be the
-// nearest one or can separate the bodies, so only these are visited.
+// separates them (Gottschalk, Lin and Manocha 1996). Otherwise the depth is the least height over
+// these normals n, where the height is the largest n . y / |n| of a difference y. Doubles give each
+// height with an error of at most 128 u / s times the size (facet_depth.hpp). Only facets whose
+// lower bound is at most the least upper bound can be the nearest one or can separate the bodies,
+// so only these are visited.
 class ExactFacets {
  public:
   enum class Answer { together, apart, unknown };

@@ -7,7 +7,8 @@
 namespace tauguard::rigid {
 
 // The point of the hull of differences nearest to the origin (Wolfe 1976; Gilbert, Johnson and
-// Keerthi 1988). It is numerator / denominator, with numerator = sum weights_k y_k over `pairs`.
+// Keerthi 1988). It is numerator / denominator, with numerator = sum of weights_k y_k, y_k the
+// differences of `pairs`.
 template <class Number>
 class ExactNearest {
  public:

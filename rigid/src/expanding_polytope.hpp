@@ -104,7 +104,7 @@ class PointDifferences {
   }
 
   // Whether a facet of the polytope is also a facet of the set. `excess` tells how far the set's
-  // farthest point is beyond the facet. If this point was taken before, it is a rounding error.
+  // farthest point is beyond the facet. If it was added before, the excess is rounding.
   bool is_final(const Number& excess, const Number&, const Source& farthest) {
     return !positive(excess) || !taken_.insert(farthest).second;
   }

@@ -46,7 +46,7 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
 }
 
 // Bounds on the depth. Let n be a unit vector, and call n . y the height of a difference y. The
-// largest height of all differences is the top.
+// largest height of all differences is the top. The size is the largest coordinate.
 // 1. Upper bound: the top is the length of a translation along n that separates the bodies.
 // 2. Lower bound: the distance of a facet from the origin is at least the least height of its
 //    vertices, for any n. The computed normal of a facet has an angle of at most 16 u / s to the

@@ -15,8 +15,8 @@
 namespace tauguard::rigid {
 namespace {
 
-// The number of steps is limited to `most_steps`, which a small constant gap can reach, plus
-// `steps_a_radian` per radian of both rotations, because bodies that pass close to each other take
+// The number of steps is limited to `most_steps`, plus `steps_a_radian` per radian of both
+// rotations. A small constant gap can need `most_steps`. Bodies that pass close to each other need
 // a few steps per radian. At the limit the time is still never late.
 constexpr int most_steps = 20000, steps_a_radian = 64;
 // spun_step is tried if the bodies rotate by more than this angle [rad] in all.
@@ -176,10 +176,10 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
   return longest;
 }
 
-// The direction of contact. It is the last certain axis, turned for the time h, if this separates
-// the bodies as well as the present best axis, and otherwise the best axis. The error of the turned
-// axis is of second order in h. It is needed for flat bodies in a common plane: the normal of this
-// plane separates them by zero, as their contact normal does.
+// The direction of contact. It is the last certain axis, turned for the time h, if this axis
+// separates the bodies as well as the present best axis; otherwise it is the best axis. The error
+// of the turned axis is of second order in h. It is needed for flat bodies in a common plane: the
+// normal of this plane separates them by zero, as their contact normal does.
 Vec3 contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
                     const Axis& now) {
   if (last.separation > -INFINITY) {

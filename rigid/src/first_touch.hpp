@@ -16,7 +16,7 @@ inline constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NA
 // point comes from the features that touch along the normal, or from the nearest points.
 FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec3& origin);
 
-// For row `row`, with each body grown by a ball of the given radius.
+// The first touch of the bodies of row `row`, each grown by a ball of the given radius.
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
                          double rounding_b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b);

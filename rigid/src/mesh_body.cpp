@@ -67,7 +67,7 @@ RoundedBody::RoundedBody(const Bodies& batch, std::size_t row, double r)
   for (const Vec3& p : points) {
     for (const double x : p) extent.magnitude = std::max(extent.magnitude, std::fabs(x) + rounding);
     extent.radius = std::max(extent.radius, norm(p - extent.centre) + rounding);
-    // The rounded centre and axes (rounded to float) are used, so that the box contains the body.
+    // Extents refer to the centre and axes as rounded to float, so that the box contains the body.
     for (int i = 0; i < 3; ++i) {
       const Vec3 n = {box.axis[i][0], box.axis[i][1], box.axis[i][2]};
       half[i] = std::max(half[i], std::fabs(dot(n, p - extent.centre)));

@@ -12,8 +12,8 @@ struct Relative {
   float r[3][3], abs_r[3][3], t[3], pad;
 };
 
-// A pose as given: x -> R x + t, with products summed from left to right. Its value in doubles is
-// by definition the corner of a posed triangle: exact answers hold for these corners.
+// A pose x -> R x + t. By definition the corners of a posed triangle are the values in doubles,
+// with sums from left to right. Exact answers are exact for these corners.
 struct Pose {
   double r[3][3], t[3];
   explicit Pose(const double* m) {

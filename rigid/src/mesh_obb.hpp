@@ -31,9 +31,9 @@ struct ObbTree {
   }
 };
 
-// The axes of a box are the principal axes of the second moments of its surface, which are summed
-// from the leaves up. For a leaf the axes come from its normal and longest edge. A box contains
-// all corners.
+// The axes of a box are principal axes of the second moments of the surface in it. The moments are
+// summed from the leaves up. A leaf has axes along its normal and longest edge instead. A box
+// contains all corners.
 ObbTree fit_obbs(const Tree& tree);
 
 // Sets bit s if child s of `node` may meet `box`, which is in the node's frame.

@@ -137,7 +137,7 @@ Moments leaf_moments(const Tree& tree, const Run& run, FloatObb* box) {
     double q[3];
     for (int k = 0; k < 3; ++k) normal[k] += sign * n[k], q[k] = p[0][k] + p[1][k] + p[2][k];
     // The integral of x x^T over a triangle is area / 12 (9 m m^T + sum p p^T), where p are its
-    // corners and m = q / 3 is its centroid.
+    // corners, q is the sum of the corners, and m = q / 3 is the centroid.
     Moments m;
     m.weight = weight;
     for (int k = 0; k < 3; ++k) m.first[k] = weight / 3 * q[k];

@@ -40,8 +40,8 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
 }
 
 // The test of overlap_mask (mesh_obb.cpp), with the fractions of the chord at which each axis stops
-// and starts separating. If the motion along an axis is smaller than the pad, the quotient is
-// formed with the pad, so that it stays bounded; a second pad covers this change.
+// and starts separating. If the motion along an axis is smaller than the pad, the pad is the
+// divisor, so that the fractions stay bounded. A second pad covers this change.
 TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
                                     float* enter) {
   const FloatObb& box = m.box;

@@ -42,7 +42,7 @@ unsigned swept_mask(const ObbNode& node, const MovingObb& moving, float leave, f
 // `b0`, `b1`: the second triangle at the ends of the chord, in the frame of `a`.
 double certainly_apart(const Vec3* a, const Vec3* b0, const Vec3* b1, double pad);
 
-// The children of a node as oriented boxes, for any volume; the result may refer to `scratch`.
+// The children of a node as oriented boxes, for any kind of tree; they may be in `scratch`.
 const ObbNode& oriented(const Mesh& mesh, std::int32_t node, ObbNode& scratch);
 FloatObb oriented_box(const Mesh& mesh, const Slot& slot);
 

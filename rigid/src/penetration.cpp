@@ -5,8 +5,8 @@ namespace tauguard::rigid {
 namespace {
 
 constexpr int most_faces = 396;  // a convex polytope with 200 corners has at most this many
-// Largest error of the depth of curved cores, as a fraction of their size. The search between
-// polytopes usually ends at a facet, whose depth is exact up to rounding.
+// Largest error of the depth of curved cores, as a fraction of their size. For two polytopes the
+// search usually ends at a facet, whose depth is exact up to rounding.
 constexpr double resolution = 1e-7;
 
 // The set of differences b - a of two shapes, by their support functions.
@@ -108,7 +108,8 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
   d->lower = -std::max(0.0, polytope.nearest.offset / length);
   const Vec3 foot = d->lower * d->n;
   Barycentric best = weights(polytope, polytope.nearest, foot);
-  // Triangles in one plane are equally near. The triangle that contains the foot gives the points.
+  // Triangles in one plane are equally near. The one with the foot of the perpendicular from the
+  // origin gives the points.
   for (const auto& face : polytope.faces()) {
     if (best.least >= 0) break;
     if (!(dot(face.normal, normal) > (1 - 1e-12) * length * norm(face.normal))) continue;

@@ -78,7 +78,8 @@ SignedDistance together(const Points<double>& a, const Points<double>& b, const 
 
 // The distance of two bodies that are close at parallel features. The segment between the nearest
 // points is then so short that rounding changes its direction. The normal of the triangle of
-// differences is a better direction; the foot of the origin on it gives the points.
+// differences is a better direction. The foot of the perpendicular from the origin gives the
+// points.
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
                    double size, SignedDistance* out) {
   Vec3 w[3], at_a{}, at_b{};

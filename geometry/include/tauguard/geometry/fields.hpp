@@ -1,4 +1,4 @@
-// The members of a struct by name, so that a binding needs no list of its own.
+// Lists the members of a struct by name, so that a binding needs no list of its own.
 #pragma once
 
 #include <algorithm>

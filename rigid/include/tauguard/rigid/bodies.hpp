@@ -26,7 +26,7 @@ struct Bodies {
   Kind kind;
   const double* data;
   const std::int64_t* offsets;  // hulls and polygons only
-  std::size_t count;            // a count of 1 broadcasts against the other side
+  std::size_t count;            // a single body is paired with each body of the other side
 
   static constexpr std::size_t strides[] = {12, 15, 12, 3, 2};
 
@@ -83,7 +83,7 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   return out;
 }
 
-// A box or parallelepiped: all points origin + shift + sum_k u_k g_k with |u_k| <= 1. The centre is
+// A box or parallelepiped: all points origin + shift + sum_k w_k g_k with |w_k| <= 1. The centre is
 // kept as origin + shift, so that a large origin costs no accuracy. The errors of g and of each
 // entry of shift are at most 3 u times the edges that they are computed from.
 struct Zonotope {

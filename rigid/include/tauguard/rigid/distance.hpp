@@ -1,5 +1,5 @@
 // Distance or penetration depth of two convex bodies at one instant, in floating point. For support
-// shapes the result has a lower and an upper bound.
+// shapes (cores grown by a radius) the result is a pair of bounds.
 #pragma once
 
 #include "tauguard/rigid/support_shape.hpp"
@@ -34,8 +34,8 @@ struct Distance {
   bool overlap = false;      // the cores share a point, up to rounding
 };
 
-// Distance of the cores at the present time of both shapes. `guess` is the first direction. The
-// search ends early if upper - lower < 0.1 (lower - needed).
+// Distance of the cores at the present time of both shapes. `guess`: the first search direction.
+// The search ends early if upper - lower < 0.1 (lower - needed).
 Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
                      double needed);
 

@@ -8,7 +8,7 @@ namespace tauguard::rigid {
 struct Impact {
   double t;     // the bodies are certainly apart on [start, t)
   bool hit;     // false: apart on all of [start, end]
-  Vec3 normal;  // unit, from a to b; zero if the bodies overlap at `start` and no axis is known
+  Vec3 normal;  // unit, from a to b; zero for an overlap at `start` if no normal is known
 };
 
 // Advances from `start` to `end` while the distance of the bodies exceeds rounding errors.

@@ -31,7 +31,7 @@ struct RigidMotion {
   Vec3 turn(const Vec3& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
 };
 
-// A vector that rotates with a body, divided as in the formula above.
+// A vector that rotates with a body, as the sum of `along` and `swing` (formula above) at t = 0.
 struct Swing {
   Vec3 along, swing, side;
   Swing(const RigidMotion& m, const Vec3& w)
@@ -95,8 +95,8 @@ class MovingBody {
   Vec3 angular() const { return motion_.speed * motion_.axis; }
   const Vec3& axis() const { return motion_.axis; }  // unit, zero without rotation
   double angular_speed() const { return motion_.speed; }
-  // A bound on the magnitudes that enter a position, to which rounding errors are relative. It
-  // includes the angle, whose rounding error rotates the body.
+  // A bound on all magnitudes from which a position is computed; rounding errors are relative to
+  // it. It includes the rotation angle, because an error of the angle rotates the body.
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }

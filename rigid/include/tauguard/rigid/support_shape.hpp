@@ -39,8 +39,8 @@ struct LocalFrame {
 };
 
 // The motion of a body between two poses. The origin moves linearly, and the frame rotates at a
-// constant rate by the shortest rotation vector. If `turn` is given, it rotates by the rotation
-// vector nearest to `turn`, which may include full turns.
+// constant rate by the shortest rotation vector. If `turn` is given, full turns are added to this
+// vector so that it is as near to `turn` as possible.
 RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
                            const double* xmat_t1, const double* turn = nullptr);
 
@@ -56,10 +56,10 @@ class SupportShape {
   void move_to(double t);
   Vec3 support(const Vec3& d) const;
   // The maximum over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)), and its slope in h.
-  // For each point x this is the tangent, at h = 0, of its projection on n + h r.
+  // For each point x the expression is the tangent, at h = 0, of the projection of x on n + h r.
   double tangent(const Vec3& n, const Vec3& r, double h, const Vec3& c, const Vec3& drift,
                  double* slope) const;
-  // The bounds of MovingBody.
+  // The bounds of the same names in MovingBody.
   double speed_about(const Vec3& drift) const;
   double acceleration(const Vec3& n, double drift) const;
   Vec3 angular() const { return corners_ ? Vec3{} : motion_->speed * motion_->axis; }
