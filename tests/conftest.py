@@ -1,5 +1,6 @@
 """Shared fixtures."""
 
+import gc
 import os
 import pickle
 import sys
@@ -20,6 +21,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def pytest_addoption(parser):
     parser.addoption("--slow-seed", type=int, default=0, help="seed of the slow tests")
+
+
+def pytest_collection_finish():
+    """Keep what every test shares out of the garbage collector's search, 0.4 s each time."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter):

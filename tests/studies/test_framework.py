@@ -81,7 +81,7 @@ STUDIES = {
 
 
 @pytest.fixture
-def checkout(tmp_path, forked):
+def checkout(tmp_path):
     """A folder with the framework and the studies above; a function that runs it there."""
     studies = tmp_path / "studies"
     studies.mkdir()
@@ -101,7 +101,13 @@ def checkout(tmp_path, forked):
             (studies / study / f"{name}.py").write_text(PART + text)
 
     def run(*args, **environment):
-        return forked("studies", *args, cwd=tmp_path, **environment)
+        return subprocess.run(
+            [sys.executable, "-m", "studies", *map(str, args)],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(tmp_path)} | environment,
+            capture_output=True,
+            text=True,
+        )
 
     run.folder = tmp_path
     return run
