@@ -2,7 +2,7 @@
 
 A group of columns has names that differ by a joint's number, such as ``q0`` to ``q6``,
 ``actual_q_0`` or ``/joint_states/position[0]``. The last word of the name tells the signal.
-Commands are ignored. A unit in a name is used: "timestamp_us", "angle (deg)". Without units, values
+Commanded values are ignored. A unit in a name is used: "timestamp_us", "angle (deg)". Else, values
 decide: angles beyond two turns are degrees, currents above 100 are mA, and times with sample
 intervals of more than 0.5 are in milliseconds or a smaller unit.
 """

@@ -44,7 +44,7 @@ ZSTD_LEVEL = 3
 
 @dataclass(frozen=True)
 class ShardTask:
-    """The work of one worker process."""
+    """A shard that a worker process is to make."""
 
     folder: str  #: the dataset's folder
     configuration: str  #: the dataset's configuration as JSON

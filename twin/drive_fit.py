@@ -48,7 +48,7 @@ def fit_friction(
     """Friction of one joint; None if it moves for less than :data:`LEAST`.
 
     Args:
-        joint: its index.
+        joint: index of the joint.
         motions: motions of the logs.
         torques: gain times current [N m], shape (T, n) each.
     """
@@ -87,7 +87,7 @@ def _solve(
     more, rises = 1 + rise * np.abs(load), [np.tanh(qd / speed) for speed in SLOPES]
     level = [more * part for part in (sign * (1 - slip), sign * slip, *rises)]
     table = np.stack([*level[:2], qd, *level[2:], one, -one, left], axis=1)
-    products = table.T @ table  # its Cholesky factor is a small system with the same residuals
+    products = table.T @ table  # its Cholesky factor is a small system with the same residual norms
     products[np.diag_indices_from(products)] *= 1 + 1e-9
     # Rows of the priors: static minus Coulomb friction, viscous friction, slopes.
     about = np.zeros((2 + len(SLOPES), table.shape[1]))

@@ -218,10 +218,10 @@ def _groups_of(logs: Sequence[Track], windows: Sequence[tuple[int, slice]]) -> N
 def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.int64]:
     """Groups of windows that stay in one fold: those of one motion, or of one part of a log.
 
-    Without these groups, if a program repeats a cycle, a classifier would be tested on motion that
-    it was trained on, and could distinguish even two draws of one process. With fewer motions than
-    folds, as of an arm that stands in few poses, the groups are parts of a log, and areas can be
-    too large.
+    If a program repeats a cycle, a classifier without groups would be tested on motion that it was
+    trained on, and could distinguish even two draws of one process. If there are fewer motions than
+    folds, as for an arm that stands in few poses, the groups are parts of a log. The areas can then
+    be too large.
 
     Args:
         place: position and velocity in units of :data:`PLACE` and :data:`SPEED`, shape (W, 2 n).
@@ -240,7 +240,7 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
 
 
 def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArray[np.int64], Bools]:
-    """Each window's nearest earlier window of the same motion (-1: none); whether it has any.
+    """The nearest earlier window of the same motion (-1: none), and whether any window repeats it.
 
     Of equal places only the first and the last window count: if those are too near in time, so are
     the windows between. More and more neighbours are looked up, until an earlier one is among them.

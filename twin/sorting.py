@@ -54,9 +54,9 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
 
 
 def _errors(arm: ArmModel, recordings: Sequence[Recording]) -> Errors:
-    """A function of a log and a group of logs: the log's residual with the group's calibration.
+    """A function that computes a log's residual with a calibration from a group of logs [N m].
 
-    It is in N m, and inf if the other logs of the group have too little motion.
+    The result is inf if the other logs of the group have too little motion.
     """
     calibrated = Subsets(replace(arm, friction=None), recordings)
 

@@ -53,7 +53,7 @@ class CollisionAlarm(Frozen):
     score is used."""
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check the fields: ``ValueError``."""
         confirmation_samples(self.confirmation, self.detector.dt)
         if np.isnan(self.threshold):
             raise ValueError("threshold: not a number")

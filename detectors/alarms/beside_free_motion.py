@@ -27,7 +27,7 @@ class BesideFreeMotion(Frozen):
     learned: CollisionAlarm  #: of the same arm
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check the fields: ``ValueError``."""
         if self.learned.detector.arm.robot.joints != self.free.arm.robot.joints:
             raise ValueError("free, learned: of arms with different joints")
         if not self.learned.threshold > 0:

@@ -137,10 +137,10 @@ def train_beside(
 ) -> tuple[CollisionAlarm, list[FreeScores], tuple[str, ...]]:
     """A learned alarm to run beside free motion, which already has plain thresholds.
 
-    The threshold comes from the logs alone: simulated noise differs. Each log, or each half of a
-    single one, is scored by a detector and an arm model that were made without it. Few logs show
-    little of the scores' tail, so the threshold exceeds all these scores, the more the fewer logs
-    there are (:data:`UNLIKE`).
+    The threshold comes from the logs alone, as simulated noise differs. Each log, or each half of a
+    single one, is scored by a detector and an arm model that were made without it. With few logs
+    the tail of the scores is hardly known, so the threshold exceeds all these scores, by a larger
+    factor for fewer logs (:data:`UNLIKE`).
 
     Args:
         detector: settings of a method.

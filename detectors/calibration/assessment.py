@@ -47,8 +47,8 @@ WRONG_LOAD = (0.8, 0.3)
 #: the unexplained torque, divided by its median. The measure is at most 1.8 in 20 free logs of five
 #: arms, and 4 to 9 in three logs of arms that were pushed.
 BURSTS = 2.5
-#: A residual above its median is reduced by ``SWING`` times the largest torque of accelerations
-#: within ``SWINGS`` [s]. For a KUKA with jerky commands this reduces the measure from 4.2 to 0.9.
+#: A residual above its median is reduced by ``SWING`` times the largest torque of accelerations at
+#: most ``SWINGS`` [s] away. For a KUKA with jerky commands the measure falls from 4.2 to 0.9.
 SWING, SWINGS = 0.5, 0.1
 #: Least motion of a joint for the check of bursts [s], and number of times that a message lists.
 ENOUGH, SAID = 3.0, 6
@@ -196,7 +196,7 @@ def explained(
     error, whole = (float(np.sqrt(x[worst] / max(rows[worst], 1))) for x in (left, torque))
     said = (
         f"{100 * fraction[worst]:.0f} % of the torque of {joints[worst]} in motion is not "
-        f"explained ({error:.2g} N m beside {whole:.2g} N m, root mean square): friction that "
+        f"explained ({error:.2g} N m of {whole:.2g} N m, root mean square): friction that "
         "changes with temperature, a load that was not named (--payload), contacts (nothing may "
         "touch the arm in these logs), another arm's robot file, or wrong order, signs, units "
         "(milliamperes?) or gains of the currents or torques"

@@ -108,10 +108,9 @@ def misread(arm: ArmModel, logs: Mapping[str, Recording]) -> str:
     """Which joints' columns seem exchanged or negated; empty: none.
 
     Each joint's current is fitted by an offset and, with weights of at least 0, by the joint's
-    rigid-body torque, the direction of motion and the speed. The unexplained variances are compared
-    with those after exchanging the currents, or all columns, of two joints, and after negating
-    those of one. Only joints that move for long enough (:data:`EXCHANGED`, :data:`NEGATED`) are
-    checked.
+    rigid-body torque, the direction of motion and the speed. Then the currents, or all columns, of
+    two joints are exchanged, or those of one joint negated, and the unexplained variances compared.
+    Only joints that move for long enough (:data:`EXCHANGED`, :data:`NEGATED`) are checked.
 
     Args:
         arm: arm of the robot file, or calibrated; of the gains, only the signs are used.
@@ -225,7 +224,7 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
         traces: their positions are used.
 
     Raises:
-        ValueError: an arm of another weight.
+        ValueError: the ratio of the gravity torques is outside its limits.
     """
     poses = np.concatenate([trace.q[:: max(1, len(trace.q) // 100)] for trace in traces])
     needed, shown = gravity_torque(file, poses), gravity_torque(found, poses)

@@ -75,7 +75,7 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
     """The momentum observer's estimate of the external torque along a trace [N m], shape (T, n).
 
     Args:
-        trace: of an arm.
+        trace: motion and currents of an arm.
         robot: a name, a file or a robot (default: the arm attached to the trace).
         gain: gain of the observer [1/s], a number or one per joint.
 

@@ -114,7 +114,7 @@ def filtered_columns(
         gain: N m per ampere, shape (n,).
         model: the columns of friction.
         rate: rate of the filter [1/s].
-        used: which rows, shape (T,).
+        used: which rows to use, shape (T,).
         rest: rows of a joint that has been at rest for longer get weight 0 [s]; ``None``: weight 1.
         held: load of load-dependent friction [N m], shape (T, n).
         sampled: see :class:`~tauguard.detectors.Estimator`.

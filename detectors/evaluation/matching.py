@@ -1,7 +1,7 @@
 """Matching of alarms with collisions, and metrics of a detector over many traces.
 
-A collision is detected by the first alarm that starts between its onset and 0.5 s later or, for a
-clamping, its end if that is later. Any other alarm is false, for example during a payload change.
+A collision is detected by the first alarm that starts within 0.5 s after its onset or, if a clamp
+lasts longer, before the clamp ends. Any other alarm is false, for example at a payload change.
 An alarm that is on at the onset of a collision does not detect it.
 """
 

@@ -42,7 +42,7 @@ STRENGTH_FACTOR = {"strike": 10.0, "clamp": 1.3, "pulse": 10.0}
 
 @dataclass(frozen=True)
 class Window:
-    """The simulation of an injected collision."""
+    """The simulated part of an episode around an injected collision."""
 
     begin: int  #: first row
     rollout: Rollout

@@ -48,7 +48,7 @@ def _errors(rows: Sequence[Row]) -> str:
 
 
 def _queries(rows: Sequence[Row]) -> Iterator[Point]:
-    """Time and error of the queries of a frame, with and without hits, beside each peer."""
+    """Time and error of a frame's queries, with and without hits, of ab2pf and of each peer."""
     own = [row for row in table_rows(rows, "query") if row.get("method") == "ab2pf"]
     latest = max((row["toi_error_most"] for row in own), default=0)
     for peer, mine in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():

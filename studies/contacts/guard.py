@@ -47,8 +47,8 @@ NOTES = {
     "energy: largest / initial energy (with a mocap body: / energy of all bodies at twice its "
     f"speed); energy_above: energy above {ADDED:g}; rolled_back_above: the same, with a rollback "
     "and more than in plain steps; rolled_back_added: most energy from rollbacks. Medians: "
-    "over_plain: time / time of plain steps; over_fixed: time / time of the fixed step fixed_ms, "
-    "the largest with stiff contacts such that nothing tunnels there and below (one scene in 4).",
+    "over_plain: time / time of plain steps; over_fixed: time / time of fixed steps of fixed_ms, "
+    "the largest with which, and with finer ones, nothing tunnels (stiff; one scene in 4).",
     "overhead": "a step of a scene without fast contacts, plain and guarded.",
 }
 
@@ -112,9 +112,9 @@ def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
 
 
 def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
-    """Simulate with stiff fixed steps, from fine to coarse, up to the first that does not hold.
+    """Simulate with stiff fixed steps, from fine to coarse, up to the first with tunnelling.
 
-    The finest step is tried only if the next one does not hold.
+    The finest step is tried only if something tunnels with the next one.
     """
     out: dict[float, Outcome] = {}
     finest, *coarser = sorted(fixed)
@@ -242,7 +242,7 @@ def _overhead(scene: Any, steps: int) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Targets of scenes held (no method can hold `squeeze`), silent tunnelling and time."""
+    """Judge scenes held (except `squeeze`, which no method holds), silent tunnelling and time."""
     whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     out: list[Row] = []
     for method in METHODS:

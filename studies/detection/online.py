@@ -178,7 +178,7 @@ def peer(regressor: SrqRegressor) -> Callable[[Array], Array]:
 
 
 def kernel_rows(regressor: SrqRegressor, windows: Array, single: int, seed: int) -> list[Row]:
-    """Rows ``kernel``: the sum over all vectors and scikit-learn's, then reduced sets."""
+    """Rows ``kernel``: times of the sum over all vectors, of scikit-learn, and of reduced sets."""
     rng = np.random.default_rng([seed, 9])
     own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
     value = np.empty(single)

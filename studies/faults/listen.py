@@ -156,9 +156,9 @@ def heard(folder: Path, rate: float) -> Row:
 def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
     """The fraction of the file's alarms that begin at the same sample in the received stream.
 
-    ``truth`` says at each of the ``times`` [s], shape (T,), whether the file's alarm is up.
-    ``said`` says the same of the received stream, by time. An alarm whose first sample, or the one
-    before, was not received is left out.
+    ``truth``: whether the file's alarm is on at each of the ``times`` [s], shape (T,). ``said``:
+    whether the received stream's alarm is on, by time. An alarm is left out if its first sample, or
+    the sample before, was not received.
     """
     begins = [
         k

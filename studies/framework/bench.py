@@ -191,9 +191,9 @@ def printed(module: Any, rows: list[Row]) -> list[Row]:
 
 
 def brief(module: Any, rows: list[Row]) -> list[Row]:
-    """What is printed unless every table is asked for: the points of the figure, and the summary.
+    """The rows to print without ``--tables``: the points of the figure, and the summary.
 
-    For a part without points all tables are printed.
+    For a part without points, these are the rows of all tables.
     """
     make = getattr(importlib.import_module(module.__package__), "points", None)
     points = list(make(rows)) if make else []

@@ -70,8 +70,8 @@ def _fast(points: Sequence[Point]) -> str:
 
 
 def _short(point: Point) -> str:
-    """The question without the peer that it names."""
-    return point.question.partition(" beside ")[0].rstrip(",")
+    """The question without the peer that it names at its end."""
+    return point.question.partition(", and ")[0]
 
 
 def _round(ratio: float) -> str:

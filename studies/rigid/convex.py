@@ -1,9 +1,9 @@
 """Table 2.1: elimination (ABFME) against separating axes on random convex bodies, beside coal.
 
 The "cubes" of the published table are random parallelepipeds. *Static* means one pose, *dynamic* a
-constant relative translation over t in [0, 1]. The entries of the published table say how many
-times faster elimination is than separating axes, but in the two entries of dynamic collisions (2.58
-and 1.37), how many times *slower*.
+constant relative translation over t in [0, 1]. An entry of the published table is the factor by
+which elimination is faster than separating axes. In the two entries of dynamic collisions (2.58 and
+1.37), elimination is *slower* by this factor.
 
 Textbook SAT tests all face normals, then all edge pairs. It projects every vertex, ends at the
 first separating axis, and has no error bounds. Data layout, compiler flags and loop are the same

@@ -76,7 +76,7 @@ def judge(rows: list[Row]) -> list[Row]:
 
 
 def steps(count: int, repeats: int, seed: int) -> list[Row]:
-    """Time of an action at 100 Hz [us]: bare physics, the environment, one option more."""
+    """Time of an action at 100 Hz [us]: bare physics, the environment, and each option added."""
     env = reach(seed)
     actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6)).astype(np.float32)
     forces, error = recorded(env, actions, seed)

@@ -38,7 +38,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Tables ``cost`` (what a thing adds) and ``timestep`` (error against cost)."""
+    """Tables ``cost`` (time added by each part) and ``timestep`` (error against cost)."""
     seconds = 5.0 if quick else 60.0
     bare = compose(SceneSpec(labels=False))
     motion = random_motion(np.random.default_rng(seed), workspace(bare), seconds, 30.0)
@@ -46,7 +46,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def costs(motion: Motion, repeats: int) -> list[Row]:
-    """Time of a step [us]: MuJoCo alone, then the arm, then the arm with one thing more."""
+    """Time of a step [us]: MuJoCo alone, then the arm, then the arm with one more part."""
     drive = cura6_drive()
     ideal = replace(drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None)
     bare = SceneSpec(labels=False)

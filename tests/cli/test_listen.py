@@ -104,7 +104,7 @@ def test_every_line_says_why(struck, capsys):
         "free",
         "collision: score 1.50 above 1.00",
         f"collision: score 1.70 above 1.00; {wrong}",
-        "collision: its alarm was up before; gap: nothing for 40 ms",
+        "collision: the alarm was on already; gap: nothing for 40 ms",
         f"fault: {wrong}",
     ]
 

@@ -46,8 +46,8 @@ def command(
     With --model a trained detector runs on the log. Its states are those of `tauguard listen`:
     free, collision, or fault if the samples are wrong (frozen, missing, of another arm). Without a
     model, the detector of `tauguard train --free` is trained on the first --quiet seconds, in which
-    nothing may touch the arm, and runs on the rest. `tauguard train --free` itself uses whole logs
-    and makes a better detector.
+    nothing may touch the arm, and then runs on the rest of the log. `tauguard train --free` itself
+    uses whole logs and makes a better detector.
 
     A column called label, contact, collision or touch with the values 0 and 1 is the ground truth.
     The output then states which contacts were detected, the delays, and the false alarms.

@@ -81,7 +81,7 @@ def command(
 
 
 def loaded(model: Path, detector: str | None) -> CollisionAlarm:
-    """The model in a file; ``detector`` names the user's class that the file may hold."""
+    """The model in a file; ``detector`` names its class if that is the user's own."""
     from tauguard.detectors import load_model
     from tauguard.detectors.registry import make_detector
 
@@ -91,7 +91,7 @@ def loaded(model: Path, detector: str | None) -> CollisionAlarm:
 
 
 def of_file(data: Path, alarms: Path, splits: tuple[str, ...]) -> Iterator[Part]:
-    """A file of alarms, matched with the collisions of a dataset split by split."""
+    """Match the alarms of a file with the collisions of a dataset, split by split."""
     from tauguard.datasets.alarm_files import judged_alarms
     from tauguard.detectors import detection_metrics
 
@@ -106,7 +106,7 @@ def of_model(
     splits: tuple[str, ...],
     wrong: EventFolder | None,
 ) -> Iterator[Part]:
-    """A detector on the splits of a dataset, or on a folder of recordings."""
+    """Evaluate a detector on the splits of a dataset, or on a folder of recordings."""
     from tauguard.datasets.reader import episodes_of_splits
     from tauguard.datasets.recordings import labelled
 

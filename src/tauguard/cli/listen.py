@@ -212,7 +212,7 @@ def _at(t: float) -> str:
 def why_text(answer: Answer, threshold: float) -> str:
     """The reason for a fault or a collision; empty for a free sample."""
     above = f"score {answer.score:.2f} above {threshold:.2f}"
-    held = "its alarm was up before"
+    held = "the alarm was on already"
     parts = [above if answer.score > threshold else held] if answer.alarm else []
     parts += [answer.reason] if answer.reason else []
     return f": {'; '.join(parts)}" if parts else ""

@@ -104,7 +104,7 @@ def command(
 
 
 def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
-    """The logs that the other logs predict, and a note on each log that is left out.
+    """Logs that a calibration from the other logs predicts, and a note on each log left out.
 
     Raises:
         ValueError: logs of two arms.
@@ -156,7 +156,7 @@ def sure_of(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]
 def judged(
     twin: Twin, given: FreeLogs, limit: Array, tried: dict[str, Trace] | None
 ) -> tuple[Likeness | None, list[str], list[str]]:
-    """The likeness of twin and arm in other motion.
+    """Compare twin and arm in motion from which the compared twin was not identified.
 
     Args:
         twin: identified from all logs.

@@ -102,7 +102,7 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def opened(inner: Any, save: Path | None, port: int) -> Any:
-    """The viewer or the file to write, with the charts laid out."""
+    """The viewer or, with ``save``, a writer of files; its charts are laid out."""
     from tauguard.replay.live import LiveView
 
     view = LiveView(inner.compiled.shown(), save, port)
