@@ -110,8 +110,9 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts
 
 int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
   const double size = shape.extent() + shape.radius;
+  const double extent = norm(in_body.at) + shape.extent() + shape.radius;
   const bool plane = shape.core == Core::half_space;
-  entries_.push_back({std::move(shape), in_body, body, norm(in_body.at) + size, size});
+  entries_.push_back({std::move(shape), in_body, body, extent, size});
   boxes_.emplace_back(), boxed_.push_back(0);
   if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
   const std::size_t n = static_cast<std::size_t>(body) + 1;
@@ -122,7 +123,7 @@ int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
     extents_.resize(n, 0);
     last_.resize(24 * n, NAN);
   }
-  extents_[body] = std::max(extents_[body], plane ? INFINITY : entries_.back().extent);
+  extents_[body] = std::max(extents_[body], plane ? INFINITY : extent);
   return static_cast<int>(entries_.size()) - 1;
 }
 
