@@ -170,10 +170,10 @@ def turned(friction: Friction, motions: Sequence[Motion], torques: Sequence[Arra
 def left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
     """Errors of the model along the logs, resampled to constant intervals without smoothing.
 
-    The running median of the error is interpolated. The deviation from the median is moved to the
-    nearest new time. There its impulse, error times interval, is kept, so that jitter of the time
-    stamps causes no impulse that the real arm did not have. The median is interpolated, because
-    keeping its impulse would turn jitter into an error.
+    The running median of the error is interpolated, because keeping its impulse (error times
+    interval) would turn jitter of the time stamps into an error. The deviation from the median is
+    moved to the nearest new time with its impulse, so that jitter causes no impulse that the real
+    arm did not have.
 
     Args:
         arm: calibrated.

@@ -242,8 +242,8 @@ def _groups(place: Array, logs: NDArray[np.int64], starts: Array) -> NDArray[np.
 def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArray[np.int64], Bools]:
     """The nearest earlier window of the same motion (-1: none), and whether any window repeats it.
 
-    Of equal places only the first and the last window count: if those are too near in time, so are
-    the windows between. More and more neighbours are looked up, until an earlier one is among them.
+    Of windows at equal places only the first and the last are compared: if they are too near in
+    time, so are those between. The number of neighbours grows until an earlier one is found.
     """
     count = len(place)
     # Mean positions at rest differ in the last bits.

@@ -71,7 +71,7 @@ class CollisionAlarm(Frozen):
         return confirmation_samples(self.confirmation, self.detector.dt)
 
     def normalised(self, score: Array, trace: Trace) -> Array:
-        """The normalised ``score`` of a trace, or that of the floor where larger, shape (T,)."""
+        """The larger of the normalised ``score`` and the floor's normalised score, shape (T,)."""
         if self.normalisation is None:
             return score
         speed = recent_speed(trace.qd, trace.dt)

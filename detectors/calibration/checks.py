@@ -18,8 +18,8 @@ from tauguard.traces.trace import Trace
 #: Least speed of a checked joint, and speed over which the sign of friction changes [rad/s].
 FAST, REVERSAL = 0.05, 0.05
 
-#: A joint's current has the wrong sign if :func:`drag` is below this. It is at least 0.6 in every
-#: log of three real arms and 2 to 8 in most of them. The wrong sign changes only its sign.
+#: A joint's current has the wrong sign if :func:`drag` is below this. Its result is at least 0.6 in
+#: every log of three real arms and 2 to 8 in most of them. A wrong sign negates the result.
 AGAINST = -1.0
 
 #: Least motion of a joint that is checked [s].

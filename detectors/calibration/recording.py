@@ -66,7 +66,7 @@ def moves(trace: Trace) -> bool:
 
 
 def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
-    """Rows from the first motion of any joint to the last one, shape (T,).
+    """Rows from the first to the last motion of any joint, shape (T,).
 
     Before and after, static friction takes up an unknown fraction of the torque.
 

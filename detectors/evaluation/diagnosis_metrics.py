@@ -27,7 +27,7 @@ LAG = 0.015
 def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, Array]:
     """True force [N] and point [m] with which an estimate for ``time`` [s] is compared.
 
-    They are those of the largest force in the last :data:`LAG` seconds. If there was no contact in
+    They belong to the largest force in the last :data:`LAG` seconds. If there was no contact in
     that time, they are the collision's own force and point.
 
     Raises:

@@ -187,7 +187,7 @@ class FreeScores:
     def over(
         self, levels: SpeedNormalisation, floor: SpeedNormalisation | None = None
     ) -> FreeScores:
-        """The normalised scores, or those of the floor where larger.
+        """The larger of the normalised scores and the floor's normalised scores.
 
         The speed at the peak of a piece is used for the whole piece.
         """

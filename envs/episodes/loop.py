@@ -39,7 +39,7 @@ class Rollout:
 
 
 class SimulationLoop:
-    """One scene's state with its drive; :meth:`run` follows a table of references."""
+    """The state of a scene and of its drive; :meth:`run` follows a table of references."""
 
     def __init__(self, scene: Scene, nominal: Drive, gains: Gains | None = None) -> None:
         """Bind the native loop to ``scene``.

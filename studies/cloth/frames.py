@@ -204,7 +204,7 @@ def _clear(kind: str, candidates: list[Any], found: FrameAnswer, most: int) -> l
 
 
 def _listed(data: Path) -> list[Row]:
-    """Compare every method with the listed collisions; "exact" only on small meshes."""
+    """Compare every method with the listed collisions; "exact" runs only on small meshes."""
     rows: list[Row] = []
     for name in FRAMES:
         frame = load_frame(data, name)

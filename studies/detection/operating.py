@@ -84,7 +84,7 @@ def free_scores(detectors: Mapping[str, FittedDetector], trace: Trace) -> Free:
 
 
 def joined(parts: Sequence[Free]) -> Free:
-    """All episodes of several traces, by detector."""
+    """Scores of all episodes of several traces, by detector."""
     return {name: [one for part in parts for one in part[name]] for name in parts[0]}
 
 
@@ -154,7 +154,7 @@ class Outcome:
 
 @dataclass
 class Tally:
-    """One detector at one operating point over some episodes."""
+    """Results of one detector at one operating point over some episodes."""
 
     outcomes: list[Outcome] = field(default_factory=list)
     cases: int = 0

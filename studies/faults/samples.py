@@ -141,7 +141,7 @@ class Tally:
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """All rows."""
+    """The rows of the tables ``clean`` and ``faults``."""
     rng = np.random.default_rng([seed, 15])
     rows: list[Row] = []
     for tested in arms(quick, seed):

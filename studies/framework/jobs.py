@@ -112,7 +112,7 @@ def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
 
 
 def _data(result: Any) -> bytes:
-    """Arrays, and a list in JSON of all objects, each once and after its parts."""
+    """The bytes of a file with the arrays, and a JSON list of all objects, parts first."""
     objects, places, arrays = list[Any](), dict[int, list[int]](), dict[str, Any]()
 
     def listed(value: Any) -> Any:

@@ -211,7 +211,7 @@ class Report:
             if not row["met"]
         ]
         met = len(judged) - len(lost)
-        return f"<p>{met} of {len(judged)} asked figures are met.</p>" + tables(lost, {})
+        return f"<p>{met} of {len(judged)} targets are reached.</p>" + tables(lost, {})
 
     def _part(self, name: str, part: Part) -> str:
         one, module = self.found[name], part.load()

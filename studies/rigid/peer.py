@@ -65,7 +65,7 @@ def motion_columns(
     most: int | None = None,
     least: int = 1,
 ) -> Row:
-    """Time of impact judged by coal's distance, before the time found and at it.
+    """Check times of impact by coal's distance at the time found and at moments before.
 
     Args:
         call: function that gives our times of impact of the chosen rows.
@@ -76,10 +76,8 @@ def motion_columns(
     """
     every = np.arange(distance.n)
     found = call(every)
-    end, hits = (
-        np.where(found.hit, found.time_of_impact, 1.0),
-        outcomes(found.time_of_impact)["hit"],
-    )
+    end = np.where(found.hit, found.time_of_impact, 1.0)
+    hits = outcomes(found.time_of_impact)["hit"]
     path = np.min([distance(every, share * end) for share in np.linspace(0, 0.999, 24)], axis=0)
     early = path < -CONTACT if distance.signed else path <= 0
     a, b = distance.motions

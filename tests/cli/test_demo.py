@@ -18,6 +18,6 @@ def test_the_rate_that_was_asked_stands_beside_the_one_that_was_found():
     assert wanted["low"] <= FALSE_ALARMS_PER_HOUR <= wanted["high"]
     found = poisson_rate(3, 0.2)
     said = asked_and_found({"asked": wanted, "false_alarms_per_hour": found})
-    assert "asked 1; found 15.0" in said
+    assert "requested 1, found 15.0" in said
     assert "from 3 alarms in 12 min" in said
     assert "5 min of training motion" in said

@@ -130,7 +130,7 @@ def asked_and_found(summary: dict[str, Any]) -> str:
         f"{two_digits(rate['low'])} to {two_digits(rate['high'])}" for rate in (wanted, found)
     )
     return (
-        f"  false alarms per hour: asked {wanted['per_hour']:g}; found {found['value']:.1f}, "
+        f"  false alarms per hour: requested {wanted['per_hour']:g}, found {found['value']:.1f}, "
         f"95 % interval {other}, from {found['n']} alarms in {60 * found['hours']:.0f} min\n"
         f"  (The threshold was set on {60 * wanted['hours']:.0f} min of training motion, with a "
         f"95 % interval of {own} per hour. The test motions are different.)"
