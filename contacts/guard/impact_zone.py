@@ -39,9 +39,9 @@ def impact_zone(
     the inertia, so that the partners of each hit do not move relative to each other (rigid impact
     zones: Provot 1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds
     none, except for the work of mocap bodies. The bodies move with this velocity for the sub-step.
-    Pairs that pass through on the new path are added, and the computation is repeated. If this has
-    no success in :data:`ROUNDS` attempts, or an edited inertia gives no finite velocity, everything
-    except mocap bodies stands still for the sub-step.
+    Pairs that pass through on the new path are added, and the computation is repeated. If there are
+    none to add, if this has no success in :data:`ROUNDS` attempts, or if an edited inertia gives no
+    finite velocity, everything except mocap bodies stands still for the sub-step.
 
     Args:
         model: MjModel.
@@ -55,9 +55,9 @@ def impact_zone(
     Returns:
         All hits whose partners were joined, and the resulting work of mocap bodies [J].
     """
-    stopped, velocity = list(hits), data.qvel.copy()
+    velocity, stopped = data.qvel.copy(), {(hit.pair, hit.vertices.tobytes()): hit for hit in hits}
     for _ in range(ROUNDS):
-        joined = _joined(model, data, velocity, stopped, length)
+        joined = _joined(model, data, velocity, list(stopped.values()), length)
         if joined is None:
             break
         data.qvel[:], work = joined
@@ -65,10 +65,13 @@ def impact_zone(
         mujoco.mj_integratePos(model, data.qpos, data.qvel, length)
         more = judge()
         if not more:
-            return stopped, work
-        stopped += more
+            return list(stopped.values()), work
+        known = len(stopped)
+        stopped |= {(hit.pair, hit.vertices.tobytes()): hit for hit in more}
+        if len(stopped) == known:
+            break
     data.qpos[:], data.qvel[:] = qpos, 0.0
-    return stopped, 0.0
+    return list(stopped.values()), 0.0
 
 
 def _joined(
