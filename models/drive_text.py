@@ -16,7 +16,8 @@ _PARTS = {"friction": Friction, "ripple": Ripple, "sensors": Sensors}
 def drive_text(drive: Drive) -> str:
     """``drive`` as JSON text, from which :func:`drive_of` makes an equal drive.
 
-    The text leaves out recorded errors of currents (``left_over``): no reader needs them.
+    The text leaves out the recorded errors of the model's current (``Sensors.left_over``), which
+    no reader needs.
     """
     if drive.sensors is not None:
         drive = replace(drive, sensors=replace(drive.sensors, left_over=None))

@@ -33,14 +33,14 @@ struct BroadStats {
 
 struct TopologyChange {
   std::array<std::uint64_t, 3> removed{}, added{};  // vertices, edges, faces
-  std::uint64_t rebuilt = 0;                        // trees without slots for the new features
+  std::uint64_t rebuilt = 0;                        // trees to rebuild, for lack of free slots
 };
 
 class MeshCcd {
  public:
   enum class Kind { vf, ee };
 
-  // adaptive: choose in each step whether the volumes are moving (k_dop.hpp).
+  // adaptive: sets volume.moving in each step, by how far vertices move relative to the edges.
   MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, bool adaptive,
           int threads);
 
@@ -51,8 +51,8 @@ class MeshCcd {
 
   // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied. fresh: start
   // the traversal at the root instead of the last front. Throws std::invalid_argument if features
-  // have vertices beyond n or a position is not finite, and TooMany if a front has more than 8
-  // `limit` entries. The object can be used after an exception.
+  // have vertices beyond n or a position is not finite, and TooMany if a front has more than
+  // 8 x limit entries. The object can be used after an exception.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
                bool fresh, std::size_t limit);
   // The positions of the last prepare.

@@ -69,7 +69,7 @@ class SrqSvr:
     distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
     vectors: int = 400  #: largest number of support vectors; 0 keeps all
     name: ClassVar[str] = "srq-svr"
-    floored: ClassVar[bool] = True  #: whether plain thresholds raise alarms, too
+    floored: ClassVar[bool] = True  #: whether plain thresholds can raise alarms, besides the score
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedWindowed:
         """Calibrate, draw windows, and train, with two rounds of added negatives.
@@ -199,7 +199,7 @@ class FittedWindowed(OnFrontEnd):
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual, which raise alarms, too."""
+        """Plain thresholds on the same residual: these or the score can raise an alarm."""
         if self.limits is None:
             return None
         return FittedThresholds(

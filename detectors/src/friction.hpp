@@ -1,4 +1,4 @@
-// A friction model that is linear in its weights: columns of position, velocity and drive torque.
+// A weighted sum of columns, which are functions of position, velocity and drive torque.
 //
 // Presliding and Coulomb friction come in two forms, both in [-1, 1] and rate-independent:
 // * a Dahl bristle of settling length d: ds = (dq - s |dq|) / d, integrated exactly over a step;
@@ -9,8 +9,8 @@
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
 //   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
 //   ripple frequency c, tau |tau| with `saturation`
-// The load is the drive's torque or, with `modelled`, the torque by the arm's model. With the drive
-// torque, joints without gravity load would have friction predicted from friction.
+// The load is the drive's torque or, with `modelled`, the torque by the arm's model: the drive
+// torque of a joint that carries no load is mostly friction, which would then predict itself.
 #pragma once
 
 #include <algorithm>

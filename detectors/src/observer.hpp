@@ -12,8 +12,8 @@
 namespace tauguard::detectors {
 
 // One step of the filter dr/dt = gain (dp/dt - tau - beta - r), with decay = 1 - exp(-gain dt). It
-// is exact if dp/dt - tau - beta is constant over the step, and stable for any gain x dt. `beta` is
-// averaged over both ends of the step; tau has its value of the beginning.
+// is exact if dp/dt - tau - beta is constant over the step, and stable for any gain x dt. beta =
+// C^T qd - g is averaged over both ends of the step; tau is that at its beginning.
 inline double observer_step(double r, double decay, double dt, double p, double p_before,
                             double beta, double beta_before, double tau_before) {
   return r + decay * ((p - p_before) / dt - (tau_before + (beta + beta_before) / 2) - r);

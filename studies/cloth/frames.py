@@ -236,7 +236,11 @@ def differences(reference: tuple[Any, Any], found: tuple[Any, Any]) -> tuple[int
 
 
 def lateness(reference: FrameAnswer, found: FrameAnswer) -> Row:
-    """Number of late common hits, and the largest lateness as a fraction of the step."""
+    """Compare the times of the hits that both have.
+
+    Returns:
+        Number of hits that are later in ``found``, and the largest delay as a fraction of the step.
+    """
     after = []
     for kind in ("vf", "ee"):
         a, b = (keys(getattr(one, kind)) for one in (reference, found))

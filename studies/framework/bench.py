@@ -40,7 +40,8 @@ def command(
 ) -> None:
     """Measure computing time and errors in a study, or in one part of it, and print them.
 
-    The output states time and error of each method, and the targets; `--tables` prints all tables.
+    The output states time and error of each method, and which targets are reached; `--tables`
+    prints all tables.
 
     `tauguard bench all` runs every part of every study and writes figures and tables into a folder.
     Parts with results in the folder are not run again. `tauguard report` makes one page of these.

@@ -157,7 +157,7 @@ class Report:
                 missing.add(name, f"incomplete: {one.get('incomplete', 'its file has no rows')}")
 
     def write(self, cases: Sequence[Row], mistakes: str) -> Path:
-        """Write ``index.html`` with these rows of the hard cases and links to mistakes (HTML)."""
+        """Write ``index.html`` with rows of the hard cases and ``mistakes``, HTML with links."""
         points, attempt = self._of_studies("points"), self.missing.attempt
         bodies = {f"Study: {name}": self._part(name, self.parts[name]) for name in self.found}
         detections = tables(self._of_studies("detections"), {}) or NONE
