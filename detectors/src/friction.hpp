@@ -1,4 +1,4 @@
-// A weighted sum of columns, which are functions of position, velocity and drive torque.
+// Friction as a weighted sum of columns, functions of position, velocity and drive torque.
 //
 // Presliding and Coulomb friction come in two forms, both in [-1, 1] and rate-independent:
 // * a Dahl bristle of settling length d: ds = (dq - s |dq|) / d, integrated exactly over a step;
