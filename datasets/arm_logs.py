@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tauguard.datasets.columns import AS_IS, Reading, column_map
+from tauguard.datasets.columns import ANGLES, AS_IS, Reading, column_map
 from tauguard.datasets.log_checks import saturated
-from tauguard.datasets.logs import Log, read_log
+from tauguard.datasets.logs import Log, chosen, read_log
 from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
@@ -114,7 +114,9 @@ def read_logs(
         ValueError: labelled contacts, a saturated current, currents in one log and torques in
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
-    read = {path.name: read_one(path, columns, torque, reading) for path in log_files(logs)}
+    files = log_files(logs)
+    reading = of_one_unit(files, columns, reading or AS_IS)
+    read = {path.name: read_one(path, columns, torque, reading) for path in files}
     for name, log in read.items():
         _refuse_touched(name, log)
     notes = [note for log in read.values() for note in log.notes]
@@ -125,6 +127,25 @@ def read_logs(
     if len({is_torque(trace) for trace in traces.values()}) > 1:
         raise ValueError("some logs hold currents, others torques: give logs of one kind")
     return ArmLogs(traces, numbers, (*notes, *held))
+
+
+def of_one_unit(files: Sequence[Path], columns: str | None, reading: Reading) -> Reading:
+    """The reading, with the unit of angles that all files have if "auto" finds different ones.
+
+    A log of small motions has angles that may be degrees or radians: the other logs decide.
+    """
+    if columns != "auto" or not ANGLES.keys().isdisjoint(reading.mend):
+        return reading
+    maps, undecided = [], False
+    for file in [file for file in files if file.suffix == ".csv"]:
+        try:
+            maps.append(chosen("auto", file))
+        except ValueError:  # an error other than an undecided unit is raised again by `read_one`
+            undecided = True
+    units = {found.degrees for found in maps}
+    if len({found.q for found in maps}) != 1 or len(units) + undecided == 1:
+        return reading
+    return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
 
 
 def _refuse_touched(name: str, log: Log) -> None:

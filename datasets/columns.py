@@ -22,6 +22,9 @@ REPAIRS = ("repeat", "tail", "nan", "state", "order")
 #: Seconds in one unit of a time column, by the unit's name.
 CLOCK_UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
+#: Units of angles, and whether they are degrees.
+ANGLES = {"deg": True, "rad": False}
+
 
 @dataclass(frozen=True)
 class ColumnMap:
@@ -117,8 +120,8 @@ class ColumnMap:
         """The map with other units, repairs or a clock.
 
         Args:
-            words: "deg" (angles), "mA" (currents), "ms", "us" or "ns" (time), a repair, or
-                "clock=HZ".
+            words: "deg" or "rad" (angles), "mA" (currents), "ms", "us" or "ns" (time), a repair,
+                or "clock=HZ".
 
         Raises:
             ValueError: an unknown word.
@@ -126,8 +129,8 @@ class ColumnMap:
         changed: dict[str, Any] = {"repair": self.repair | (set(words) & set(REPAIRS))}
         for word in words:
             name, _, value = word.partition("=")
-            if word == "deg":
-                changed["degrees"] = True
+            if word in ANGLES:
+                changed["degrees"] = ANGLES[word]
             elif word == "mA":
                 changed["current_scale"] = 1e-3
             elif word in CLOCK_UNITS:
@@ -135,7 +138,7 @@ class ColumnMap:
             elif name == "clock" and re.fullmatch(r"[0-9.]+", value) and float(value) > 0:
                 changed |= {"t": None, "clock": float(value)}
             elif word not in REPAIRS:
-                known = ", ".join(("deg", "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
+                known = ", ".join((*ANGLES, "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
                 raise ValueError(f"--mend {word}: expected some of {known}")
         return dataclasses.replace(self, **changed)
 
@@ -145,7 +148,7 @@ class Reading:
     """Flags of all commands that read logs of a real arm."""
 
     mend: tuple[str, ...] = ()
-    """units and repairs of CSV files: deg (angles in degrees), mA (currents), ms, us or ns (time),
+    """units and repairs of CSV files: deg or rad (angles), mA (currents), ms, us or ns (time),
     clock=HZ (no time column), order (sort rows by time); drop rows that repeat a time (repeat) or
     the whole state (state), rows that lack numbers (nan), a last row that is cut off (tail)"""
     resample: float = 0.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.datasets.columns import (
+    ANGLES,
     PRESETS,
     Column,
     ColumnMap,
@@ -75,7 +76,7 @@ def read_log(
                 from tauguard.datasets.logs_mcap import read_joint_states
 
                 return read_joint_states(path, joint_names)
-            own = chosen(columns, path)
+            own = chosen(columns, path, mend)
             return read_csv(path, own.mended(mend) if mend else own, joint_names, columns == "auto")
         except UnicodeDecodeError as error:
             raise ValueError("not a text file; expected CSV or MCAP") from error
@@ -83,7 +84,7 @@ def read_log(
             raise ValueError(f"not CSV ({error})") from error
 
 
-def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
+def chosen(columns: ColumnMap | str | None, path: Path, mend: Collection[str] = ()) -> ColumnMap:
     """The given map, the preset of the given name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
@@ -96,7 +97,8 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     preset = next((replace(PRESETS[name], **form) for name in presets_of(header)), None)
     if preset is not None and columns is None:
         return preset
-    found = recognised(header, table)
+    told = next((ANGLES[word] for word in mend if word in ANGLES), None)
+    found = recognised(header, table, told)
     found = None if found is None else replace(found, **form)
     if preset is not None:
         return preset if found is None else in_units_of(preset, found)

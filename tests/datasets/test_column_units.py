@@ -5,7 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from tauguard.datasets.columns import ColumnMap
+from tauguard.datasets.arm_logs import log_files, of_one_unit
+from tauguard.datasets.columns import AS_IS, ColumnMap, Reading
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.recognition import described, recognised
 from tests.datasets.test_recognition import motion, written
@@ -206,3 +207,47 @@ def test_units_that_no_map_can_hold_are_refused_by_name(tmp_path):
     path = written(tmp_path / "mixed.csv", names, t, q, i)
     with pytest.raises(ValueError, match=r"current 2 .* a current_scale for each joint"):
         read_log(path, "auto")
+
+
+def turned(path, speed, scale=1.0, turns=16.0, motion_of_others=1.0):
+    """A log in which joint 3 alone goes beyond two turns, if ``turns`` is above 12.6."""
+    t = 0.01 * np.arange(400)
+    q = np.column_stack([motion_of_others * np.sin(speed * t + k) for k in range(3)])
+    q[:, 2] = turns * t / 4
+    qd = np.gradient(q, t, axis=0)
+    names = ["t", *(f"{name}{k}" for name in ("q", "qd", "tau") for k in range(3))]
+    return written(path, names, t, scale * q, scale * qd, q)
+
+
+def test_one_joint_beyond_two_turns_does_not_make_degrees(tmp_path):
+    """The last joint of some arms turns on; speeds decide, else the user is asked."""
+    path = turned(tmp_path / "fast.csv", speed=3.0)
+    assert read_log(path, "auto").trace.q[-1, 2] == pytest.approx(16.0, rel=0.01)
+    path = turned(tmp_path / "deg.csv", speed=3.0, motion_of_others=10.0, turns=40.0)
+    assert "[deg]" in read_log(path, "auto").notes[0]
+    path = turned(tmp_path / "slow.csv", speed=0.5)
+    with pytest.raises(ValueError, match=r"q2 is beyond two turns .*--mend deg or --mend rad"):
+        read_log(path, "auto")
+    assert "[rad]" in read_log(path, "auto", mend=("rad",)).notes[0]
+    assert "[deg]" in read_log(path, "auto", mend=("deg",)).notes[0]
+
+
+def test_logs_of_one_command_have_one_unit_of_angles(tmp_path):
+    turned(tmp_path / "slow.csv", speed=0.5)
+    turned(tmp_path / "usual.csv", speed=3.0, turns=3.0)
+    files = log_files([tmp_path])
+    assert of_one_unit(files, "auto", AS_IS).mend == ("rad",)
+    assert of_one_unit(files, "ur3", AS_IS) == AS_IS
+    turned(tmp_path / "degrees.csv", speed=1.0, scale=57.3, turns=3.0)
+    files = log_files([tmp_path])
+    assert of_one_unit(files, "auto", AS_IS).mend == ("deg",)
+    assert of_one_unit(files, "auto", Reading(mend=("rad",))).mend == ("rad",)
+
+
+@pytest.mark.data
+def test_all_logs_of_a_ur3_are_in_radians(data_dir):
+    files = sorted((data_dir / "ur3" / "free").glob("*.csv"))
+    if not files:
+        pytest.skip("no ur3 folder in the real data")
+    for path in files:
+        assert "[rad]" in next(n for n in read_log(path, "auto").notes if "read as" in n), path

@@ -288,7 +288,7 @@ def test_what_is_wrong_with_a_log_is_named_with_the_word_that_mends_it(tmp_path)
     path = written(tmp_path / "milli.csv", names, t, q, qd, 1000 * i)
     assert "say --mend mA" in "".join(read_log(path, columns).notes)
     np.testing.assert_allclose(read_log(path, columns, mend=("mA",)).trace.current, i)
-    with pytest.raises(ValueError, match="--mend grad: expected some of deg, mA"):
+    with pytest.raises(ValueError, match="--mend grad: expected some of deg, rad, mA"):
         read_log(path, columns, mend=("grad",))
 
 
