@@ -74,7 +74,8 @@ def _timing(trace: Trace, where: Where) -> list[str]:
         row = int(gaps[0])
         raise ValueError(
             f"{where(row + 1)}: no sample in the {steps[row]:.3g} s before it, but samples come "
-            f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): split the log there"
+            f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there; the "
+            f"rows up to {where(row)} and those from {where(row + 1)} on are logs of their own"
         )
     late = np.flatnonzero(steps > 2 * usual)
     if len(steps) < 20 or not len(late):

@@ -188,7 +188,7 @@ def read_csv(
     if columns.torque:
         meta["effort"] = "torque"
     if "qd" not in signals:
-        signals["qd"] = differentiated(t[keep], signals["q"])
+        signals["qd"], meta["velocities"] = differentiated(t[keep], signals["q"]), "differentiated"
         notes.append(DIFFERENTIATED)
     names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
@@ -355,5 +355,5 @@ def _lacking(
         if "nan" not in columns.repair:
             raise ValueError(
                 f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
-                "--mend nan"
+                "--mend nan (where they last longer than 0.05 s, cut the log in two instead)"
             )

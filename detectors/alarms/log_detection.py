@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauguard.arrays import Array, Bools
+from tauguard.detectors import _observer
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.monitor import Span, detect_with_faults
 from tauguard.detectors.calibration.checks import check_torques, drive_torque
@@ -33,6 +34,8 @@ class LogDetection:
     notes: tuple[str, ...]
     faults: tuple[Span, ...] = ()  #: faults of the samples; no alarm starts during a fault
     fault_seconds: float = 0.0  #: duration of the faults [s]; collisions may be missed in them
+    unwatched_seconds: float = 0.0
+    """Time outside of faults in which the detector does not judge all joints [s]."""
 
 
 def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
@@ -63,13 +66,12 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
             "alarms fill much of this log; if the arm was not touched that often, give the load "
             "that it carried (--payload), and check that model, robot file and log are of one arm"
         )
+    unwatched = 0.0
     if isinstance(alarm.detector, FittedFreeMotion):
-        seconds, names = alarm.detector.unwatched(trace)
-        if names:
-            notes.append(
-                f"{', '.join(names)}: moves here, but in none of the training logs: no collision "
-                f"is detected in {seconds:.1f} s of this log"
-            )
+        unwatched, said = _unwatched(
+            alarm.detector, trace, rows & ~_inside(monitored.faults, trace)
+        )
+        notes += said
         notes += _prior_knowledge(alarm.detector, trace)
         seconds, levels = alarm.detector.beyond(trace)
         if levels:
@@ -86,7 +88,52 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
         tuple(notes),
         monitored.faults,
         monitored.fault_seconds,
+        unwatched,
     )
+
+
+def _unwatched(detector: FittedFreeMotion, trace: Trace, rows: Bools) -> tuple[float, list[str]]:
+    """Time of ``rows`` in which some joint is not watched [s], and notes that say why.
+
+    Nothing is watched while a joint moves that moves in no training log, and in the settling time
+    after it. Moving joints are not watched while such a joint stands elsewhere than in the logs.
+    """
+    hidden, bound = ~detector.bound.shown, detector.bound
+    if not hidden.any():
+        return 0.0, []
+    away = hidden & ((trace.q < bound.low) | (trace.q > bound.high))
+    slow = np.where(away, _observer.REGIME_SLOW, _observer.REGIME_FULL_SPEED)
+    moves = hidden & (np.abs(trace.qd) >= slow)
+    first = np.flatnonzero(moves.any(axis=1))
+    after = np.searchsorted(trace.t, trace.t[first] + _observer.REGIME_SETTLES)
+    count = np.zeros(len(trace.t) + 1, dtype=np.int64)
+    np.add.at(count, first, 1)
+    np.add.at(count, after, -1)
+    blind = np.cumsum(count)[:-1] > 0
+    partly = away.any(axis=1) & ~detector.judge(trace).rest.all(axis=1) & ~blind
+    steps, total, notes = np.diff(trace.t, append=trace.t[-1]), 0.0, []
+    for on, own, text in (
+        (blind, moves, "moves here, but in none of the training logs: no collision is detected in"),
+        (
+            partly,
+            away,
+            "stands elsewhere than in the training logs, which do not show its motion: moving "
+            "joints are not watched for",
+        ),
+    ):
+        if seconds := float(steps[on & rows].sum()):
+            names = np.array(trace.joint_names)[(own & on[:, None]).any(axis=0)].tolist()
+            notes.append(f"{', '.join(names)}: {text} {seconds:.1f} s of this log")
+        total += seconds
+    return total, notes
+
+
+def _inside(faults: tuple[Span, ...], trace: Trace) -> Bools:
+    """Rows within faults, shape (T,)."""
+    inside = np.zeros(len(trace.t), dtype=np.bool_)
+    for fault in faults:
+        inside |= (trace.t >= fault.start) & (trace.t <= fault.end)
+    return inside
 
 
 def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:

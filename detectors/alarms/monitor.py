@@ -19,6 +19,7 @@ from tauguard.detectors.faults.inputs import (
     TorqueCheck,
     UsualInput,
     input_fault,
+    lacks_velocities,
     torque_fault,
 )
 from tauguard.detectors.samples import check_interval
@@ -226,11 +227,14 @@ def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
     """
     if alarm.inputs is None:
         return Monitored(alarm.detect(trace), (), 0.0)
+    usual = alarm.inputs
+    if lacks_velocities(trace):
+        usual = usual.without_velocities()
+        alarm = replace(alarm, inputs=usual)
     if np.isfinite(trace.dt):
         check_interval("the log", trace, alarm.detector.dt)
     if not np.isfinite(trace.dt) or _broken(alarm, trace):
         return _by_sample(alarm, trace)
-    usual = alarm.inputs
     detection = alarm.detect(trace)
     torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
     spans, seconds, dt = Spans(), 0.0, trace.dt  # trace.dt is a median: computed once

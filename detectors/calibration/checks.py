@@ -49,7 +49,9 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
         if against := [joint for joint, value in pairs if value < AGAINST]:
             raise ValueError(
                 f"{name}: friction would push {', '.join(against)}: the sign of the current or "
-                "torque, or of the velocity, is opposite to the robot file's"
+                "torque, or of the velocity, is opposite to the robot file's; for currents, a "
+                "negative number in --gains or in current_scale of the column map turns it, for "
+                "torques one in torque_scale"
             )
 
 

@@ -8,7 +8,7 @@ the torques that the arm's model needs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ TEXTS = {
     14: "torque: {joint} is driven against its motion ({value:.2f} of the torque that the model "
     "needs): another sign, exchanged joints, another arm, or a push of half a second or more",
     15: "torque: {joint} is driven with {value:.2f} of the torque that the model needs: "
-    "another load, gain or arm, or a saturated or biased current",
+    "another load, gain or arm, a saturated or biased current, or a push of a second or more",
 }
 
 
@@ -129,6 +129,8 @@ MARGIN = 3.0
 #: Least allowed difference [rad]: an encoder's resolution, which training at rest may not show.
 RESOLUTION = 2e-4
 
+#: Allowed differences [rad] where velocities are derivatives of the positions: no limit.
+UNLIMITED = 1e6
 #: Largest number of successive missing samples, which are interpolated; more of them are a gap.
 LATE = 2
 #: Least value of :attr:`UsualInput.odd`.
@@ -184,7 +186,7 @@ class UsualInput:
             raise ValueError("no traces, or one of fewer than 2 samples: nothing to learn from")
         dt = float(np.median([trace.dt for trace in traces]))
         window = max(2, round(SPAN / dt))
-        return cls(
+        usual = cls(
             traces[0].joint_names,
             dt,
             max((LATE + 1.3) * dt, 1.25 * max(float(np.diff(trace.t).max()) for trace in traces)),
@@ -202,6 +204,17 @@ class UsualInput:
             np.max([_stuck(trace) for trace in traces], axis=0),
             np.ones((3, len(traces[0].joint_names))) if arm is None else torque_ratios(traces, arm),
         )
+        return usual.without_velocities() if any(map(lacks_velocities, traces)) else usual
+
+    def without_velocities(self) -> UsualInput:
+        """Limits for velocities that are derivatives of the positions: the two always agree."""
+        unlimited = np.full(len(self.joint_names), UNLIMITED)
+        return replace(self, step=unlimited, drift=unlimited)
+
+
+def lacks_velocities(trace: Trace) -> bool:
+    """Whether a trace's velocities are derivatives of its positions."""
+    return trace.meta.get("velocities") == "differentiated"
 
 
 def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:

@@ -127,23 +127,6 @@ class FittedFreeMotion(Frozen):
         scores = _observer.free_scores(native(self.arm, self.bound, self.load))
         return NativeStream(scores, self.dt)
 
-    def unwatched(self, trace: Trace) -> tuple[float, tuple[str, ...]]:
-        """Time in which joints move that move in no training log [s], and their names.
-
-        It includes the settling time after the motion. No collision is detected in this time.
-        """
-        hidden = ~self.bound.shown
-        moved = (np.abs(trace.qd) > _observer.REGIME_FULL_SPEED) | (trace.q < self.bound.low)
-        moved = (moved | (trace.q > self.bound.high)) & hidden
-        names = tuple(np.array(trace.joint_names)[moved.any(axis=0)].tolist())
-        rows = np.flatnonzero(moved.any(axis=1))
-        after = np.searchsorted(trace.t, trace.t[rows] + _observer.REGIME_SETTLES)
-        blind = np.zeros(len(trace.t) + 1, dtype=np.int64)
-        np.add.at(blind, rows, 1)
-        np.add.at(blind, after, -1)
-        steps = np.diff(trace.t, append=trace.t[-1])
-        return float(steps[np.cumsum(blind)[:-1] > 0].sum()), names
-
     def beyond(self, trace: Trace) -> tuple[float, dict[str, float]]:
         """Time in which joints are faster, or accelerate more, than in the training logs [s].
 

@@ -465,3 +465,24 @@ def test_a_standing_log_that_is_touched_all_along_is_refused(folder, tmp_path, c
     line = refused_until_accepted(capsys, train, model)
     assert "touched.csv: 28 alarms at 2." in line
     assert "something touched the arm" in line
+
+
+def test_time_is_unwatched_while_a_joint_of_unknown_motion_stands_elsewhere(
+    folder, tmp_path, capsys
+):
+    logs = [written(tmp_path, f"held{k}.csv", held_joint(k)) for k in range(3)]
+    model, json_file = str(tmp_path / "m.skops"), tmp_path / "found.json"
+    main(["train", "--free", *logs, *flags(folder), "--gains", *GAINS, "--model", model])
+    trace = held_joint(7)
+    moved = dataclasses.replace(trace, q=trace.q + np.array([0.0, 0.0, 0.6]))
+    detect = [*flags(folder), "--model", model, "--payload", "0", "--json", str(json_file)]
+    watched = []
+    for name, one in (("as_trained.csv", trace), ("elsewhere.csv", moved)):
+        capsys.readouterr()
+        main(["detect", written(tmp_path, name, one), *detect])
+        said = capsys.readouterr().out
+        assert "moves here" not in said
+        assert ("c: stands elsewhere than in the training logs" in said) == (one is moved)
+        watched.append(json.loads(json_file.read_text())["watched_seconds"])
+    assert watched[0] > 24
+    assert 1 < watched[1] < 4  # the dwell of 2 s, in which all joints stand

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
+#: If less of a log was watched, the output says so [s].
+WATCHED = 1.0
 #: Without a model, the detector is trained on this length of the log's beginning [s].
 QUIET = 20.0
 
@@ -279,7 +281,8 @@ def summary(
     from tauguard.detectors.alarms.log_detection import loudest_joint
 
     whole = float(trace.t[-1] - found.begin)
-    watched = max(whole - found.fault_seconds, trace.dt)
+    watched = max(whole - found.fault_seconds - found.unwatched_seconds, 0.0)
+    hours = max(watched, trace.dt) / 3600
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
         joint = loudest_joint(found, alarm.start, alarm.end)
@@ -299,9 +302,10 @@ def summary(
         "score_threshold": found.detection.threshold,
         "faults": [{"start": f.start, "end": f.end, "reason": f.reason} for f in found.faults],
         "fault_seconds": found.fault_seconds,
+        "unwatched_seconds": found.unwatched_seconds,
         "alarms": len(events),
-        "alarms_per_hour": 3600 * len(events) / watched,
-        "alarms_per_hour_high": poisson_rate(len(events), watched / 3600)["high"],
+        "alarms_per_hour": len(events) / hours,
+        "alarms_per_hour_high": poisson_rate(len(events), hours)["high"],
         "events": events,
     }
 
@@ -329,8 +333,12 @@ def report(result: dict[str, Any]) -> None:
     if labels := result.get("labels"):
         print(f"{text}\n{labels_text(labels, since)}")
         return
+    if seconds < WATCHED:
+        print(f"{text}: almost nothing of this log was watched")
+        return
     most = rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
-    print(f"{text}; if nothing touched the arm, each is a false alarm{most}")
+    false = "; if nothing touched the arm, each is a false alarm" if count else ""
+    print(f"{text}{false}{most}")
 
 
 def leave(

@@ -22,7 +22,9 @@ def test_a_current_of_the_other_sign_is_named(joint):
     arm, trace = ArmModel(nominal(), GAIN), record(3)
     check_signs(arm, {"log.csv": Recording(trace)})
     sign = np.where(np.arange(3) == joint, -1.0, 1.0)
-    with pytest.raises(ValueError, match=rf"^log.csv: friction would push {'abc'[joint]}:"):
+    with pytest.raises(
+        ValueError, match=rf"^log.csv: friction would push {'abc'[joint]}:.*--gains or"
+    ):
         check_signs(arm, {"log.csv": Recording(replace(trace, current=trace.current * sign))})
     # A gain of that sign makes up for it.
     told = replace(arm, drive_gain=GAIN * sign)

@@ -190,3 +190,15 @@ def test_a_hard_contact_on_a_joint_that_needs_little_is_no_fault():
         current[:500, 0] += np.sin(np.arange(500) / 500 * np.pi) * 6.0
 
     assert not any(said(UsualInput.of([quiet]), quiet, pushed))
+
+
+def test_positions_are_not_compared_with_their_own_derivative():
+    """A jerk moves the position away from the last velocities: no fault if these are derived."""
+
+    def jerk(t, q, qd, current):
+        q[:3, 1] += np.array([1, 2, 1]) * 2e-3
+
+    free = motion(0)
+    assert any("off its velocity" in (x or "") for x in said(UsualInput.of([free]), free, jerk))
+    derived = replace(free, meta={"velocities": "differentiated"})
+    assert not any(said(UsualInput.of([free, derived]), derived, jerk))
