@@ -14,7 +14,8 @@ from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
 from tauguard.contacts.run import TOUCHING, Run
 
 Covers = frozenset[tuple[str, str]]
-#: Depth [m], inner radius [m] and normal of contacts, by the ids of geoms, flexes and features.
+#: Depth [m] of each contact, half the thickness of its thinner geom [m] and its normal, by the ids
+#: of its geoms, flexes and features.
 _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 
 

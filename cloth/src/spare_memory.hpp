@@ -25,8 +25,8 @@ class SpareMemory {
     void* at;
     std::size_t bytes;
   };
-  // A block of at least `bytes`, not zeroed: the smallest kept block of this size, unless it is
-  // much larger.
+  // A block of at least `bytes`, not zeroed: the smallest kept block that is large enough, or
+  // a new one if each of these is more than 4 times as large.
   Block take(std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

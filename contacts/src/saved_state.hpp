@@ -1,5 +1,5 @@
-// Saves a guard's memory of earlier steps as bytes, so that a copied guard continues with equal
-// bits.
+// Saves a guard's memory of earlier steps as bytes, so that a copy of the guard continues
+// with bit-identical results.
 #pragma once
 
 #include <cstring>

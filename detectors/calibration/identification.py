@@ -2,8 +2,8 @@
 
 The residual of the nominal observer is linear in the errors of the inertial numbers and of the
 reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
-and in the payloads. All pass through the detector's own causal filter, so no acceleration is
-needed. The solution is restricted to bodies that can exist
+and in the payloads. All columns of this regression pass through the detector's own causal filter,
+so no acceleration is needed. The solution is restricted to bodies that can exist
 (:mod:`~tauguard.detectors.dynamics.physical_consistency`).
 
 Currents determine torques only up to a factor: if all gains, masses and friction are scaled by the

@@ -21,9 +21,9 @@ struct TorqueBounds {
   double fast = 0.5;            // time constant of the fast average [s]
   double slow = 4.0;            // time constant of the slow average [s]
   double heard = 8.0;           // least RMS of `needed` to judge a ratio, in units of the noise
-  std::vector<double> opposed;  // least fast ratio, n
-  std::vector<double> least;    // least slow ratio, n
-  std::vector<double> most;     // largest slow ratio, n
+  std::vector<double> opposed;  // least allowed fast ratio of each joint
+  std::vector<double> least;    // least allowed slow ratio of each joint
+  std::vector<double> most;     // largest allowed slow ratio of each joint
 };
 
 class TorqueCheck {
@@ -54,7 +54,7 @@ class TorqueCheck {
     return all;
   }
 
-  // Processes a sample: residual of the plain observer [N m], currents [A], time step [s].
+  // Processes a sample: r, the residual without Kalman filter [N m], currents [A], time step [s].
   Verdict step(const double* residual, const double* current, double dt) {
     const bool first = time_ == 0;
     const double low = first ? 1.0 : 1 - std::exp(-set_.rate * dt);

@@ -37,7 +37,7 @@ class TwoArms(CarefulReach):
         return layout.someone(middle, -beside, np.pi / 2)
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
-        """Whether the place is in the middle (first arm) or near the first target (second arm)."""
+        """Whether the place is midway between the arms (arm 0) or near arm 0's target (arm 1)."""
         layout = self.batch.compiled.layout
         if arm == 0:
             middle = layout.apart(APART) / 2

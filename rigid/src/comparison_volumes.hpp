@@ -1,6 +1,6 @@
 // For comparison only: bounding volumes that no query uses by default (ball, oriented box, 18-DOP).
-// All are in double precision in their tree's centred frame. Tests add a pad that covers rounding,
-// so volumes that overlap are never reported as apart.
+// All are in double precision, relative to their tree's centre. Tests add a pad for rounding, so
+// volumes that overlap are never reported as apart.
 #pragma once
 
 #include "mesh_traverse.hpp"

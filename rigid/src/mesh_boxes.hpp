@@ -7,7 +7,7 @@
 
 namespace tauguard::rigid {
 
-// The pose of one tree's centred frame in another's, in float, and a pad that covers rounding.
+// The pose of one tree in another (both relative to their centres), in float; a pad for rounding.
 struct Relative {
   float r[3][3], abs_r[3][3], t[3], pad;
 };

@@ -6,7 +6,7 @@
 
 namespace tauguard::rigid {
 
-// One child's box in its tree's centred frame. The rows of `axis` are the directions of the box.
+// One child's box, relative to the centre of its tree. The rows of `axis` are its directions.
 struct FloatObb {
   float axis[3][3], centre[3], extent[3];
   float size() const { return extent[0] + extent[1] + extent[2]; }
@@ -33,7 +33,7 @@ struct ObbTree {
 
 // The axes of a box are principal axes of the second moments of the surface in it. The moments are
 // summed from the leaves up. A leaf has axes along its normal and longest edge instead. A box
-// contains all corners.
+// contains all corners of its triangles.
 ObbTree fit_obbs(const Tree& tree);
 
 // Sets bit s if child s of `node` may meet `box`, which is in the node's frame.

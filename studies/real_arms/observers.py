@@ -86,6 +86,7 @@ def kalman(arm: ArmModel, trace: Trace, tau: Array) -> Array:
     return out
 
 
+#: The public observers: the external torque [N m], shape (T, n), from arm, log and drive torque.
 PEERS: dict[str, Callable[[ArmModel, Trace, Array], Array]] = {
     "momentum observer": momentum,
     "disturbance observer": disturbance,
@@ -103,10 +104,11 @@ def alarms(value: Array, limit: Array, trace: Trace) -> Bools:
 def with_thresholds(
     arm: ArmModel, training: Sequence[Trace], baseline: bool = False
 ) -> dict[str, Callable[[ArmModel, Trace], Bools]]:
-    """Each peer with thresholds from the training logs; the arm that it judges may carry a load.
+    """The alarms of each of :data:`PEERS`, with thresholds from the training logs.
 
-    ``baseline`` subtracts the mean of each value from :data:`SETTLE` to twice :data:`SETTLE`, for a
-    standing arm whose weight is not calibrated.
+    The returned functions take the model of a log's arm, which may include a load, and the log.
+    With ``baseline``, the mean of each joint's values between the times :data:`SETTLE` and twice
+    :data:`SETTLE` is subtracted, for a standing arm whose weight is not calibrated.
     """
     traces = [trace for trace in training if trace.t[-1] - trace.t[0] > 2 * SETTLE]
     torques = [drive_torque(arm, trace) for trace in traces]

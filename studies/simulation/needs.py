@@ -85,7 +85,7 @@ def costs(episode: Episode, parts: Sequence[str], repeats: int) -> dict[str, dic
 
 
 def judged_without(job: tuple[Episodes, Episodes, str]) -> dict[str, Any]:
-    """The results of a detector from simulations without a part, judged in both simulations."""
+    """Train a detector without a part of the simulation; judge it with and without the part."""
     training, judging, part = job
     traces = recordings(training, part)
     alarm = train(SrqSvr(), traces, nominal_arm(traces), PER_HOUR)
