@@ -13,7 +13,7 @@ from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
-from tauguard.detectors.features.motion_regimes import unseen, unseen_text
+from tauguard.detectors.features.motion_regimes import SEEN, unseen, unseen_text
 from tauguard.traces import Trace
 from tauguard.traces.resample import averaged
 
@@ -273,5 +273,5 @@ def not_shown(traces: Sequence[Trace]) -> list[str]:
             "which it moves"
         )
     if lacking := unseen(traces):
-        notes.append(f"the logs do not show {unseen_text(lacking, len(names))}")
+        notes.append(f"the logs show less than {SEEN:g} s of {unseen_text(lacking, len(names))}")
     return notes

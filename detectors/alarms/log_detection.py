@@ -13,7 +13,7 @@ from tauguard.detectors.alarms.monitor import Span, detect_with_faults
 from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
-from tauguard.detectors.features.motion_regimes import SHORTLY, motion_regimes, unseen_text
+from tauguard.detectors.features.motion_regimes import SEEN, SHORTLY, motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Detection, Trace
 
@@ -38,8 +38,13 @@ class LogDetection:
     """Time outside of faults in which the detector does not judge all joints [s]."""
 
 
-def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
+def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False) -> LogDetection:
     """Find collisions in a log.
+
+    Args:
+        alarm: trained.
+        trace: of the detector's arm.
+        load_known: the alarm is that of the carried load; no note asks for it.
 
     Raises:
         ValueError: number of joints or sample rate differs from the training's, the log ends
@@ -62,9 +67,10 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
     doubts = check_torques(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange)
     notes = [] if strange else list(doubts)
     if strange:
+        load = "check the load (--payload)" if load_known else "give the load (--payload)"
         notes.append(
-            "alarms fill much of this log; if the arm was not touched that often, give the load "
-            "that it carried (--payload), and check that model, robot file and log are of one arm"
+            f"alarms fill much of this log; if the arm was not touched that often, {load}, and "
+            "check that model, robot file and log are of one arm"
         )
     unwatched = 0.0
     if isinstance(alarm.detector, FittedFreeMotion):
@@ -147,9 +153,10 @@ def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
     seconds = float(rows.sum() * trace.dt)
     if seconds < SHORTLY:
         return []
+    lacking = unseen_text(detector.unseen, len(names))
     return [
-        f"the training logs do not show {unseen_text(detector.unseen, len(names))}; this log does "
-        f"for {seconds:.1f} s, in which bounds learned on other arms apply"
+        f"the training logs show less than {SEEN:g} s of {lacking}; this log shows {seconds:.1f} s "
+        "of it, in which bounds learned on other arms apply"
     ]
 
 

@@ -68,7 +68,8 @@ class Diagnosis:
         if not self.link_identifiable:
             return f"{self.kind}, link not identifiable, {size}"
         likely = self.links[self.link - 1]
-        return f"{self.kind}, link {self.link} (probability {likely:.2f}), {size}"
+        moved = self.joints[self.link - 1]
+        return f"{self.kind}, link {self.link} (of joint {moved}, probability {likely:.2f}), {size}"
 
     @property
     def link_identifiable(self) -> bool:

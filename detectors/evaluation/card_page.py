@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tauguard.atomic_write import atomic_file
 from tauguard.detectors.evaluation.threshold_card import UPPER
 from tauguard.detectors.features.free_bound import ANYWHERE
-from tauguard.detectors.features.motion_regimes import unseen_text
+from tauguard.detectors.features.motion_regimes import SEEN, unseen_text
 
 if TYPE_CHECKING:
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
@@ -92,6 +92,9 @@ def _wrapped(line: str) -> list[str]:
 
 def _lines(card: ThresholdCard) -> list[str]:
     assumed = any(_torque(card, "standing", j)[0] == "(" for j in range(len(card.joints)))
+    bracketed = any(
+        _torque(card, name, j)[0] == "(" for name in COLUMNS for j in range(len(card.joints))
+    )
     lines = [
         "force found at the tool: in half (in 95 %) of all poses and directions"
         + ("; standing: if the torques in brackets hold" if assumed else ""),
@@ -118,8 +121,24 @@ def _lines(card: ThresholdCard) -> list[str]:
     if card.unseen:
         parts = unseen_text(tuple(card.unseen.items()), len(card.joints))
         lines.append(
-            f"not in the logs, so left out, or bounded by what other arms do (in brackets): {parts}"
+            f"less than {SEEN:g} s in the logs, so left out"
+            + (", or bounded by what other arms do (in brackets)" if bracketed else "")
+            + f": {parts}"
         )
+
+    lines += _settings(card)
+    contacts, collisions = card.replay
+    lines.append(
+        "the columns moving and starting as constant thresholds, as a robot has them, would have "
+        f"raised {contacts} contact{'' if contacts == 1 else 's'} in these logs, {collisions} of "
+        f"them also if {UPPER:g} times as high"
+    )
+    lines.append("These are estimates from logs; they replace no safety function.")
+    return lines
+
+
+def _settings(card: ThresholdCard) -> list[str]:
+    """Lines with the settings of a robot's controller that are like the card."""
 
     def numbers(values: list[float]) -> str:
         return "{" + ", ".join(f"{value:.1f}" for value in values) + "}"
@@ -131,23 +150,16 @@ def _lines(card: ThresholdCard) -> list[str]:
         for level in ("lower", "upper")
     ]
     if franka := card.franka:
-        lines.append("as Franka's setCollisionBehavior takes them (7 joints; x, y, z, R, P, Y):")
-        lines += [f"  {name} {numbers(franka[name])}" for name in order]
-    elif not card.ur:
-        lines.append("no thresholds for a robot's settings: some joints move in none of the logs")
-    else:
-        lines.append(
-            f"as UR's safety settings: tool force limit {card.ur['tool_force_limit_n']:.0f} N "
-            f"(Franka's setCollisionBehavior is for 7 joints, this arm has {len(card.joints)})"
-        )
-    contacts, collisions = card.replay
-    lines.append(
-        "the columns moving and starting as constant thresholds, as a robot has them, would have "
-        f"raised {contacts} contacts and, {UPPER:g} times as high, {collisions} collisions in "
-        "these logs; all set to 100 N m would find nothing below 100 N m"
-    )
-    lines.append("These are estimates from logs; they replace no safety function.")
-    return lines
+        return [
+            "for a Franka arm, as setCollisionBehavior takes them (7 joints; x, y, z, R, P, Y):",
+            *(f"  {name} {numbers(franka[name])}" for name in order),
+        ]
+    if card.ur:
+        limit = card.ur["tool_force_limit_n"]
+        return [f"for a UR arm, in its safety settings: tool force limit {limit:.0f} N"]
+    if all(value == value for value in card.moving):
+        return []
+    return ["no thresholds for a robot's settings: some joints move in none of the logs"]
 
 
 def _newton(force: float) -> str:

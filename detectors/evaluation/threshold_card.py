@@ -36,8 +36,8 @@ TRACKED = 1.25
 LITTLE = 1.5
 #: Ratio of the upper threshold, at which a robot stops, to the lower one, which reports a contact.
 UPPER = 1.5
-#: Number of joints of the arms that libfranka supports.
-FRANKA_JOINTS = 7
+#: Numbers of joints of the arms that libfranka supports, and of UR's arms.
+FRANKA_JOINTS, UR_JOINTS = 7, 6
 #: Numbers of poses and directions of the force at the tool.
 POSES, DIRECTIONS = 24, 100
 
@@ -67,16 +67,17 @@ class ThresholdCard:
     contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""
     fast: Array  #: speeds in the logs, up to which ``moving`` holds [rad/s], shape (n,)
     twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
+    slides: bool = False  #: some joint is prismatic, as in no arm of Franka or UR
 
     @property
     def franka(self) -> dict[str, list[float]]:
         """Arguments of libfranka's ``setCollisionBehavior``.
 
         They are torques of 7 joints [N m], and forces and moments of three axes [N, N m]. Empty for
-        an arm with another number of joints, or if a number is unknown.
+        an arm with another number of joints or a prismatic one, or if a number is unknown.
         """
         numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
-        if len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
+        if self.slides or len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
             return {}
         tool = np.repeat([self.tool["moving"][0], self.moment], 3)
         lower = {
@@ -91,10 +92,14 @@ class ThresholdCard:
 
     @property
     def ur(self) -> dict[str, float]:
-        """The tool force limit of UR's safety settings [N]; empty if unknown."""
+        """The tool force limit of UR's safety settings [N]; empty for another arm, or if unknown.
+
+        UR's arms have six joints, none of them prismatic.
+        """
         limit = UPPER * self.tool["moving"][1]
         known = np.isfinite([limit, *self.moving]).all()
-        return {"tool_force_limit_n": limit} if known else {}
+        other = self.slides or len(self.joints) != UR_JOINTS
+        return {"tool_force_limit_n": limit} if known and not other else {}
 
 
 def threshold_card(
@@ -143,6 +148,7 @@ def threshold_card(
         replayed(detector, traces, usual, starting),
         np.where(bound.shown, bound.fast, np.nan),
         usual + TRACKED * faster,
+        bool(np.any(robot.prismatic)),
     )
 
 
@@ -181,7 +187,7 @@ def found_in_motion(judged: Sequence[Judged]) -> Array:
 def replayed(
     detector: FittedFreeMotion, traces: Sequence[Trace], moving: Array, starting: Array
 ) -> tuple[int, int]:
-    """Numbers of events in logs with constant thresholds, and with :data:`UPPER` times these.
+    """Numbers of events in logs above constant thresholds, and of those above UPPER times these.
 
     The thresholds apply to an observer's external torque, as those in the settings of a robot do,
     with higher thresholds while a joint accelerates.
@@ -199,8 +205,10 @@ def replayed(
         limit = np.where(motion_regimes(trace)["starting"], starting, moving)
         ratio = (np.abs(residual) / np.where(np.isfinite(limit), limit, np.inf)).max(axis=1)
         ratio[trace.t - trace.t[0] < detector.settle] = 0.0
-        lower += len(find_alarms(trace.t, ratio > 1, SERIES))
-        upper += len(find_alarms(trace.t, ratio > UPPER, SERIES))
+        contacts = find_alarms(trace.t, ratio > 1, SERIES)
+        harder = trace.t[ratio > UPPER]
+        lower += len(contacts)
+        upper += sum(((harder >= c.start) & (harder <= c.end)).any() for c in contacts)
     return lower, upper
 
 

@@ -73,8 +73,13 @@ def test_the_push_is_found_and_nothing_else(log, capsys):
     assert sorted(p.name for p in out.iterdir()) == ["detect.mcap", "detect.rrd", "events.json"]
     assert json.loads((out / "events.json").read_text()) == figures
     text = capsys.readouterr().out
-    assert "1 alarm in 8.0 s watched" in text
+    assert "1 alarm in 8.0 s watched; if nothing touched the arm, each is a false alarm" in text
     assert "free-motion: score above 1" in text
+    assert "kinds of contact" not in text  # an unknown load may change: payload
+    run(log, "--gains", "8", "5", "--payload", "0", "--json", str(log / "figures.json"))
+    (event,) = json.loads((log / "figures.json").read_text())["events"]
+    said = capsys.readouterr().out
+    assert f"kinds of contact, 0.3 s or more after an alarm begins: {event['kind']}: it " in said
 
 
 def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 #: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
+#: Meaning of each kind of contact.
+KINDS = {
+    "transient": "the contact is over",
+    "clamp": "it lasts, and the force was against the motion or rose fast",
+    "push": "it lasts, and the force was along the motion or rose slowly",
+}
 #: If less of a log was watched, the output says so [s].
 WATCHED = 1.0
 #: Without a model, the detector is trained on this length of the log's beginning [s].
@@ -101,7 +107,7 @@ def command(
         seconds = QUIET if quiet is None else quiet
         refuse_touched(log, read, seconds)
         trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
-    found = detect_in_log(alarm, trace)
+    found = detect_in_log(alarm, trace, payload is not None)
     causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
@@ -312,6 +318,7 @@ def summary(
 
 def report(result: dict[str, Any]) -> None:
     """Print the results as text."""
+    from tauguard.detectors.diagnosis.post_alarm import AFTER
     from tauguard.detectors.evaluation.card_page import printed_from, rate_text
     from tauguard.detectors.evaluation.labelled_log import labels_text
 
@@ -323,6 +330,9 @@ def report(result: dict[str, Any]) -> None:
         start, end = event["start"] - since, event["end"] - since
         line = f"alarm {start:.3f} s to {end:.3f} s, most on {event['joint']}"
         print(f"{line}: {event['summary']}" if event.get("summary") else line)
+    said = {event.get("kind") for event in result["events"]}
+    if meanings := [f"{kind}: {KINDS[kind]}" for kind in KINDS if kind in said]:
+        print(f"kinds of contact, {AFTER:g} s or more after an alarm begins: {'; '.join(meanings)}")
     for fault in result["faults"]:
         start, end = fault["start"] - since, fault["end"] - since
         print(f"fault {start:.3f} s to {end:.3f} s: {fault['reason']}")

@@ -137,7 +137,10 @@ def test_a_link_that_the_leading_joint_lies_beyond_is_not_named(trace):
         torque = replace(first.severity.torque, peak=9.0 * np.eye(6)[joint])
         one = replace(sure, severity=replace(first.severity, torque=torque))
         assert one.link_identifiable == (joint < first.link)
-        assert (f"link {first.link}" in one.summary) == one.link_identifiable
+        named = (
+            f"link {first.link} (of joint {trace.joint_names[first.link - 1]}, probability 1.00)"
+        )
+        assert (named in one.summary) == one.link_identifiable
 
 
 def test_what_was_known_before_the_alarm_is_kept(trace):

@@ -368,8 +368,15 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert assumed == any(joint in card.unseen["standing for 2 s"] for joint in card.joints)
     still = text(replace(card, unseen={}))
     assert "in brackets" not in still
-    assert card.franka == {}  # libfranka speaks to arms of seven joints
-    seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
+    assert card.franka == {} == card.ur  # libfranka speaks to arms of seven joints, UR builds six
+    arms = {n: replace(card, joints=tuple("abcdefg"[:n]), moving=np.ones(n)) for n in (6, 7)}
+    arms[7] = replace(arms[7], starting=np.ones(7))
+    assert arms[6].ur["tool_force_limit_n"] > 0
+    assert not any(replace(arm, slides=True).franka for arm in arms.values())
+    assert not any(replace(arm, slides=True).ur for arm in arms.values())
+    once = text(replace(card, replay=(1, 0)))
+    assert "raised 1 contact in these logs" in " ".join(once.split())
+    seven = arms[7].franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
     assert {len(v) for k, v in seven.items() if "force" in k} == {6}
     assert card.false_alarms_per_hour["high"] > 0
