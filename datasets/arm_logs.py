@@ -51,7 +51,11 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
 
 
 def read_one(
-    log: Path, columns: str | None, torque: bool = False, reading: Reading | None = None
+    log: Path,
+    columns: str | None,
+    torque: bool = False,
+    reading: Reading | None = None,
+    joints: Sequence[str] = (),
 ) -> Log:
     """Read one log, with joints in the file's order; each note begins with the file's name.
 
@@ -60,12 +64,13 @@ def read_one(
         columns: preset or JSON file of a column map.
         torque: whether the log's currents or efforts are joint torques [N m].
         reading: repairs and sample rate (default: the log unchanged).
+        joints: the robot's joints, after which columns may be named.
 
     Raises:
         ValueError: as :func:`~tauguard.datasets.logs.read_log`.
     """
     reading = reading or AS_IS
-    read = read_log(log, column_map(columns), mend=reading.mend)
+    read = read_log(log, column_map(columns), None, reading.mend, joints)
     if reading.resample != 0:
         read = reduced(read, reading.resample)
     trace, notes = read.trace, read.notes
@@ -115,8 +120,9 @@ def read_logs(
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
     files = log_files(logs)
-    reading = of_one_unit(files, columns, reading or AS_IS)
-    read = {path.name: read_one(path, columns, torque, reading) for path in files}
+    joints = robot_numbers(robot)[0].joint_names
+    reading = of_one_unit(files, columns, reading or AS_IS, joints)
+    read = {path.name: read_one(path, columns, torque, reading, joints) for path in files}
     for name, log in read.items():
         _refuse_touched(name, log)
     notes = [note for log in read.values() for note in log.notes]
@@ -129,7 +135,9 @@ def read_logs(
     return ArmLogs(traces, numbers, (*notes, *held))
 
 
-def of_one_unit(files: Sequence[Path], columns: str | None, reading: Reading) -> Reading:
+def of_one_unit(
+    files: Sequence[Path], columns: str | None, reading: Reading, joints: Sequence[str] = ()
+) -> Reading:
     """The reading, with the unit of angles that all files have if "auto" finds different ones.
 
     A log of small motions has angles that may be degrees or radians: the other logs decide.
@@ -139,7 +147,7 @@ def of_one_unit(files: Sequence[Path], columns: str | None, reading: Reading) ->
     maps, undecided = [], False
     for file in [file for file in files if file.suffix == ".csv"]:
         try:
-            maps.append(chosen("auto", file))
+            maps.append(chosen("auto", file, (), joints))
         except ValueError:  # an error other than an undecided unit is raised again by `read_one`
             undecided = True
     units = {found.degrees for found in maps}

@@ -23,7 +23,7 @@ from tauguard.datasets.columns import (
     presets_of_width,
 )
 from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
-from tauguard.datasets.recognition import described, in_units_of, recognised
+from tauguard.datasets.recognition import described, in_units_of, lacking, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
@@ -46,6 +46,7 @@ def read_log(
     columns: ColumnMap | str | None = None,
     joint_names: Sequence[str] | None = None,
     mend: Collection[str] = (),
+    robot_joints: Sequence[str] = (),
 ) -> Log:
     """Read a recording of a real arm.
 
@@ -58,6 +59,7 @@ def read_log(
         joint_names: names of the joints in the order of the columns (default: the map's names, the
             messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
         mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
+        robot_joints: names of the robot's joints; "auto" finds columns that are named after them.
 
     Returns:
         The trace, without truth and with the log's own times, and notes on repairs. Only faults
@@ -76,15 +78,22 @@ def read_log(
                 from tauguard.datasets.logs_mcap import read_joint_states
 
                 return read_joint_states(path, joint_names)
-            own = chosen(columns, path, mend)
-            return read_csv(path, own.mended(mend) if mend else own, joint_names, columns == "auto")
+            own = chosen(columns, path, mend, robot_joints).mended(mend)
+            told = columns == "auto" and set(own.joint_names) <= set(robot_joints)
+            names = own.joint_names or joint_names if told else joint_names
+            return read_csv(path, own, names, columns == "auto")
         except UnicodeDecodeError as error:
             raise ValueError("not a text file; expected CSV or MCAP") from error
         except csv.Error as error:
             raise ValueError(f"not CSV ({error})") from error
 
 
-def chosen(columns: ColumnMap | str | None, path: Path, mend: Collection[str] = ()) -> ColumnMap:
+def chosen(
+    columns: ColumnMap | str | None,
+    path: Path,
+    mend: Collection[str] = (),
+    joints: Sequence[str] = (),
+) -> ColumnMap:
     """The given map, the preset of the given name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
@@ -94,11 +103,13 @@ def chosen(columns: ColumnMap | str | None, path: Path, mend: Collection[str] = 
             raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
         return replace(PRESETS[columns], **form)
     header, table = _beginning(path, **form)
+    if not header:
+        raise ValueError("the file is empty")
     preset = next((replace(PRESETS[name], **form) for name in presets_of(header)), None)
     if preset is not None and columns is None:
         return preset
     told = next((ANGLES[word] for word in mend if word in ANGLES), None)
-    found = recognised(header, table, told)
+    found = recognised(header, table, told, joints)
     found = None if found is None else replace(found, **form)
     if preset is not None:
         return preset if found is None else in_units_of(preset, found)
@@ -110,10 +121,7 @@ def chosen(columns: ColumnMap | str | None, path: Path, mend: Collection[str] = 
             f"no names of columns in the first line: {known}; a map may count columns from 0"
         )
     if found is None:
-        raise ValueError(
-            "no column map, and no positions, efforts and time (or velocities that tell the sample "
-            f"rate) found among the columns: {known}"
-        )
+        raise ValueError(f"the columns' names do not suffice: {lacking(header, joints)}; {known}")
     raise ValueError(
         f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
     )

@@ -7,12 +7,13 @@ Commanded values are ignored. Units: :mod:`tauguard.datasets.column_units`.
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.datasets.column_units import (
+    AMPERE_UNITS,
     SECONDS,
     TIME_UNITS,
     TIME_WRITTEN,
@@ -31,7 +32,7 @@ WORDS = {
     "q": ("q", "position", "positions", "pos", "angle", "joint_position", "joint_positions"),
     "qd": ("qd", "dq", "velocity", "velocities", "vel", "speed", "qdot", "joint_velocity"),
     "torque": ("tau_j", "tau", "torque", "torques", "effort", "efforts", "joint_torque"),
-    "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
+    "current": ("i", "current", "currents", "cur", "amps", "joint_current", "actual_current"),
 }
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
 #: Words in names of commands and estimates; ``_OTHER``: also of other signals that are not measured
@@ -90,8 +91,110 @@ def _field(prefix: str) -> str | None:
     return None
 
 
+def _parted(name: str) -> str:
+    """Words of a name, with digits as words of their own: J1 and j_1 are the same."""
+    return re.sub(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", "_", words_of(name))
+
+
+def of_joints(header: Sequence[str], joints: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Columns by signal and joint, where names hold a joint's name as whole words.
+
+    Args:
+        header: names of all columns.
+        joints: the robot's joints; of two that a name holds, the longer one counts.
+    """
+    words = {joint: _parted(joint) for joint in joints if _parted(joint)}
+    found: dict[str, dict[str, str]] = {}
+    for name in header:
+        plain = UNIT.sub("", name)
+        if re.search(f"(^|_)({_COMMANDS})(_|$)", words_of(name[len(plain) :])):
+            continue
+        text = f"_{_parted(plain)}_"
+        held = [joint for joint in words if f"_{words[joint]}_" in text]
+        if held:
+            joint = max(held, key=lambda one: len(words[one]))
+            rest = text.replace(f"_{words[joint]}_", "_", 1).strip("_")
+            found.setdefault(rest, {}).setdefault(joint, name)
+    out: dict[str, dict[str, str]] = {}
+    for rest, columns in found.items():
+        field = _field(rest)
+        if field is None and not _OTHER.search(rest):
+            ampere = all(UNIT.search(c) and unit_of(c, AMPERE_UNITS) for c in columns.values())
+            field = "current" if ampere else None
+        if field and len(columns) >= FEWEST:
+            out.setdefault(field, {j: columns[j] for j in joints if j in columns})
+    return out
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Columns of each signal, before units are known."""
+
+    times: list[str]
+    groups: dict[str, tuple[str, ...]]  #: columns by signal
+    joints: tuple[str, ...]  #: the joints of the positions, if names tell them
+    lacks: str  #: what is missing for a map; empty: nothing
+
+    @property
+    def effort(self) -> str | None:
+        """The signal of the torques."""
+        return next((f for f in ("torque", "current") if f in self.groups), None)
+
+
+#: Signals in plain words.
+_PLAIN = {"q": "positions", "qd": "velocities", "torque": "torques", "current": "currents"}
+
+
+def _found(header: Sequence[str], joints: Sequence[str]) -> _Found:
+    def plain(name: str) -> str:
+        return TIME_WRITTEN.sub("", UNIT.sub("", name).strip(" #").lower())
+
+    times = [name for name in header if plain(name) in TIMES]
+    named = of_joints(header, joints)
+    groups = {field: tuple(columns.values()) for field, columns in named.items()}
+    for prefix, columns in grouped(header).items():
+        field = _field(prefix)
+        if field and FEWEST <= len(columns) <= MOST and field not in groups:
+            groups[field] = columns
+    own = tuple(named.get("q", ()))
+    lacks = [] if "q" in groups else ["positions"]
+    lacks += [] if {"torque", "current"} & groups.keys() else ["currents or torques"]
+    lacks += [] if times or "qd" in groups else ["time"]
+    if "q" in groups and own == () and len(groups["q"]) < len(joints):
+        others = [name for name in header if _sibling(name, groups["q"])]
+        lacks += [f"the joints of {', '.join(others)}"] if others else []
+    return _Found(times, groups, own or _joints(groups.get("q", ())), " and ".join(lacks))
+
+
+def _sibling(name: str, columns: Sequence[str]) -> bool:
+    """Whether a name without number begins or ends as the names of the numbered positions do."""
+    words, same = words_of(UNIT.sub("", name)), words_of(UNIT.sub("", columns[0])).split("_")
+    parts = words.split("_")
+    alike = [w for w in (same[0], same[-1]) if w in WORDS["q"]]
+    return name not in columns and not _OTHER.search(words) and any(w in parts for w in alike)
+
+
+def lacking(header: Sequence[str], joints: Sequence[str] = ()) -> str:
+    """What :func:`recognised` finds among columns, and what it misses, in one line."""
+    found = _found(header, joints)
+    told = [f"time: {found.times[0]}"] if found.times else []
+    for field, columns in found.groups.items():
+        told.append(f"{_PLAIN[field]}: {_span(columns)} ({len(columns)})")
+    lacks = found.lacks
+    for field, columns in found.groups.items() if not lacks else ():
+        if len(columns) != len(found.groups["q"]):
+            absent = [j for j in found.joints if j not in of_joints(header, joints).get(field, ())]
+            lacks = f"{_PLAIN[field]} of {', '.join(absent) or 'all joints'}"
+            break
+    lacks = lacks or "a time, and velocities that tell the sample rate"
+    return f"found {'; '.join(told) or 'none of the signals'}; not found: {lacks}"
+
+
 def recognised(
-    header: Sequence[str], table: Array, degrees: bool | None = None
+    header: Sequence[str],
+    table: Array,
+    degrees: bool | None = None,
+    joints: Sequence[str] = (),
 ) -> ColumnMap | None:
     """The map that names and values suggest; None if positions, efforts or a clock are not found.
 
@@ -99,26 +202,18 @@ def recognised(
         header: names of all columns.
         table: values of some rows, NaN for a cell that is no number, shape (rows, columns).
         degrees: whether angles without a unit in their names are degrees; None: values decide.
+        joints: the robot's joints: columns that are named after them are theirs, in this order.
 
     Raises:
         ValueError: columns of one kind in different units, or a time in two columns.
     """
-
-    def plain(name: str) -> str:
-        return TIME_WRITTEN.sub("", UNIT.sub("", name).strip(" #").lower())
-
-    times = [name for name in header if plain(name) in TIMES]
-    time = next(iter(times), None)
-    groups: dict[str, tuple[str, ...]] = {}
-    for prefix, columns in grouped(header).items():
-        field = _field(prefix)
-        if field and FEWEST <= len(columns) <= MOST and field not in groups:
-            groups[field] = columns
-    effort = next((f for f in ("torque", "current") if f in groups), None)
-    if "q" not in groups or effort is None:
+    found = _found(header, joints)
+    times, groups, effort = found.times, found.groups, found.effort
+    if found.lacks or effort is None:
         return None
-    joints = len(groups["q"])
-    if len(groups[effort]) != joints or len(groups.get("qd", groups["q"])) != joints:
+    time = next(iter(times), None)
+    count = len(groups["q"])
+    if len(groups[effort]) != count or len(groups.get("qd", groups["q"])) != count:
         return None
 
     def numbers(columns: Sequence[str]) -> Array:
@@ -149,7 +244,7 @@ def recognised(
         clock=clock,
         current_scale=amperes,
         torque_scale=-newton_metres if _FRI in groups[effort][0] else newton_metres,
-        joint_names=_joints(groups["q"]),
+        joint_names=found.joints,
         repair=frozenset(repair),
     )
 
@@ -178,7 +273,7 @@ def in_units_of(preset: ColumnMap, found: ColumnMap) -> ColumnMap:
 
 
 def _joints(columns: Sequence[str]) -> tuple[str, ...]:
-    """Joint names, if the names of all columns contain them."""
+    """Joint names, if the names of all columns contain them in the form of ROS's JointState."""
     found = [m.group(2) or m.group(3) for n in columns if (m := _NAMED.match(UNIT.sub("", n)))]
     return tuple(found) if len(found) == len(columns) else ()
 
@@ -202,19 +297,21 @@ def described(columns: ColumnMap) -> str:
     unit = {1e-9: "ns", 1e-6: "us", 1e-3: "ms", 1.0: "s", 60.0: "min", 3600.0: "h"}
     angle = "deg" if columns.degrees else "rad"
     ampere = "mA" if columns.current_scale == 1e-3 else "A"
-    time = f"time {columns.t} [{unit[columns.time_scale]}]"
+    time = f"time {_in_unit(columns.t, unit[columns.time_scale])}"
     if columns.t is None:
         time = f"no time, {columns.clock:g} rows per second by the velocities"
     scale = columns.torque_scale
     assert isinstance(scale, float)  # `recognised` makes no scale per joint
     torque = {1.0: "N m", 1e-2: "N cm", 1e-3: "mN m"}[abs(scale)]
     torque += ", opposite sign" if scale < 0 else ""
-    parts = [time, f"positions {_span(columns.q)} [{angle}]"]
-    parts.append(f"velocities {_span(columns.qd)} [{angle}/s]" if columns.qd else "no velocities")
+    parts = [time, f"positions {_in_unit(_span(columns.q), angle)}"]
     parts.append(
-        f"joint torques {_span(columns.torque)} [{torque}]"
+        f"velocities {_in_unit(_span(columns.qd), angle + '/s')}" if columns.qd else "no velocities"
+    )
+    parts.append(
+        f"joint torques {_in_unit(_span(columns.torque), torque)}"
         if columns.torque
-        else f"currents {_span(columns.current)} [{ampere}]"
+        else f"currents {_in_unit(_span(columns.current), ampere)}"
     )
     if "order" in columns.repair:
         parts.append("rows sorted by time")
@@ -223,3 +320,8 @@ def described(columns: ColumnMap) -> str:
 
 def _span(names: Sequence[object]) -> str:
     return f"{names[0]} to {names[-1]}"
+
+
+def _in_unit(names: object, unit: str) -> str:
+    """Names with their unit, unless they end with it."""
+    return str(names) if str(names).endswith(f"[{unit}]") else f"{names} [{unit}]"

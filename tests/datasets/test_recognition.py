@@ -6,7 +6,7 @@ import pytest
 from tauguard.datasets.arm_logs import reduced
 from tauguard.datasets.columns import PRESETS, ColumnMap
 from tauguard.datasets.logs import Log, read_csv, read_log
-from tauguard.datasets.recognition import described, grouped, recognised
+from tauguard.datasets.recognition import described, grouped, lacking, recognised
 from tauguard.traces import Trace
 
 
@@ -305,3 +305,62 @@ def test_a_reduced_log_has_nothing_folded_in_and_says_its_cost(tmp_path):
     assert "1e+03 Hz averaged down to 100 Hz: alarms come 4.5 ms later" in log.notes[0]
     with pytest.raises(ValueError, match="--resample 2000: hz 2000 for a trace at 1000 Hz"):
         reduced(Log(trace, ()), 2000.0)
+
+
+RAIL = ("rail", "A1", "A2", "lift axis", "j.rot")
+
+
+@pytest.mark.parametrize(
+    ("q", "i"),
+    [
+        ("q_{}", "i_{}"),
+        ("{}.position", "{}.current"),
+        ("{} position [rad]", "{} current [A]"),
+        ("pos_{}", "cur_{}"),
+        ("{}_pos [rad]", "{}_Strom [A]"),
+        ("state/{}/angle", "state/{}/amps"),
+    ],
+)
+def test_names_of_the_robot_s_joints_decide_before_numbers(tmp_path, q, i):
+    """A number within a name is no place in the row: the rail stands before A1."""
+    t, *parts = motion(joints=5)
+    order = [3, 1, 0, 4, 2]  # of the columns
+    names = [*(q.format(RAIL[k]) for k in order), *(i.format(RAIL[k].upper()) for k in order)]
+    values = (parts[0][:, order], parts[2][:, order])
+    path = written(tmp_path / "log.csv", ["time [s]", *names], t, *values)
+    trace = read_log(path, "auto", robot_joints=RAIL).trace
+    assert trace.joint_names == RAIL
+    np.testing.assert_allclose(trace.q, parts[0], atol=1e-8)
+    np.testing.assert_allclose(trace.current, parts[2], atol=1e-8)
+
+
+def test_joints_whose_name_is_part_of_another_s_are_told_apart():
+    header = ["t", *(f"{name}_{w}" for w in ("q", "tau") for name in ("arm", "arm_2", "arm_21"))]
+    table = np.arange(5.0)[:, None] * np.ones(len(header))
+    found = recognised(header, table, joints=("arm_21", "arm", "arm_2"))
+    assert found.q == ("arm_21_q", "arm_q", "arm_2_q")
+    assert found.joint_names == ("arm_21", "arm", "arm_2")
+
+
+def test_a_refusal_says_what_was_found_and_what_was_not(tmp_path):
+    t, q, _, i = motion(joints=3)
+    axes = ("rail", "A1", "A2")
+    names = ["t", *(f"q_{a}" for a in axes), *(f"i_{a}" for a in axes)]
+    path = written(tmp_path / "log.csv", names, t, q, i)
+    said = r"found time: t; positions: q_A1 to q_A2 \(2\).*; not found: the joints of q_rail"
+    with pytest.raises(ValueError, match=said):
+        read_log(path, "auto", robot_joints=("x", "y", "z"))
+    said = lacking(names[:-1], axes)
+    assert said.endswith("currents: i_rail to i_A1 (2); not found: currents of A2")
+    assert lacking(["t", "a", "b"]) == (
+        "found time: t; not found: positions and currents or torques"
+    )
+    (tmp_path / "empty.csv").write_text("")
+    with pytest.raises(ValueError, match="the file is empty"):
+        read_log(tmp_path / "empty.csv", "auto")
+
+
+def test_a_unit_is_said_once():
+    columns = ColumnMap("t [ms]", ("a [deg]", "b [deg]"), torque=("c", "d"), time_scale=1e-3)
+    text = described(ColumnMap(**{**vars(columns), "degrees": True}))
+    assert text.startswith("time t [ms], positions a [deg] to b [deg], no velocities")

@@ -168,7 +168,7 @@ def opened(
         from tauguard.datasets.arm_logs import matched
         from tauguard.datasets.columns import column_map
 
-        log = read_log(play, column_map(columns), names)
+        log = read_log(play, column_map(columns), names, robot_joints=names)
         print_notes(f"{play.name}: {note}" for note in log.notes)
         return PlayedStream(matched(log.trace, names))
     if ros is not None:
