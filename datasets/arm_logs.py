@@ -120,12 +120,12 @@ def read_logs(
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
     files = log_files(logs)
-    joints = robot_numbers(robot)[0].joint_names
+    joints = robot_numbers(robot)[0].joint_names if columns in ("auto", None) else ()
     reading = of_one_unit(files, columns, reading or AS_IS, joints)
     read = {path.name: read_one(path, columns, torque, reading, joints) for path in files}
     for name, log in read.items():
         _refuse_touched(name, log)
-    notes = [note for log in read.values() for note in log.notes]
+    notes = _gathered(read)
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
     for name, trace in traces.items():
@@ -154,6 +154,19 @@ def of_one_unit(
     if len({found.q for found in maps}) != 1 or len(units) + undecided == 1:
         return reading
     return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
+
+
+def _gathered(read: dict[str, Log]) -> list[str]:
+    """The notes of all logs, each text once."""
+    logs: dict[str, list[str]] = {}
+    for name, log in read.items():
+        for note in log.notes:
+            logs.setdefault(note.removeprefix(f"{name}: "), []).append(name)
+    out = []
+    for note, names in logs.items():
+        every = len(names) == len(read) > 1
+        out.append(f"{'each log' if every else ', '.join(names)}: {note}")
+    return out
 
 
 def _refuse_touched(name: str, log: Log) -> None:

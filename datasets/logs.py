@@ -121,7 +121,8 @@ def chosen(
             f"no names of columns in the first line: {known}; a map may count columns from 0"
         )
     if found is None:
-        raise ValueError(f"the columns' names do not suffice: {lacking(header, joints)}; {known}")
+        lead = "" if columns == "auto" else "no column map; "
+        raise ValueError(f"{lead}among the columns, {lacking(header, joints)}; {known}")
     raise ValueError(
         f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
     )

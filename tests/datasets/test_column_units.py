@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tauguard.datasets.arm_logs import log_files, of_one_unit
+from tauguard.datasets.arm_logs import log_files, of_one_unit, read_logs
 from tauguard.datasets.columns import AS_IS, ColumnMap, Reading
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.recognition import described, recognised
@@ -251,3 +251,19 @@ def test_all_logs_of_a_ur3_are_in_radians(data_dir):
         pytest.skip("no ur3 folder in the real data")
     for path in files:
         assert "[rad]" in next(n for n in read_log(path, "auto").notes if "read as" in n), path
+
+
+def test_a_note_on_several_logs_is_given_once(tmp_path):
+    arm = tmp_path / "arm.xml"
+    inner = '<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/>'
+    bodies = "".join(f'<body pos="0 0 .3"><joint name="j{k}"/>{inner}' for k in range(3))
+    arm.write_text(f"<mujoco><worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>")
+    for name in ("a", "b"):
+        turned(tmp_path / f"{name}.csv", speed=3.0, turns=3.0)
+    notes = read_logs([tmp_path], "auto", arm).notes
+    (note,) = [note for note in notes if "read as" in note]
+    assert note.startswith("each log: read as time t [s]")
+    path = turned(tmp_path / "d.csv", speed=3.0, turns=3.0)
+    path.write_text(path.read_text() + "4.0,1")
+    tail = [note for note in read_logs([tmp_path], "auto", arm).notes if "cut off" in note]
+    assert tail == ["d.csv: line 402: cut off (2 of 10 columns), left out"]
