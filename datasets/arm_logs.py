@@ -290,8 +290,8 @@ def not_shown(traces: Sequence[Trace]) -> list[str]:
     if still:
         notes.append(
             f"{', '.join(still)}: moves in none of the logs, so its friction is not known. No "
-            "collision is detected while it moves, and its bound at rest is assumed; add a log in "
-            "which it moves"
+            "collision is detected while it moves, and none of moving joints while it stands "
+            "elsewhere; its bound at rest is assumed; add a log in which it moves"
         )
     if lacking := unseen(traces):
         notes.append(f"the logs show less than {SEEN:g} s of {unseen_text(lacking, len(names))}")

@@ -7,6 +7,7 @@ import pytest
 
 from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
 from tauguard.detectors._observer import REGIME_SETTLES
+from tauguard.detectors.alarms.log_detection import detect_in_log
 from tauguard.detectors.alarms.training import carrying
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.evaluation.card_page import text
@@ -417,3 +418,11 @@ def test_what_the_card_promises_in_motion_is_found(fitted, alarm):
                 alarms = alarm.detect(add_contact(trace, GAIN, push)).alarms
                 found.append(any(start < one.start < start + 0.6 for one in alarms))
     assert np.mean(found) >= 0.9
+
+
+def test_a_load_is_asked_for_only_if_it_was_not_given(alarm):
+    """A load of 4 kg that is not there: most of the log is in alarm."""
+    wrong, trace = carrying(alarm, Load(4.0)), record(9, seconds=10.0)
+    for given, verb in ((False, "give"), (True, "check")):
+        (note,) = (n for n in detect_in_log(wrong, trace, given).notes if "fill much" in n)
+        assert f"{verb} the load (--payload)" in note
