@@ -127,6 +127,7 @@ def read_logs(
         _refuse_touched(name, log)
     notes = _gathered(read)
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
+    _refuse_linear_degrees(files, columns, reading, numbers, joints)
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
     for name, trace in traces.items():
         _refuse_saturated(name, trace)
@@ -154,6 +155,25 @@ def of_one_unit(
     if len({found.q for found in maps}) != 1 or len(units) + undecided == 1:
         return reading
     return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
+
+
+def _refuse_linear_degrees(
+    files: Sequence[Path],
+    columns: str | None,
+    reading: Reading,
+    numbers: RobotNumbers,
+    joints: Sequence[str],
+) -> None:
+    """Raise ``ValueError`` if columns of linear axes are read in degrees."""
+    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
+    linear = ", ".join(name for name, is_linear in pairs if is_linear)
+    for file in [file for file in files if linear and file.suffix == ".csv"]:
+        found = chosen(column_map(columns), file, reading.mend, joints).mended(reading.mend)
+        if found.degrees is True:
+            raise ValueError(
+                f"{file.name}: {linear} is a linear axis, but is read in degrees as the others: "
+                'give a column map in which "degrees" is a list, false for this axis [m]'
+            )
 
 
 def _gathered(read: dict[str, Log]) -> list[str]:

@@ -41,7 +41,9 @@ class ColumnMap:
     q_des: tuple[Column, ...] = ()  #: commanded positions
     qd_des: tuple[Column, ...] = ()  #: commanded velocities
     qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
-    degrees: bool = False  #: angles, their speeds and accelerations are in degrees
+    degrees: bool | tuple[bool, ...] = False
+    """Angles, their speeds and accelerations are in degrees; also per joint: a linear axis is not,
+    its numbers are in m."""
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
     current_scale: float | tuple[float, ...] = 1.0  #: amperes per logged unit, also per joint
     torque_scale: float | tuple[float, ...] = 1.0
@@ -71,10 +73,10 @@ class ColumnMap:
         for name, group in self.groups().items():
             if len(group) != joints:
                 raise ValueError(f"columns.{name}: {len(group)} columns for {joints} joints")
-        for name in ("current_scale", "torque_scale"):
+        for name in ("current_scale", "torque_scale", "degrees"):
             scale = getattr(self, name)
             if not isinstance(scale, float | int) and len(scale) != joints:
-                raise ValueError(f"columns.{name}: one number or {joints}")
+                raise ValueError(f"columns.{name}: one value or {joints}")
         if bool(self.current) == bool(self.torque):
             raise ValueError("columns: give either current [A] or torque [N m]")
         unknown = self.repair - set(REPAIRS)
@@ -92,7 +94,8 @@ class ColumnMap:
         for column in columns:
             if isinstance(column, bool) or not isinstance(column, str | int):
                 raise ValueError(f"column {column!r}: expected a name or a number from 0")
-        if not isinstance(self.degrees, bool):
+        told = self.degrees if isinstance(self.degrees, tuple) else (self.degrees,)
+        if not all(isinstance(one, bool) for one in told):
             raise ValueError(f"columns.degrees: {self.degrees!r}, expected true or false")
         scales: list[object] = [self.time_scale]
         for one in (self.current_scale, self.torque_scale):

@@ -237,8 +237,9 @@ def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array
     if not columns.torque:
         signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
     efforts = signals.pop("torque", None)
-    if columns.degrees:
-        signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
+    if np.any(columns.degrees):
+        scale = np.where(columns.degrees, np.pi / 180, 1.0)  # one, or one per joint
+        signals |= {n: v * scale for n, v in signals.items() if n != "current"}
     if efforts is not None:
         signals["current"] = efforts * np.asarray(columns.torque_scale, float)
     return signals

@@ -194,7 +194,8 @@ def known_arm(
         check_named(robot, columns, [r.trace for r in recordings])
     arm, scale = initial_arm(numbers, recordings, columns, gains, "gains")
     words = {"gains": "those given", "torques": "none, the log holds torques"}
-    return arm, words.get(scale, "those of the preset")
+    preset = recordings[0].trace.meta.get("columns") or columns
+    return arm, words.get(scale, f"those of the preset {preset}")
 
 
 def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:

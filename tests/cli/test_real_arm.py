@@ -28,7 +28,7 @@ def test_calibrate_train_detect(folder, tmp_path, capsys):
     given = ["--robot", str(folder / "ur10e.urdf"), "--out", str(robot)]
     main(["calibrate", *logs, *given, *common, "--json", str(tmp_path / "calibrate.json")])
     figures = json.loads((tmp_path / "calibrate.json").read_text())
-    assert "from the gains of the preset" in capsys.readouterr().out
+    assert "from the gains of the preset ur10e\n" in capsys.readouterr().out
     excitation = [v for k, v in figures["held_out_rms_nm"].items() if "joint" not in k]
     for rms in excitation:
         assert all(a < b for a, b in zip(rms, [2.0, 2.3, 1.0, 0.4, 0.4, 0.3], strict=True))

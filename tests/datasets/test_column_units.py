@@ -267,3 +267,26 @@ def test_a_note_on_several_logs_is_given_once(tmp_path):
     path.write_text(path.read_text() + "4.0,1")
     tail = [note for note in read_logs([tmp_path], "auto", arm).notes if "cut off" in note]
     assert tail == ["d.csv: line 402: cut off (2 of 10 columns), left out"]
+
+
+def test_degrees_are_those_of_revolute_joints(tmp_path):
+    arm = tmp_path / "arm.xml"
+    inner = '<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/>'
+    bodies = "".join(
+        f'<body pos="0 0 .3"><joint name="j{k}" type="{kind}"/>{inner}'
+        for k, kind in enumerate(("slide", "hinge", "hinge"))
+    )
+    arm.write_text(f"<mujoco><worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>")
+    log = turned(tmp_path / "a.csv", speed=3.0, scale=np.array([1.0, 57.3, 57.3]), turns=3.0)
+    signals = {name: tuple(f"{name}{k}" for k in range(3)) for name in ("q", "qd")}
+    torque = tuple(f"tau{k}" for k in range(3))
+    mixed = ColumnMap("t", **signals, torque=torque, degrees=(False, True, True))
+    _, table = np.split(np.loadtxt(log, delimiter=",", skiprows=1), [1], axis=1)
+    trace = read_log(log, mixed).trace
+    np.testing.assert_allclose(trace.q, table[:, :3] * [1.0, np.pi / 180, np.pi / 180])
+    np.testing.assert_allclose(trace.qd[:, 0], table[:, 3])
+    with pytest.raises(ValueError, match=r"a.csv: j0 is a linear axis, .* \"degrees\" is a list"):
+        read_logs([log], "auto", arm)
+    for wrong in ((False, True), (0, 1, 1)):
+        with pytest.raises(ValueError, match=r"columns.degrees: .*(one value or 3|expected true)"):
+            ColumnMap("t", **signals, torque=torque, degrees=wrong)

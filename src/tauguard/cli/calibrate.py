@@ -85,11 +85,12 @@ def command(
     hold_to("error", accept, lambda: check_held_out(*logs_of, held))
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=names)
+    preset = str(recordings[0].trace.meta.get("columns") or columns)
     result = summary(names, found, held, target) | {"scale": given.source}
     speeds = [(one.trace.t, np.abs(one.trace.qd)) for one in recordings]
     result["speed_rad_s"] = exceeded(speeds).tolist()
     result["moves"] = (motion_seconds(recordings) >= SHOWN_SECONDS).tolist()
-    report(result, found)
+    report(result, found, preset)
     if json is not None:
         write_json(json, result)
 
@@ -151,12 +152,16 @@ def summary(names: list[str], found: Identified, held: list[Array], target: Path
     }
 
 
-def report(result: dict[str, Any], found: Identified) -> None:
-    """Print the results. For a joint that moves in no log, only gain and mass are printed."""
+def report(result: dict[str, Any], found: Identified, preset: str) -> None:
+    """Print the results; only gain and mass for a joint that moves in no log.
+
+    ``preset`` is named if its gains were taken.
+    """
     from tauguard.cli.help_text import print_notes
     from tauguard.report import table
 
-    print(f"scale of the torques: from {SOURCES[result['scale']]}")
+    source = SOURCES[result["scale"]] + (f" {preset}" if result["scale"] == "preset" else "")
+    print(f"scale of the torques: from {source}")
     held = result["scale"] if result["scale"] in ("preset", "torques") else "given"
     rows = []
     for k, name in enumerate(result["joints"]):
