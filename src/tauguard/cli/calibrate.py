@@ -41,9 +41,10 @@ def command(
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
 
-    Logs with currents do not determine the drive gains. These come from --gains or a preset if
-    given, else from a log with a known --payload, else from the robot file's masses; the output
-    states which. For cross-validation, each log is predicted by a calibration from the other logs.
+    Logs with currents do not determine the drive gains. These come from --gains if given, else from
+    a log with a known --payload, else from a preset of the columns, else from the robot file's
+    masses; the output states which. For cross-validation, each log is predicted by a calibration
+    from the other logs.
 
     Args:
         logs: CSV or MCAP files, or a folder of them; at least 10 s of motion, better two minutes.
