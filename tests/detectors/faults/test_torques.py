@@ -64,7 +64,8 @@ def test_another_gain_is_named_within_eight_seconds(arm, seed, gain):
     found = said(arm, trace, gain * trace.current)
     first = next(k for k, text in enumerate(found) if text)
     assert 4.0 <= first * DT <= 8.0
-    assert "of the torque that the model needs" in found[first]
+    assert "of the torque that the model needs: another load, gain or arm, a sat" in found[first]
+    assert found[first].endswith(", or a push of a second or more")
 
 
 @pytest.mark.parametrize("seed", range(6))
