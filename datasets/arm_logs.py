@@ -127,7 +127,12 @@ def read_logs(
         _refuse_touched(name, log)
     notes = _gathered(read)
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
-    _refuse_linear_degrees(files, columns, reading, numbers, joints)
+    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
+    if linear := ", ".join(name for name, is_linear in pairs if is_linear):
+        _refuse_linear_degrees(files, columns, reading, linear, joints)
+        held += (
+            f"{linear}: linear, so its numbers are in m, m/s and N, not in rad, rad/s and N m",
+        )
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
     for name, trace in traces.items():
         _refuse_saturated(name, trace)
@@ -161,13 +166,11 @@ def _refuse_linear_degrees(
     files: Sequence[Path],
     columns: str | None,
     reading: Reading,
-    numbers: RobotNumbers,
+    linear: str,
     joints: Sequence[str],
 ) -> None:
-    """Raise ``ValueError`` if columns of linear axes are read in degrees."""
-    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
-    linear = ", ".join(name for name, is_linear in pairs if is_linear)
-    for file in [file for file in files if linear and file.suffix == ".csv"]:
+    """Raise ``ValueError`` if columns of the axes ``linear`` are read in degrees."""
+    for file in [file for file in files if file.suffix == ".csv"]:
         found = chosen(column_map(columns), file, reading.mend, joints).mended(reading.mend)
         if found.degrees is True:
             raise ValueError(

@@ -287,6 +287,8 @@ def test_degrees_are_those_of_revolute_joints(tmp_path):
     np.testing.assert_allclose(trace.qd[:, 0], table[:, 3])
     with pytest.raises(ValueError, match=r"a.csv: j0 is a linear axis, .* \"degrees\" is a list"):
         read_logs([log], "auto", arm)
+    turned(log, speed=3.0, turns=3.0)
+    assert read_logs([log], "auto", arm).notes[-1].startswith("j0: linear, so its numbers are in m")
     for wrong in ((False, True), (0, 1, 1)):
         with pytest.raises(ValueError, match=r"columns.degrees: .*(one value or 3|expected true)"):
             ColumnMap("t", **signals, torque=torque, degrees=wrong)
