@@ -306,9 +306,11 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
     box.widen(radius);
     return box;
   };
-  const RigidMotion& motion = this->motion(entries_[pair.a[0]].body);
+  const Entry& geom = entries_[pair.a[0]];
+  const RigidMotion& motion = this->motion(geom.body);
   const Vec3& drift = motion.linear;
-  const double turned = motion.speed * entries_[pair.a[0]].extent;
+  const bool sweeps = geom.shape.core == Core::half_space && motion.speed > 0;
+  const double turned = sweeps ? INFINITY : motion.speed * geom.extent;
   for (std::size_t begin = 0; begin < count; begin += block) {
     const std::size_t end = std::min(count, begin + block);
     if (!near.overlaps(box_of(begin, end))) continue;

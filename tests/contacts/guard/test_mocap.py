@@ -183,6 +183,25 @@ def test_a_paddle_that_meets_nothing_changes_no_bit(way, quat):
         np.testing.assert_array_equal(getattr(data, name), getattr(twin, name))
 
 
+@pytest.mark.parametrize("turn", [0.1, 0.5])
+def test_a_plane_that_turns_takes_a_cloth_along(turn):
+    """The plane turns about its own origin: its way grows with the distance of what it meets."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option timestep=".002" gravity="0 0 0"/>
+        <worldbody><body mocap="true"><geom type="plane" size="1 1 .1"/></body>
+        <flexcomp name="cloth" type="grid" dim="2" count="3 3 1" spacing=".02 .02 .02"
+            pos=".4 0 .02" radius=".002" mass=".05"><contact selfcollide="none"/>
+          <edge equality="true"/></flexcomp></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    guard = GuardedStepper(model, data)
+    guard.step()
+    data.mocap_quat[0] = [np.cos(turn / 2), 0, -np.sin(turn / 2), 0]
+    first, second = guard.step(), guard.step()
+    assert first.cuts
+    assert not first.passed
+    assert not second.passed
+    assert (data.flexvert_xpos @ [-np.sin(turn), 0, np.cos(turn)] > 0).all()
+
+
 @pytest.mark.parametrize("speed", [1.0, 5.0])
 def test_a_ball_between_a_paddle_and_a_table_leaves_no_faster_than_an_elastic_impact(speed):
     """It has to slide on one of them: by MuJoCo's friction it would leave 5 times as fast."""
