@@ -71,7 +71,8 @@ class Regimes {
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double wary = 0.5;        // fraction of the bound above which `slower` applies
   static constexpr double slower = 2.0;      // factor of `follow` while no joint moves
-  static constexpr double ended = 0.3;       // time after a contact without `slower` [s]
+  static constexpr double ended = 5.0;       // time after a contact without `slower` [s]: the
+                                             // controllers move torque between joints for seconds
   static constexpr double after = 1.0;       // time after it in which only change away counts [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double harder = 0.5;      // fraction of `beyond` that is added at 2 `hard`

@@ -62,6 +62,15 @@ def run(folder, *flags):
     )
 
 
+def test_columns_are_found_by_the_names_of_the_robots_joints(log, capsys):
+    (log / "arm.xml").write_text(ARM.replace('"j1"', '"base"').replace('"j2"', '"elbow"'))
+    table = np.loadtxt(log / "log.csv", delimiter=",")[:, [0, 2, 1, 4, 3, 6, 5]]
+    header = "t,q_elbow,q_base,qd_elbow,qd_base,current_elbow,current_base"
+    np.savetxt(log / "log.csv", table, delimiter=",", fmt="%.9g", header=header, comments="")
+    run(log, "--columns", "auto", "--gains", "8", "5")
+    assert "1 alarm in 8.0 s watched" in capsys.readouterr().out
+
+
 def test_the_push_is_found_and_nothing_else(log, capsys):
     out = log / "found"
     run(log, "--gains", "8", "5", "--out", str(out), "--json", str(log / "figures.json"))

@@ -36,7 +36,7 @@ def test_ten_seconds_of_motion_are_enough_for_every_command(folder, capsys, seco
     for arguments in asked(folder, log, longer).values():
         main(arguments)
     assert re.search(
-        r"alarms in these logs: 0 in 0.\d min, each part under", capsys.readouterr().out
+        r"alarms in these logs: 0 in 0.\d min, each part with calibration", capsys.readouterr().out
     )
 
 

@@ -255,7 +255,7 @@ def test_the_report_runs_what_is_not_there_and_says_what_failed(checkout):
     done = checkout("report", "--out", "page", "--quick", "--no-mistakes")
     assert done.returncode == 1
     text = (checkout.folder / "page" / "index.html").read_text()
-    asked = "0 of 1 asked"
+    asked = "0 of 1 targets are reached"
     for part in (
         "Not recorded in a quick run",
         "Study: first-good",

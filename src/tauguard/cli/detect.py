@@ -88,6 +88,7 @@ def command(
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_one
+    from tauguard.datasets.real_arms import robot_numbers
     from tauguard.detectors.alarms.log_detection import detect_in_log
     from tauguard.detectors.evaluation.labelled_log import beside_labels
     from tauguard.models.robot import bodies_file
@@ -98,7 +99,8 @@ def command(
     if model is not None and (quiet is not None or gains):
         raise ValueError("--quiet and --gains cannot be combined with --model (trained already)")
     robot = bodies_file(robot)
-    read = read_one(log, columns, torque, reading)
+    joints = robot_numbers(robot)[0].joint_names if columns in ("auto", None) else ()
+    read = read_one(log, columns, torque, reading, joints)
     print_notes(read.notes)
     trace = read.trace
     if model is not None:

@@ -81,7 +81,7 @@ def test_logs_in_which_no_joint_moves_are_scored_too(count):
     named = {f"log{k}": log for k, log in enumerate(logs)}
     _, scores, notes = train_beside(Watched(), [], named, whole, 10.0)
     assert len(scores) == len(logs)
-    assert any("0.0 s of motion are left without it" in note for note in notes) == (count == 0)
+    assert any("the rest has 0.0 s of motion" in note for note in notes) == (count == 0)
 
 
 def test_other_errors_of_the_calibration_are_not_hidden(monkeypatch):
