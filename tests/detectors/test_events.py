@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauguard.detectors.evaluation import matching as matching_module
 from tauguard.detectors.evaluation.matching import collision_free, match
 from tauguard.detectors.events import confirmation_samples, confirmed, find_alarms, undisturbed_rows
 from tauguard.traces.trace import Alarm, Collision
@@ -88,8 +87,7 @@ def test_a_clamping_that_lets_go_at_once_can_be_found_like_any_other_collision()
     assert (late.delays, len(late.false_alarms)) == ((None,), 1)
 
 
-def test_cases_are_equal_pieces_of_collision_free_time(monkeypatch):
-    monkeypatch.setattr(matching_module, "CASE_SECONDS", 2.0)
+def test_cases_are_equal_pieces_of_collision_free_time():
     false = [Alarm(3.0, 3.1), Alarm(5.9, 6.1)]
     matching = match([*false, Alarm(10.1, 13.0)], [STRIKE, CLAMP], SPAN)
     # 0-10, 10.5-20 and 22-40: five, four and nine pieces of 2 s
