@@ -106,28 +106,25 @@ class Trial:
         if self._owner != os.getpid():  # the process belongs to the parent
             self._lock, self._process, self._owner = threading.Lock(), None, os.getpid()
         with self._lock:
-            for _ in range(2):  # an idle process may just have ended
+            for _ in range(2):  # an idle process may just have ended, also after the request
                 process = self._running()
-                if process is None or process.stdin is None:
+                if process is None or process.stdin is None or process.stdout is None:
                     break
                 with contextlib.suppress(BrokenPipeError):
                     process.stdin.write(line)
                     process.stdin.flush()
-                    return self._answer(process)
+                    if not select([process.stdout], [], [], self.seconds)[0]:
+                        self._end()
+                        return f"MuJoCo needs more than {self.seconds:g} s for it"
+                    if status := process.stdout.readline().strip():
+                        return self._failure(int(status))
                 self._end()
-        return "the process that compiles it first does not start"
+        return "the process that compiles it first ends"
 
-    def _answer(self, process: subprocess.Popen[bytes]) -> str | None:
-        assert process.stdout is not None
-        if not select([process.stdout], [], [], self.seconds)[0]:
-            self._end()
-            return f"MuJoCo needs more than {self.seconds:g} s for it"
-        answer = process.stdout.readline().strip()
-        if answer == b"0":
+    def _failure(self, status: int) -> str | None:
+        if status == 0:
             return None
-        if not answer:
-            self._end()
-        elif os.WIFSIGNALED(int(answer)) and os.WTERMSIG(int(answer)) == signal.SIGXCPU:
+        if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU:
             return f"MuJoCo needs more than {MOST_WORK} s of processor time for it"
         return (
             f"MuJoCo does not survive it (a crash, or more than {MOST_MEMORY >> 30} GiB of memory)"

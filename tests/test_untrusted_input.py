@@ -266,3 +266,17 @@ def test_an_environment_is_watched_for_a_few_resets_and_actions():
         assert part["memory_mib"] > 10
         assert part["wall_p50_us"] >= 0.5 * part["cpu_p50_us"] > 0
     assert endurance.moved(env, 0.4, 20)["rms_residual"] > 0
+
+
+def test_a_trial_whose_process_ends_after_the_request_is_repeated(tmp_path):
+    """The idle process can end between the request and its reading."""
+    from tauguard.models.robot_check import Trial
+
+    work = f"""
+import pathlib
+first = not (mark := pathlib.Path({str(tmp_path / "mark")!r})).exists()
+mark.touch()
+if first or "ends" in what["text"]: os.kill(os.getppid(), signal.SIGKILL)
+"""
+    assert Trial(work).of(text="<mujoco/>") is None
+    assert "ends" in (Trial(work).of(text="ends") or "")

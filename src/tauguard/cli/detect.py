@@ -93,12 +93,14 @@ def command(
     from tauguard.detectors.evaluation.labelled_log import beside_labels
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
+    from tauguard.untrusted_input import check_no_device
 
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
         raise ValueError("--quiet and --gains cannot be combined with --model (trained already)")
     robot = bodies_file(robot)
+    check_no_device(log)
     joints = robot_numbers(robot)[0].joint_names if columns in ("auto", None) else ()
     read = read_one(log, columns, torque, reading, joints)
     print_notes(read.notes)
