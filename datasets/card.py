@@ -60,7 +60,7 @@ def card(
     return (
         files("tauguard.datasets")
         .joinpath("card.md")
-        .read_text()
+        .read_text("utf-8")
         .format(
             license=LICENSE,
             name=configuration.name,
@@ -124,7 +124,7 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
         for split in summary
         if any(s == split for _, _, s in shards.values())
     ]
-    context = files("tauguard.datasets").joinpath("croissant_context.json").read_text()
+    context = files("tauguard.datasets").joinpath("croissant_context.json").read_text("utf-8")
     content = {
         "@context": json.loads(context),
         "@type": "sc:Dataset",

@@ -171,7 +171,7 @@ def _map_of(fields: dict[str, Any]) -> ColumnMap:
     return ColumnMap(**values)
 
 
-_TEXT = files("tauguard.datasets").joinpath("presets.toml").read_text()
+_TEXT = files("tauguard.datasets").joinpath("presets.toml").read_text("utf-8")
 #: Maps of known formats by name.
 PRESETS = {name: _map_of(fields) for name, fields in tomllib.loads(_TEXT).items()}
 

@@ -147,7 +147,8 @@ def load(source: str | Path) -> Configuration:
     """
     path = Path(source)
     if str(source) in NAMED:
-        text, where = files("tauguard.datasets").joinpath(f"named/{source}.toml").read_text(), ""
+        named = files("tauguard.datasets").joinpath(f"named/{source}.toml")
+        text, where = named.read_text("utf-8"), ""
     elif path.is_file():
         try:
             text, where = path.read_text(encoding="utf-8"), f"{path}: "

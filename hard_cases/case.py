@@ -134,5 +134,5 @@ def answer_text(answer: Any) -> str:
 def load_cases() -> tuple[Case, ...]:
     """Every case of the folder ``cases``, in the order of its files."""
     files = ("queries", "convex", "scenes", "observer")
-    texts = ((FOLDER / f"{name}.json").read_text() for name in files)
+    texts = ((FOLDER / f"{name}.json").read_text("utf-8") for name in files)
     return tuple(Case(**entry) for text in texts for entry in json.loads(text))

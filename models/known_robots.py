@@ -37,7 +37,7 @@ def _known(name: str, row: dict[str, Any]) -> KnownRobot:
     return KnownRobot(robot, own, urdf, menagerie, sources)
 
 
-_TEXT = Path(__file__).with_suffix(".toml").read_text()
+_TEXT = Path(__file__).with_suffix(".toml").read_text("utf-8")
 #: The table; ``cura6`` is described in :mod:`tauguard.models.cura6` instead.
 ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
     {name: _known(name, row) for name, row in tomllib.loads(_TEXT).items()}

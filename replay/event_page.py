@@ -111,6 +111,6 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
     begin, time = "beginning", "confirmation time"
     if alarm is not None:
         begin, time = f"first {alarm.settle:.3g} s", f"last {1e3 * alarm.confirmation:.3g} ms"
-    text = files("tauguard.replay").joinpath("event_terms.html").read_text()
+    text = files("tauguard.replay").joinpath("event_terms.html").read_text("utf-8")
     ms = f"{1e3 * late:.0f} ms"
     return text.format(gap=MERGE_GAP, window=WINDOW, late=ms, begin=begin, time=time)

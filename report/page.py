@@ -27,7 +27,7 @@ def page(title: str, sections: Mapping[str, str], lead: str = "") -> str:
         lead: HTML between the title and the links.
     """
     sections = {name: body for name, body in sections.items() if body}
-    style = files("tauguard.report").joinpath("page.css").read_text()
+    style = files("tauguard.report").joinpath("page.css").read_text("utf-8")
     names = {name: f"s{i}" for i, name in enumerate(sections)}
     links = " ".join(f'<a href="#{at}">{escape(name)}</a>' for name, at in names.items())
     bodies = "\n".join(

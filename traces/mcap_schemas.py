@@ -26,7 +26,7 @@ NUMBERS: dict[str, tuple[str, int | None]] = {
 def definition(name: str) -> str:
     """The definition of a type, such as ``sensor_msgs/msg/JointState``."""
     package, *_, kind = name.split("/")
-    return files("tauguard.traces").joinpath(f"ros/{package}/msg/{kind}.msg").read_text()
+    return files("tauguard.traces").joinpath(f"ros/{package}/msg/{kind}.msg").read_text("utf-8")
 
 
 def schema(name: str) -> str:

@@ -29,7 +29,7 @@ def arm_xml(name: str = "cura6") -> str:
     """MJCF text of the arm alone, self-contained; ``name`` is one of :data:`NAMES`."""
     if name in SIZES:
         return mjcf(links(SIZES[name]), flange(SIZES[name]), name)
-    return files(__name__).joinpath("cura6.xml").read_text()
+    return files(__name__).joinpath("cura6.xml").read_text("utf-8")
 
 
 def max_speed(name: str = "cura6") -> tuple[float, ...]:

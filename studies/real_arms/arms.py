@@ -79,7 +79,7 @@ ARMS = (
 
 def by_eye(log: str) -> tuple[Push, ...]:
     """Pushes of a log without a sensor, from ``pushes.csv``, which documents their source."""
-    lines = Path(__file__).with_name("pushes.csv").read_text().splitlines()
+    lines = Path(__file__).with_name("pushes.csv").read_text("utf-8").splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return tuple(
         Push(float(row["start"]), float(row["peak"]), row["state"] == "moving")
