@@ -69,7 +69,8 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     """
     path = Path(path)
     detection = trace.detection if detection is None else detection
-    groups = [Group(nanoseconds(trace.t), sample_topics(trace, detection))]
+    form = describe(trace, detection)
+    groups = [Group(nanoseconds(trace.t), sample_topics(trace, detection, form))]
     if trace.truth is not None:
         groups.append(event_group("/truth/collisions", trace.truth.collisions))
     if detection is not None:
@@ -78,7 +79,8 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     with atomic_file(path) as stream:
         writer = Writer(stream, LIBRARY)
         writer.metadata("tauguard.meta", trace.meta)
-        writer.metadata("tauguard.trace", describe(trace, detection))
+        texts = {name: json.dumps(value) for name, value in form.items()}
+        writer.metadata("tauguard.trace", texts)
         for name, text in sorted(trace.attachments.items()):
             media_type = MEDIA_TYPES.get(Path(name).suffix, "text/plain")
             writer.attachment(name, media_type, text.encode())
@@ -108,8 +110,8 @@ def read_mcap(path: str | Path) -> Trace:
         return decode(Contents(path.read_bytes()))
 
 
-def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
-    """Metadata from which the reader derives the layouts of the messages.
+def describe(trace: Trace, detection: Detection | None) -> dict[str, Any]:
+    """Metadata, stored as JSON, from which the reader derives the layouts of the messages.
 
     Raises:
         ValueError: a checker has two entries.
@@ -132,7 +134,7 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
             {"name": one.checker, "partners": one.partners, "rows": len(one)}
             for one in trace.contacts
         ]
-    return {name: json.dumps(value) for name, value in form.items()}
+    return form
 
 
 def sample_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
@@ -160,7 +162,9 @@ def contact_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
     return {f"/contacts/{one['name']}": layout(*CHECKED, one["partners"]) for one in checkers}
 
 
-def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
+def sample_topics(
+    trace: Trace, detection: Detection | None, form: Mapping[str, Any]
+) -> list[Topic]:
     """The topics of :func:`sample_layouts` with the trace's and the detection's values.
 
     Raises:
@@ -182,7 +186,6 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
             raise ValueError("detection.t: differs from trace.t; expected one row per sample")
         values |= {name: getattr(detection, name) for name in ("residual", "score", "alarm")}
         values["threshold"] = np.full(len(trace.t), detection.threshold)
-    form = {name: json.loads(text) for name, text in describe(trace, detection).items()}
     return [
         Topic(topic, SAMPLES[topic][0], found, {name: values[name] for name in found.fields})
         for topic, found in sample_layouts(form).items()
