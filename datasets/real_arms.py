@@ -23,6 +23,7 @@ from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.dynamics.robot import holding
 from tauguard.models import pin_model
 from tauguard.traces import Trace
+from tauguard.untrusted_input import read_text
 
 #: Two files describe the same arm if each joint's position [m], and each entry of its rotation
 #: matrix, differ by at most this.
@@ -107,7 +108,7 @@ def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> No
         ValueError: one line that names both models.
     """
     known = r"ur(?:3|5|10|16|20|30)e?"
-    name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', robot.read_text())
+    name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', read_text(robot))
     names = f"{name.group(1) if name else ''} {robot.stem}".lower()
     arms = re.findall(rf"(?<![a-z0-9]){known}(?![a-z0-9])", names)
     presets = {str(trace.meta.get("columns") or columns) for trace in traces}

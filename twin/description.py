@@ -50,7 +50,7 @@ def write_twin(
 
 def _without_losses(bodies: Path) -> None:
     """Remove damping and friction from the URDF or MJCF file; the TOML file states them."""
-    text = re.sub(r"<dynamics\b[^>]*/>", "", bodies.read_text())
+    text = re.sub(r"<dynamics\b[^>]*/>", "", bodies.read_text("utf-8"))
     write_atomic(bodies, re.sub(r'\s(?:damping|frictionloss)="[^"]*"', "", text))
 
 

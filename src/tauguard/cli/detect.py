@@ -362,9 +362,10 @@ def leave(
     from tauguard.replay import write_rrd
     from tauguard.report import write_json
     from tauguard.traces import write_mcap
+    from tauguard.untrusted_input import read_text
 
     out.mkdir(parents=True, exist_ok=True)
-    trace = dataclasses.replace(trace, attachments={robot.name: robot.read_text()})
+    trace = dataclasses.replace(trace, attachments={robot.name: read_text(robot)})
     write_json(out / "events.json", result)
     write_mcap(out / "detect.mcap", trace, found.detection)
     write_rrd(out / "detect.rrd", trace, found.detection, robot)
