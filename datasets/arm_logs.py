@@ -129,7 +129,7 @@ def read_logs(
     numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
     pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
     if linear := ", ".join(name for name, is_linear in pairs if is_linear):
-        _refuse_linear_degrees(files, columns, reading, linear, joints)
+        _refuse_linear_degrees(read, linear)
         held += (
             f"{linear}: linear, so its numbers are in m, m/s and N, not in rad, rad/s and N m",
         )
@@ -162,19 +162,12 @@ def of_one_unit(
     return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
 
 
-def _refuse_linear_degrees(
-    files: Sequence[Path],
-    columns: str | None,
-    reading: Reading,
-    linear: str,
-    joints: Sequence[str],
-) -> None:
+def _refuse_linear_degrees(read: dict[str, Log], linear: str) -> None:
     """Raise ``ValueError`` if columns of the axes ``linear`` are read in degrees."""
-    for file in [file for file in files if file.suffix == ".csv"]:
-        found = chosen(column_map(columns), file, reading.mend, joints).mended(reading.mend)
-        if found.degrees is True:
+    for name, log in read.items():
+        if log.columns is not None and log.columns.degrees is True:
             raise ValueError(
-                f"{file.name}: {linear} is a linear axis, but is read in degrees as the others: "
+                f"{name}: {linear} is a linear axis, but is read in degrees as the others: "
                 'give a column map in which "degrees" is a list, false for this axis [m]'
             )
 

@@ -39,6 +39,7 @@ class Log:
     notes: tuple[str, ...]  #: one line for each repair, empty if there was none
     touched: tuple[tuple[float, float], ...] | None = None
     """First and last time [s] of each contact that a column labels; None: no such column"""
+    columns: ColumnMap | None = None  #: the map of a CSV file, as it was read
 
 
 def read_log(
@@ -203,7 +204,8 @@ def read_csv(
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
     touched = labelled(header, rows, kept, trace.t)
-    return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")), touched)
+    notes += checked(trace, lambda row: f"line {kept[row]}")
+    return Log(trace, tuple(notes), touched, columns)
 
 
 def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:
