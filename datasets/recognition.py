@@ -38,6 +38,7 @@ TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "dur
 #: Words in names of commands and estimates; ``_OTHER``: also of other signals that are not measured
 #: at the joints.
 _COMMANDS = "target|desired|des|command|commanded|cmd|goal|ref|reference|ext|external"
+_COMMANDED = re.compile(f"(^|_)({_COMMANDS})(_|$)")
 _OTHER = re.compile(
     f"(^|_)({_COMMANDS}|control|gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
 )
@@ -60,7 +61,7 @@ def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
     named: dict[str, list[str]] = {}
     for name in header:
         plain = UNIT.sub("", name)
-        if re.search(f"(^|_)({_COMMANDS})(_|$)", words_of(name[len(plain) :])):
+        if _COMMANDED.search(words_of(name[len(plain) :])):
             continue
         if match := _NAMED.match(plain):
             named.setdefault(match.group(1) + match.group(4), []).append(name)
@@ -107,7 +108,7 @@ def of_joints(header: Sequence[str], joints: Sequence[str]) -> dict[str, dict[st
     found: dict[str, dict[str, str]] = {}
     for name in header:
         plain = UNIT.sub("", name)
-        if re.search(f"(^|_)({_COMMANDS})(_|$)", words_of(name[len(plain) :])):
+        if _COMMANDED.search(words_of(name[len(plain) :])):
             continue
         text = f"_{_parted(plain)}_"
         held = [joint for joint in words if f"_{words[joint]}_" in text]
