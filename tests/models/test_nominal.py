@@ -7,8 +7,6 @@ import pytest
 
 from tauguard.models import cura6, pin_model
 
-TILTED = [1.2, -3.0, -9.0]
-
 
 def differences(m: mujoco.MjModel, model: pin.Model, states: int) -> dict[str, float]:
     """Largest absolute differences over random states; bodies and joints in the same order."""

@@ -161,14 +161,6 @@ def collide_mesh(
     return hit, seconds
 
 
-def mesh_distance(model: Any, other: Any, pose: NDArray[np.float64]) -> float:
-    """coal's distance of two models, the other one posed [m]; 0 or less where they meet."""
-    coal = coal_module()
-    there = coal.Transform3s(pose[:3, :3], pose[:3, 3])
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    return float(coal.distance(model, coal.Transform3s.Identity(), other, there, request, result))
-
-
 def distance_all(
     left: list[tuple[Any, Any]], right: list[tuple[Any, Any]]
 ) -> tuple[NDArray[np.float64], float]:

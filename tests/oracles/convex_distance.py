@@ -104,23 +104,6 @@ def _radii(a: Solid, b: Solid, i: int) -> Fraction:
     return sum((Fraction(float(r[i if len(r) > 1 else 0])) for r in both), Fraction(0))
 
 
-def squared_distance(pa: Vectors, pb: Vectors) -> Fraction:
-    """The least squared distance between points of both hulls.
-
-    The minimum lies on a simplex of at most four vertices of the Minkowski difference, and is the
-    point of that simplex nearest to the origin. All simplices are tried: the others give points of
-    the hulls too, none of them nearer.
-    """
-    y = list({sub(q, p) for p in pa for q in pb})
-    best = Fraction(min(dot(v, v) for v in y))
-    for size in (2, 3, 4):
-        for face in combinations(y, size):
-            square = carried(face)
-            if square is not None and square < best:
-                best = square
-    return best
-
-
 def squared_gap(a: Features, b: Features) -> Fraction:
     """The least squared distance between points of two bodies that share none.
 
@@ -165,37 +148,6 @@ def _squared_height(
         return None
     volume = dot(corner, cross(u, v))
     return volume * volume, det
-
-
-def carried(y: tuple[Vector, ...]) -> Fraction | None:
-    """Squared distance of a simplex from the origin, None if the nearest point is on its rim."""
-    e = [sub(v, y[0]) for v in y[1:]]
-    if len(e) == 1:
-        det = dot(e[0], e[0])
-        weights = [-dot(e[0], y[0])]
-    elif len(e) == 2:
-        aa, ab, bb = dot(e[0], e[0]), dot(e[0], e[1]), dot(e[1], e[1])
-        det = aa * bb - ab * ab
-        x, z = -dot(e[0], y[0]), -dot(e[1], y[0])
-        weights = [x * bb - z * ab, z * aa - x * ab]
-    else:
-        det = dot(e[0], cross(e[1], e[2]))
-        o = tuple(-x for x in y[0])
-        weights = [
-            dot(o, cross(e[1], e[2])),
-            dot(o, cross(e[2], e[0])),
-            dot(o, cross(e[0], e[1])),
-        ]
-        if det < 0:
-            det, weights = -det, [-w for w in weights]
-    if det == 0 or any(w < 0 for w in weights) or sum(weights) > det:
-        return None
-    if len(e) == 3:
-        return Fraction(0)
-    v = tuple(
-        y[0][k] * det + sum(w * u[k] for w, u in zip(weights, e, strict=True)) for k in range(3)
-    )
-    return Fraction(dot(v, v), det * det)
 
 
 def squared_depth(pa: Vectors, ea: Vectors, pb: Vectors, eb: Vectors) -> Fraction:
