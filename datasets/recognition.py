@@ -83,7 +83,7 @@ def _field(prefix: str) -> str | None:
     whole = re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_")
     if _OTHER.search(whole):
         return None
-    for plain in (WRITTEN.sub("", whole), whole):  # "amps" is a unit and a signal
+    for plain in (WRITTEN.sub("", whole), whole):  # a unit alone may name a signal: "amps"
         for field, words in WORDS.items():
             if plain in words or any(
                 plain.endswith("_" + word) for word in words if len(word) > 1 or word == "q"

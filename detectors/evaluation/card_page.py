@@ -121,8 +121,8 @@ def _lines(card: ThresholdCard) -> list[str]:
     if card.unseen:
         parts = unseen_text(tuple(card.unseen.items()), len(card.joints))
         lines.append(
-            f"less than {SEEN:g} s in the logs, so left out"
-            + (", or bounded by what other arms do (in brackets)" if bracketed else "")
+            f"the logs show less than {SEEN:g} s of these, so no torque is stated"
+            + (", or one from other arms in brackets" if bracketed else "")
             + f": {parts}"
         )
 

@@ -61,7 +61,7 @@ constexpr double climb = 0.6;          // speed at which a hand that a barrier s
 constexpr double highest_climb = 0.6;  // largest rise of such a hand [m]
 constexpr double descend = 0.2;        // speed at which the hand comes down again [m/s]
 // Before a walk the person withdraws both hands. If they are not at rest after this time [s], the
-// next attempt begins after the same time.
+// person waits for the same time and tries again.
 constexpr double patience = 2.0;
 
 inline double minimum_jerk(double u) {
