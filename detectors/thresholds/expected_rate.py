@@ -27,7 +27,7 @@ from tauguard.detectors.thresholds.tail_model import (
     shape_error,
     tail_fraction,
 )
-from tauguard.report import poisson_rate
+from tauguard.report import poisson_rate, two_digits
 
 #: Bounds of the tail's shape if the peaks do not show an end of the tail, and the lowest shape if
 #: they do.
@@ -79,6 +79,15 @@ class ExpectedRate:
         low, high = np.quantile(self.rates(threshold), (side, 1 - side))
         seen = poisson_rate(int(np.sum(self.highest > threshold)), self.hours, confidence)
         return min(float(low), seen["low"]), max(float(high), seen["high"])
+
+    def at(self, threshold: float, requested: float) -> str:
+        """Text: the requested rate [1/h] beside the 95 % interval of the rate at a threshold."""
+        low, high = map(two_digits, self.interval(threshold))
+        return (
+            f"requested: {requested:g} false alarms per hour; 95 % interval of the rate in the "
+            f"{max(1, round(60 * self.hours))} min of motion on which the threshold was set: "
+            f"{low} to {high}"
+        )
 
 
 @dataclass(frozen=True)

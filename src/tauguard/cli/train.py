@@ -13,7 +13,7 @@ from tauguard.datasets.columns import AS_IS, Reading
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from tauguard.detectors import ArmModel, CollisionAlarm, FreeScores
+    from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.recording import Recording
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
     from tauguard.detectors.scores.free_motion import FittedFreeMotion
@@ -162,6 +162,7 @@ def labelled_motion(
     from tauguard.detectors import make_detector, save_model, with_guarantee
     from tauguard.detectors.alarms.training import FOLDS, train_and_score
     from tauguard.detectors.calibration.nominal import nominal_arm
+    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.detectors.thresholds.guarantee import check_guarantee
     from tauguard.report import two_digits
 
@@ -187,7 +188,7 @@ def labelled_motion(
         f"threshold {alarm.threshold:.3g}"
     )
     if guarantee is None:
-        print(aimed_at(alarm, scores, rate))
+        print(ExpectedRate.of(scores).at(alarm.threshold, rate))
     else:
         hours = two_digits(guarantee.hours)
         print(
@@ -195,20 +196,6 @@ def labelled_motion(
             f"{calibration} ({guarantee.episodes} episodes, {hours} h), with a "
             f"confidence of {guarantee.confidence:.0%}"
         )
-
-
-def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
-    """The requested rate of false alarms, and the 95 % interval of the rate on training motion."""
-    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
-    from tauguard.report import two_digits
-
-    expected = ExpectedRate.of(scores)
-    low, high = map(two_digits, expected.interval(alarm.threshold))
-    minutes = max(1, round(60 * expected.hours))
-    return (
-        f"requested: {rate:g} false alarms per hour; 95 % interval of the rate in the {minutes} "
-        f"min of motion on which the threshold was set: {low} to {high}"
-    )
 
 
 def free_motion(

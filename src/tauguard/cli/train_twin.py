@@ -45,7 +45,6 @@ def twin_contacts(
         ValueError: no twin, or logs of another rate or arm.
     """
     from tauguard.cli.help_text import print_notes
-    from tauguard.cli.train import aimed_at
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors import CollisionAlarm, make_detector, save_model
     from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
@@ -54,6 +53,7 @@ def twin_contacts(
     from tauguard.detectors.faults.inputs import UsualInput
     from tauguard.detectors.samples import same_rate
     from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
+    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.models.robot import Robot, bodies_file
 
     robot = Robot.from_toml(twin)
@@ -82,7 +82,7 @@ def twin_contacts(
         f"{model}: {both.name}, trained on {len(logs)} logs and {count} contacts of the twin; the "
         f"learned score's threshold is {learned.threshold:.3g}"
     )
-    print(f"{detector}: {aimed_at(learned, scores, per_hour)}")
+    print(f"{detector}: {ExpectedRate.of(scores).at(learned.threshold, per_hour)}")
     print_notes(notes)
 
 
