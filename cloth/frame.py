@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.cloth.impacts import Impacts
 
 
@@ -72,6 +73,8 @@ class Frame:
     pe_impacts: Impacts
     pp_impacts: Impacts
     stats: FrameStats
+
+    __repr__ = in_a_line
 
     def first_time(self) -> float:
         """Time of the first collision, in [0, 1] of the step; inf if there is none."""

@@ -19,12 +19,15 @@ the range of doubles. A query with a minimum distance is conservative: it takes 
 and uses no exact arithmetic.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.cloth import _mesh
 from tauguard.geometry import finite
 
@@ -58,6 +61,8 @@ class Impacts:
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
     weights: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
 
 def vertex_face(

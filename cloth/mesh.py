@@ -11,6 +11,8 @@ from these publications in three points:
 * Features can be added and removed without a rebuild (``update_topology``).
 """
 
+from __future__ import annotations
+
 import time
 from collections.abc import Mapping
 from numbers import Real

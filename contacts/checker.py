@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.contacts._contacts import all_finite, carried
 
 Index = NDArray[np.int32]
@@ -158,6 +158,8 @@ class Contacts:
     point: Array
     normal: Array
     distance: Array
+
+    __repr__ = in_a_line
 
     def __post_init__(self) -> None:
         """Check the shapes; a ``ValueError`` names the field with the error."""

@@ -1,5 +1,7 @@
 """The effective mass of an arm at an impact: reflected mass, and the standard's estimate."""
 
+from __future__ import annotations
+
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike

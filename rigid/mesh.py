@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
@@ -29,6 +30,8 @@ class MeshOverlap:
     hit: NDArray[np.bool_]
     faces: NDArray[np.int32]
 
+    __repr__ = in_a_line
+
 
 @dataclass(frozen=True, eq=False)
 class MeshContacts:
@@ -48,6 +51,8 @@ class MeshContacts:
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
     penetration: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
     def __len__(self) -> int:
         return len(self.pose)

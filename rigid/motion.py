@@ -1,5 +1,7 @@
 """Checked rigid poses and motions."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,6 +7,8 @@
 Both run in floating point with derived error bounds. Exact arithmetic decides the remaining rows.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock

@@ -7,6 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import in_a_line
+
 
 @dataclass(frozen=True, eq=False)
 class Witness:
@@ -24,6 +26,8 @@ class Witness:
     normal: NDArray[np.float64]
     offset: NDArray[np.float64]
 
+    __repr__ = in_a_line
+
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
@@ -35,6 +39,8 @@ class Overlap:
 
     hit: NDArray[np.bool_]
     _find_witness: Callable[[], Witness] = field(repr=False)
+
+    __repr__ = in_a_line
 
     @cached_property
     def witness(self) -> Witness:
@@ -59,6 +65,8 @@ class Impacts:
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
 
+    __repr__ = in_a_line
+
 
 @dataclass(frozen=True, eq=False)
 class MeshImpacts(Impacts):
@@ -70,6 +78,8 @@ class MeshImpacts(Impacts):
     """
 
     faces: NDArray[np.int32]
+
+    __repr__ = in_a_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +102,8 @@ class Distances:
     point_a: NDArray[np.float64]
     point_b: NDArray[np.float64]
     normal: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
     def within(self, min_distance: float) -> NDArray[np.bool_]:
         """Whether each distance is at most ``min_distance`` [m]. Shape (N,).
@@ -117,3 +129,5 @@ class MeshDistances(Distances):
     """
 
     face: NDArray[np.int32]
+
+    __repr__ = in_a_line

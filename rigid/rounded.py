@@ -1,5 +1,7 @@
 """Batches of rounded bodies: a convex core grown by a ball."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 

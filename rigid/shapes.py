@@ -5,6 +5,8 @@ thickness, a single point. Lengths may be in any unit; both sides of a query mus
 A batch has its own immutable copy of its arrays.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar

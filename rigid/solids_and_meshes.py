@@ -1,5 +1,7 @@
 """Queries of convex bodies with radii, and of meshes with convex bodies."""
 
+from __future__ import annotations
+
 from typing import Literal, cast, get_args, overload
 
 import numpy as np

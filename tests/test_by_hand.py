@@ -1,5 +1,6 @@
 """What one types by hand: completion, a residual, a figure, values that print in a line."""
 
+import inspect
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import tauguard
-from tauguard import contacts
+from tauguard import cloth, contacts, rigid
 from tauguard.detectors import make_detector, train
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import (
@@ -141,3 +142,14 @@ def test_a_plain_model_can_be_compared():
 def test_modules_of_envs_are_completed_and_load():
     assert {"controllers", "policies", "wrappers"} <= set(dir(tauguard.envs))
     assert tauguard.envs.wrappers.Reaction
+
+
+def test_results_of_collision_queries_print_as_shapes():
+    apart = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    solid = rigid.Tetrahedra([apart])
+    frame = cloth.MeshCCD([[0, 1, 2]]).find(apart[:3], apart[1:])
+    for value in (frame, frame.vf_impacts, rigid.distance(solid, solid)):
+        assert len(repr(value)) < 400
+        assert "array(" in repr(value)
+    assert "ArrayLike" in str(inspect.signature(rigid.Boxes))
+    assert len(str(inspect.signature(rigid.overlap))) < 200

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauguard.arrays import Array, Bools
+from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.detectors import _observer
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.monitor import Span, detect_with_faults
@@ -35,6 +35,8 @@ class LogDetection:
     faults: tuple[Span, ...] = ()  #: faults of the samples; no alarm starts during a fault
     fault_seconds: float = 0.0  #: duration of the faults [s]; collisions may be missed in them
     unwatched_seconds: float = 0.0
+
+    __repr__ = in_a_line
     """Time outside of faults in which the detector does not judge all joints [s]."""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.diagnosis.classification import Signs, signs
 from tauguard.detectors.diagnosis.contact_force import (
@@ -53,6 +53,8 @@ class Diagnosis:
     since: float  #: start of the observed window [s]; with ``at_tool`` shortly before the contact
     until: float  #: end of the observed window [s]
     joints: tuple[str, ...]  #: names of the joints
+
+    __repr__ = in_a_line
 
     @property
     def collision(self) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
@@ -157,6 +157,8 @@ class Estimate:
     """
     plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
+
+    __repr__ = in_a_line
 
 
 class Estimator:

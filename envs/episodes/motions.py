@@ -1,5 +1,7 @@
 """Smooth joint motions whose speed is given as a percentage of the largest speed."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 
