@@ -56,17 +56,6 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   store4(g.value[Group::scale], s);
 }
 
-// The differences of one query at one end of the step.
-struct Differences {
-  Double4 p, q, r;
-};
-template <bool vf, bool packed>
-TAUGUARD_INLINE Differences differences(const Ends& x, bool end, const std::int32_t* row) {
-  const Double4 a = point<packed>(x, end, row[0]), b = point<packed>(x, end, row[1]),
-                c = point<packed>(x, end, row[2]), d = point<packed>(x, end, row[3]);
-  if (vf) return {a - b, c - b, d - b};
-  return {c - a, b - a, d - c};
-}
 TAUGUARD_INLINE Vec3x4 transposed(Double4 a, Double4 b, Double4 c, Double4 d) {
   const Double4 ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
                 cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
@@ -77,25 +66,39 @@ TAUGUARD_INLINE Vec3x4 transposed(Double4 a, Double4 b, Double4 c, Double4 d) {
           __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
 }
 
+// The differences (query.hpp) of `width` queries at both ends of the step, one query per lane. They
+// are not stored between two stages: the positions stay in the cache, and are a third of the size.
+struct Differences {
+  Vec3x4 p[2], q[2], r[2];
+};
+// row(i): the vertices of query i.
+template <bool vf, bool packed, class Row>
+TAUGUARD_INLINE Differences differences(const Ends& x, const Row& row) {
+  Differences all;
+  for (int e = 0; e < 2; ++e) {
+    Double4 p[width], q[width], r[width];
+    for (int i = 0; i < width; ++i) {
+      const std::int32_t* v = row(i);
+      const Double4 a = point<packed>(x, e, v[0]), b = point<packed>(x, e, v[1]),
+                    c = point<packed>(x, e, v[2]), d = point<packed>(x, e, v[3]);
+      p[i] = vf ? a - b : c - a;
+      q[i] = vf ? c - b : b - a;
+      r[i] = vf ? d - b : d - c;
+    }
+    all.p[e] = transposed(p[0], p[1], p[2], p[3]);
+    all.q[e] = transposed(q[0], q[1], q[2], q[3]);
+    all.r[e] = transposed(r[0], r[1], r[2], r[3]);
+  }
+  return all;
+}
+
 template <bool vf, bool packed>
 TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Group* groups) {
   for (int first = 0; first < n; first += width, ++groups) {
     const auto row = [&](int i) { return rows + 4 * std::min(first + i, n - 1); };
     for (int i = 0; i < width; ++i) prefetch<packed>(x, row(i + ahead));
-    Vec3x4 p[2], q[2], r[2];
-    for (int e = 0; e < 2; ++e) {
-      Differences d[width];
-      for (int i = 0; i < width; ++i) {
-        d[i] = differences<vf, packed>(x, e, row(i));
-        store4(groups->of[i][e][Group::p], d[i].p);
-        store4(groups->of[i][e][Group::q], d[i].q);
-        store4(groups->of[i][e][Group::r], d[i].r);
-      }
-      p[e] = transposed(d[0].p, d[1].p, d[2].p, d[3].p);
-      q[e] = transposed(d[0].q, d[1].q, d[2].q, d[3].q);
-      r[e] = transposed(d[0].r, d[1].r, d[2].r, d[3].r);
-    }
-    finish(p, q, r, *groups);
+    const Differences of = differences<vf, packed>(x, row);
+    finish(of.p, of.q, of.r, *groups);
   }
 }
 
@@ -190,20 +193,17 @@ TAUGUARD_INLINE Cut cut(const Group* groups, std::int32_t* queries, int n, Piece
   return found;
 }
 
-// Pieces and the differences of their queries, one piece per lane.
+// Pieces, one per lane.
 struct Pieces {
-  Vec3x4 p[2], q[2], r[2];
-  Double4 start, length, root, cubic[4], error, big;
+  Double4 start, length, root, cubic[4], error, big, scale;
 };
 TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const double* roots, int n,
                                Pieces& out) {
   alignas(64) double own[10][width];
-  const double (*of[width])[Group::differences][4];
   for (int i = 0; i < width; ++i) {
     const Piece& piece = pieces[std::min(i, n - 1)];
     const Group& g = groups[piece.query / width];
     const int lane = piece.query % width;
-    of[i] = g.of[lane];
     own[0][i] = piece.start;
     own[1][i] = piece.length;
     for (int j = 0; j < 4; ++j) own[2 + j][i] = piece.cubic[j];
@@ -212,22 +212,13 @@ TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const d
     own[8][i] = g.value[Group::big][lane];
     own[9][i] = g.value[Group::scale][lane];
   }
-  const Double4 scale = load4(own[9]);
-  for (int e = 0; e < 2; ++e) {
-    const auto vector = [&](Group::Difference f) {
-      return scale * transposed(load4(of[0][e][f]), load4(of[1][e][f]), load4(of[2][e][f]),
-                                load4(of[3][e][f]));
-    };
-    out.p[e] = vector(Group::p);
-    out.q[e] = vector(Group::q);
-    out.r[e] = vector(Group::r);
-  }
   out.start = load4(own[0]);
   out.length = load4(own[1]);
   for (int j = 0; j < 4; ++j) out.cubic[j] = load4(own[2 + j]);
   out.root = load4(own[6]);
   out.error = load4(own[7]);
   out.big = load4(own[8]);
+  out.scale = load4(own[9]);
 }
 
 // The value of a cubic in Bernstein form.
@@ -288,9 +279,9 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
 // * Per unit of time g changes by at most 6 B, and q and r by 2 B. So a side changes by at most
 //   (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 per unit of time, which is 2^-23.6 B G^3 for d.
 // * Rounding adds less than 2^-38 B G^3. The bound is 2^-23 B G^3.
-template <bool vf>
-TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome,
-                              double* toi) {
+template <bool vf, bool packed>
+TAUGUARD_INLINE void at_roots(const Ends& x, const std::int32_t* rows, const Group* groups,
+                              const Piece* pieces, int n, double* toi) {
   find_roots(pieces, n, toi);
   for (int first = 0; first < n; first += width) {
     Pieces k;
@@ -302,8 +293,13 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
     const Mask4 bracket =
         ((f_lo > k.error) & (f_hi < -k.error)) | ((f_lo < -k.error) & (f_hi > k.error));
 
-    const Vec3x4 p = k.p[0] + t * (k.p[1] - k.p[0]), q = k.q[0] + t * (k.q[1] - k.q[0]),
-                 r = k.r[0] + t * (k.r[1] - k.r[0]), normal = cross(q, r);
+    const Differences of = differences<vf, packed>(
+        x, [&](int i) { return rows + 4 * pieces[std::min(first + i, n - 1)].query; });
+    const auto at_root = [&](const Vec3x4* ends) {
+      const Vec3x4 start = k.scale * ends[0];
+      return start + t * (k.scale * ends[1] - start);
+    };
+    const Vec3x4 p = at_root(of.p), q = at_root(of.q), r = at_root(of.r), normal = cross(q, r);
     const Double4 a = dot(cross(p, r), normal), b = dot(cross(q, p), normal),
                   nn = dot(normal, normal);
     Double4 extent = max(max(largest(p), largest(p - q)), largest(vf ? p - r : p + r));
@@ -311,15 +307,8 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
     if (!vf) extent = max(extent, largest(p + r - q));
     extent += 0x1p-30 * k.big;
     const Double4 margin = 0x1p-23 * k.big * (extent * extent * extent);
-    const unsigned inside = bits(bracket & (least > margin)),
-                   outside = bits(bracket & (least < -margin)), rooted = bits(bracket);
-    for (int i = 0; i < width && first + i < n; ++i) {
-      outcome[first + i] = inside >> i & 1    ? Outcome::contact
-                           : outside >> i & 1 ? Outcome::clear
-                           : rooted >> i & 1  ? Outcome::edge
-                                              : Outcome::unknown;
-      toi[first + i] = lo[i];
-    }
+    const Double4 found = least > margin ? lo : least < -margin ? splat(never) : splat(edge);
+    store4(toi + first, bracket ? found : splat(unknown));
   }
 }
 
@@ -336,6 +325,13 @@ TAUGUARD_INLINE void at_start(bool vf, const Ends& x, const std::int32_t* rows,
      : at_start<false, packed>(x, rows, queries, n, found);
 }
 
+template <bool packed>
+TAUGUARD_INLINE void at_roots(bool vf, const Ends& x, const std::int32_t* rows, const Group* groups,
+                              const Piece* pieces, int n, double* toi) {
+  vf ? at_roots<true, packed>(x, rows, groups, pieces, n, toi)
+     : at_roots<false, packed>(x, rows, groups, pieces, n, toi);
+}
+
 #define TAUGUARD_VARIANT(name, attributes)                                                         \
   attributes void gather_##name(bool vf, const Ends& x, const std::int32_t* rows, int n,           \
                                 Group* groups) {                                                   \
@@ -349,10 +345,10 @@ TAUGUARD_INLINE void at_start(bool vf, const Ends& x, const std::int32_t* rows,
   attributes Cut cut_##name(const Group* groups, std::int32_t* queries, int n, Piece* pieces) {    \
     return cut(groups, queries, n, pieces);                                                        \
   }                                                                                                \
-  attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n,        \
-                                  Outcome* outcome, double* toi) {                                 \
-    vf ? at_roots<true>(groups, pieces, n, outcome, toi)                                           \
-       : at_roots<false>(groups, pieces, n, outcome, toi);                                         \
+  attributes void at_roots_##name(bool vf, const Ends& x, const std::int32_t* rows,                \
+                                  const Group* groups, const Piece* pieces, int n, double* toi) {  \
+    x.in_lines() ? at_roots<true>(vf, x, rows, groups, pieces, n, toi)                             \
+                 : at_roots<false>(vf, x, rows, groups, pieces, n, toi);                           \
   }                                                                                                \
   attributes int not_apart_##name(bool vf, const Ends& x, const std::int32_t* rows, int n,         \
                                   std::int32_t* left) {                                            \

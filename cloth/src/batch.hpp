@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "ends.hpp"
 #include "start_contact.hpp"
@@ -14,12 +15,9 @@ using namespace geometry;  // lanes.hpp; argument-dependent lookup does not find
 
 inline constexpr int width = 4;
 
-// `width` queries. Their differences (query.hpp) are stored query by query, because they are read
-// only for the few queries with a root, one piece at a time.
+// `width` queries.
 struct Group {
   enum Field { cubic = 0, error = 4, big = 5, scale = 6, fields = 7 };
-  enum Difference { p, q, r, differences };
-  alignas(64) double of[width][2][differences][4];  // x, y, z and padding, at both ends
   // scale: a power of two that brings the largest difference into [1, 2); big: this scaled
   // difference. The cubic and its error are those of the scaled query.
   alignas(64) double value[fields][width];
@@ -35,9 +33,10 @@ struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-// edge: rounding leaves open whether the contact point is in the feature. unknown: rounding leaves
-// open whether there is a root.
-enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
+// What is known of a piece, or of a query, in place of a time of contact. `never`: no contact.
+// `edge`: rounding leaves open whether the contact point is in the feature. `unknown`: rounding
+// leaves open whether there is a root.
+inline constexpr double never = std::numeric_limits<double>::infinity(), edge = -1, unknown = -2;
 
 // The result of cutting the cubics of some queries once.
 struct Cut {
@@ -63,9 +62,10 @@ struct BatchKernels {
   // Cuts the cubics of n queries (indices into the groups) once. Queries that need more cuts are
   // moved to the front of `queries`.
   Cut (*cut)(const Group* groups, std::int32_t* queries, int n, Piece* pieces);
-  // For each piece: whether there is contact at its root, and a time at most 2^-32 before it.
-  void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,
-                   double* toi);
+  // For each piece: a time at most 2^-32 before the contact at its root, or `never`, `edge` or
+  // `unknown`. Writes toi up to a multiple of `width`.
+  void (*at_roots)(bool vf, const Ends& x, const std::int32_t* rows, const Group* groups,
+                   const Piece* pieces, int n, double* toi);
 };
 
 // The fastest kernels that this processor can run. Every variant gives the same bits.

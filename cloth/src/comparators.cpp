@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "batch.hpp"
 #include "query.hpp"
@@ -14,7 +13,6 @@ namespace tauguard::cloth {
 namespace {
 
 constexpr std::size_t block = 512;  // queries at a time
-constexpr double never = std::numeric_limits<double>::infinity();
 
 // Tolerance of the barycentric weights at a root, similar to the published codes.
 constexpr double inside_tolerance = 1e-10;
@@ -106,17 +104,14 @@ double first_root_inside(const Query& k, const Cubic& c, Comparator comparator, 
   return never;
 }
 
-Query query_of(const Group& g, int lane) {
-  const double scale = g.value[Group::scale][lane];
-  const auto vector = [&](int e, Group::Difference f) {
-    const double* x = g.of[lane][e][f];
-    return scale * Vec3{x[0], x[1], x[2]};
-  };
+template <bool vf>
+Query query_of(const Ends& x, const std::int32_t* row, double scale) {
   Query k{};
   for (int e = 0; e < 2; ++e) {
-    k.p[e] = vector(e, Group::p);
-    k.q[e] = vector(e, Group::q);
-    k.r[e] = vector(e, Group::r);
+    const Vec3 a = x(e, row[0]), b = x(e, row[1]), c = x(e, row[2]), d = x(e, row[3]);
+    k.p[e] = scale * (vf ? a - b : c - a);
+    k.q[e] = scale * (vf ? c - b : b - a);
+    k.r[e] = scale * (vf ? d - b : d - c);
   }
   return k;
 }
@@ -140,7 +135,9 @@ void compare(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator 
       if (filtered_out(whole, comparator)) {
         ++stats.cubic_sign;
       } else {
-        toi = first_root_inside(query_of(g, lane), whole, comparator, vf);
+        const double scale = g.value[Group::scale][lane];
+        const Query query = query_of<vf>(x, part + 4 * i, scale);
+        toi = first_root_inside(query, whole, comparator, vf);
         stats.roots += !(toi <= 1);
       }
       hit[first + i] = toi <= 1;

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "batch.hpp"
 #include "cuts.hpp"
@@ -27,7 +26,6 @@ namespace {
 
 constexpr int block = 512;  // number of queries that pass the axis filter together
 constexpr int batch = 128;  // number of queries that pass the later stages together
-constexpr double never = std::numeric_limits<double>::infinity();
 
 // The same cubic in all four lanes.
 Cubics cubics_of(const double* b) { return {{splat(b[0]), splat(b[1]), splat(b[2]), splat(b[3])}}; }
@@ -83,16 +81,14 @@ double resolve(const Ends& x, const std::int32_t* row, double distance, Stats& s
 struct Batch {
   Group groups[batch / width];
   Piece pieces[3 * batch];
-  Outcome outcome[3 * batch];
   double at[3 * batch];
   std::int32_t open[batch];
   AtStart start[batch];     // of the open queries
   int count = 0, left = 0;  // number of pieces; number of undecided queries
 };
 
-// Writes the pieces of all queries that may have contact. Returns how many have one piece; they
-// come first.
-int make_pieces(Batch& b, int n, Stats& stats) {
+// Writes the pieces of all queries that may have contact, sorted by time within a query.
+void make_pieces(Batch& b, int n, Stats& stats) {
   std::uint8_t rest[batch / width];
   const int groups = (n + width - 1) / width;
   for (int g = 0; g < groups; ++g) {
@@ -109,7 +105,6 @@ int make_pieces(Batch& b, int n, Stats& stats) {
       piece.query = g * width + lane;
     }
   }
-  const int single = b.count;
   std::int32_t several[batch];
   int count = 0;
   for (int g = 0; g < groups; ++g)
@@ -131,7 +126,6 @@ int make_pieces(Batch& b, int n, Stats& stats) {
     if (found == 0) ++stats.cubic_sign;
     b.count += std::max(found, 0);
   }
-  return single;
 }
 
 // Whether the cubic may be zero at the start, given its rounding error.
@@ -165,30 +159,20 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
   b.count = b.left = 0;
   kernels.gather(vf, x, rows, n, b.groups);
   std::fill(toi, toi + n, never);
-  const int single = make_pieces(b, n, stats);
-  kernels.at_roots(vf, b.groups, b.pieces, b.count, b.outcome, b.at);
-  for (int i = 0; i < single; ++i) {
-    toi[b.pieces[i].query] = b.outcome[i] == Outcome::contact ? b.at[i] : never;
-    stats.roots += b.outcome[i] == Outcome::clear;
-    if (b.outcome[i] == Outcome::edge)
-      toi[b.pieces[i].query] = exactly<vf>(x, rows + 4 * b.pieces[i].query, stats);
-    if (b.outcome[i] == Outcome::unknown) b.open[b.left++] = b.pieces[i].query;
+  make_pieces(b, n, stats);
+  kernels.at_roots(vf, x, rows, b.groups, b.pieces, b.count, b.at);
+  // The first piece of a query that is not clear decides. Few branches: they would be mispredicted.
+  for (int i = b.count - 1; i >= 0; --i) {
+    double& time = toi[b.pieces[i].query];
+    time = b.at[i] == never ? time : b.at[i];
   }
-  for (int i = single; i < b.count;) {
+  for (int i = 0; i < b.count; ++i) {
     const std::int32_t query = b.pieces[i].query;
-    int first = i;  // the first piece that is not clear
-    while (first < b.count && b.pieces[first].query == query && b.outcome[first] == Outcome::clear)
-      ++first;
-    if (first == b.count || b.pieces[first].query != query) {
-      ++stats.roots;
-    } else if (b.outcome[first] == Outcome::contact) {
-      toi[query] = b.at[first];
-    } else if (b.outcome[first] == Outcome::edge) {
-      toi[query] = exactly<vf>(x, rows + 4 * query, stats);
-    } else {
-      b.open[b.left++] = query;
-    }
-    while (i < b.count && b.pieces[i].query == query) ++i;
+    const bool first = i == 0 || b.pieces[i - 1].query != query;
+    stats.roots += first & (toi[query] == never);
+    if (toi[query] >= 0) continue;
+    if (first && toi[query] == unknown) b.open[b.left++] = query;
+    if (toi[query] == edge) toi[query] = exactly<vf>(x, rows + 4 * query, stats);
   }
   kernels.at_start(vf, x, rows, b.open, b.left, b.start);
   for (int i = 0; i < b.left; ++i) {
@@ -254,11 +238,12 @@ void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method
     } else {
       one_by_one<vf>(x, part, count, method, distance, toi, stats);
     }
-    for (int i = 0; i < count; ++i) {
-      hit[first + i] = toi[i] <= 1;
+    for (int i = 0; i < count; ++i) hit[first + i] = toi[i] <= 1;
+    if (!out.point) std::copy_n(toi, count, out.toi + first);
+    for (int i = 0; out.point && i < count; ++i) {
       if (!hit[first + i]) continue;
       out.toi[first + i] = toi[i];
-      if (out.point) describe<vf>(x, part + 4 * i, toi[i], out, first + i);
+      describe<vf>(x, part + 4 * i, toi[i], out, first + i);
     }
   }
 }
