@@ -20,12 +20,13 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, const std::int32_t*
     for (Mask hits = found.lanes_of[i]; hits; hits &= hits - 1) {
       const int lane = __builtin_ctz(hits);
       const std::int32_t id_b = ids_b[lane];
-      const bool swap = arity_a == arity_b && id_a > id_b;
-      const int at_a = swap ? arity_b : 0, at_b = swap ? 0 : arity_a;
+      // Computed, not chosen: half of the branches would be mispredicted.
+      const int swap = (arity_a == arity_b) & (id_a > id_b), at_a = arity_b * swap,
+                at_b = arity_a * (1 - swap);
       for (int k = 0; k < arity_b; ++k) row[at_b + k] = vb[k * lanes + lane];
       for (int j = 0; j < arity_a; ++j) row[at_a + j] = a[j];
-      pair[0] = swap ? id_b : id_a;
-      pair[1] = swap ? id_a : id_b;
+      pair[swap] = id_a;
+      pair[1 - swap] = id_b;
       bool meet = true;
       if (some) {  // the pair is written already; keep it only if the features may meet
         meet = !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
