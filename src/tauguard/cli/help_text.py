@@ -3,12 +3,16 @@
 import inspect
 import re
 from collections.abc import Callable, Iterable
-from typing import Annotated, Any, get_type_hints
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
 
 #: An argument of a docstring: its name, and its text with continuation lines.
 ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
+
+#: What a flag without a default takes, by type; tyro shows None as a choice.
+METAVARS: dict[Any, str] = {str: "STR", Path: "PATH", int: "INT", float: "FLOAT"}
 
 
 def tidy(command: Callable[..., Any]) -> None:
@@ -23,7 +27,12 @@ def tidy(command: Callable[..., Any]) -> None:
         if not text:
             continue
         said = parameter.default in (None, ()) or "(default:" in text
-        shown = tyro.conf.arg(help=text, help_behavior_hint="" if said else None)
+        kinds = [kind for kind in get_args(hints[name]) if kind is not type(None)]
+        shown = tyro.conf.arg(
+            help=text,
+            help_behavior_hint="" if said else None,
+            metavar=METAVARS.get(kinds[0]) if parameter.default is None else None,
+        )
         hints[name] = Annotated[hints[name], shown]
     command.__annotations__ = hints
 
