@@ -154,10 +154,13 @@ def _entries(
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     places: list[Array] = []
     outs: list[Array] = []
-    for direction in _directions(rng, TRIES * wanted):
+    directions = _directions(rng, TRIES * wanted)
+    for number, direction in enumerate(directions):
         if len(places) == wanted:
             break
-        across = np.linalg.svd(direction[None])[2][1:]
+        if number % wanted == 0:
+            bases = np.linalg.svd(directions[number : number + wanted, None])[2]
+        across = bases[number % wanted, 1:]
         offset = radius * np.sqrt(rng.random()) * np.exp(2j * np.pi * rng.random())
         start = centre - 2 * radius * direction + np.array([offset.real, offset.imag]) @ across
         geom, normal = np.full(1, -1, dtype=np.int32), np.zeros(3)

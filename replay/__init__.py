@@ -1,11 +1,17 @@
 """Playback of traces in rerun."""
 
 import os
+from typing import TYPE_CHECKING
+
+from tauguard.lazy import on_demand
+from tauguard.replay.plot import plot
+
+if TYPE_CHECKING:
+    from tauguard.replay.rrd import write_rrd
 
 # Rerun reports its use to its makers by default; set the variable to 1 to allow that.
 os.environ.setdefault("RERUN_ANALYTICS", "0")
 
-from tauguard.replay.plot import plot
-from tauguard.replay.rrd import write_rrd
+__getattr__ = on_demand(__name__)
 
 __all__ = ["plot", "write_rrd"]

@@ -8,7 +8,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.replay.robot import bodies, sheets
@@ -58,6 +57,8 @@ def write_contacts_rrd(
         ValueError: an empty run, or arrays that do not fit the model.
         OSError: the folder cannot be written.
     """
+    from scipy.spatial.transform import Rotation
+
     path = Path(path)
     shapes = {
         "positions": (positions, (len(t), model.nbody, 3)),

@@ -6,9 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.models.cloth import flex_elements
@@ -97,6 +95,7 @@ def bodies(model: Any) -> list[Body]:
 def drawn(model: Any, geom: int) -> Any:
     """A geom as a rerun archetype; None if it is hidden, a plane or a height field."""
     import mujoco
+    import rerun as rr
 
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
     material = int(model.geom_matid[geom])
@@ -124,6 +123,8 @@ def drawn(model: Any, geom: int) -> Any:
 
 def capsule(center: Array, quat_wxyz: Array, radius: float, half: float, colour: Any) -> Any:
     """A capsule as a rerun archetype, which begins at its origin and extends along z."""
+    import rerun as rr  # here, so that a video, which needs none, does not load it
+
     start = center - matrix(quat_wxyz) @ np.array([0.0, 0.0, half])
     return rr.Capsules3D(
         lengths=[2 * half],
@@ -137,6 +138,8 @@ def capsule(center: Array, quat_wxyz: Array, radius: float, half: float, colour:
 
 def mesh(model: Any, number: int, center: Array, rotation: Array, colour: Any) -> Any:
     """A mesh as a rerun archetype; each triangle has its own vertices, with its normals."""
+    import rerun as rr
+
     vertex, face = int(model.mesh_vertadr[number]), int(model.mesh_faceadr[number])
     corners = slice(face, face + int(model.mesh_facenum[number]))
     points = model.mesh_vert[vertex : vertex + int(model.mesh_vertnum[number])]
@@ -153,7 +156,11 @@ def mesh(model: Any, number: int, center: Array, rotation: Array, colour: Any) -
 
 def matrix(quat_wxyz: Array) -> Array:
     """Rotation matrix of a unit quaternion, shape (3, 3)."""
-    return np.asarray(Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix(), np.float64)
+    import mujoco
+
+    found = np.empty(9)
+    mujoco.mju_quat2Mat(found, quat_wxyz)
+    return found.reshape(3, 3)
 
 
 def sticks(model: Any, index: int) -> list[Any]:

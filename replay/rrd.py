@@ -13,7 +13,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.replay.estimates import arrow, arrows, during
@@ -172,6 +171,8 @@ def log_scene(
             )
     if truth is None:
         return
+    if names:
+        from scipy.spatial.transform import Rotation
     for number, name in enumerate(names):
         if not any(body.name == name and body.shapes for body in shown):
             ball = rr.Ellipsoids3D(radii=[0.05], colors=[GREY], fill_mode="solid")

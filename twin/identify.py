@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel
@@ -93,7 +93,7 @@ def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
     count = len(others)
     if count < 2:
         return twin
-    wide, intervals = float(student.ppf(0.975, count - 1)), {}
+    wide, intervals = float(stdtrit(count - 1, 0.975)), {}
     for name in NUMBERS:
         values = np.array([other.number(name) for other in others])
         deviation = np.sqrt((count - 1) * values.var(axis=0))

@@ -112,14 +112,14 @@ def cross_validate(
 
 def standing_out(logs: Sequence[CrossValidatedLog]) -> list[CrossValidatedLog]:
     """The logs whose rate of alarms is far above that of all other logs, least likely first."""
-    from scipy.stats import binom
+    from scipy.special import bdtrc  # scipy.stats loads for seconds
 
     count = sum(len(log.alarms) for log in logs)
     seconds = sum(log.seconds for log in logs)
     if len(logs) < 2:
         return []
     chance = {
-        log.name: float(binom.sf(len(log.alarms) - 1, count, log.seconds / seconds)) * len(logs)
+        log.name: float(bdtrc(len(log.alarms) - 1, count, log.seconds / seconds)) * len(logs)
         for log in logs
     }
     odd = [log for log in logs if chance[log.name] < CHANCE]
