@@ -303,7 +303,7 @@ def cura6_drive(name: str = "cura6") -> Drive:
     """
     coulomb = np.array([12.5, 13.3, 5.0, 2.0, 2.7, 2.3])
     gain = np.array([10.0, 10.7, 8.5, 9.0, 9.5, 10.1])
-    scale = cura6.SIZES[name].drive if name in cura6.SIZES else 1.0
+    scale = cura6.SIZES[name][0]
     coulomb, gain = scale * coulomb, scale * gain
     size = np.array([1.0, 1.0, 0.7, 0.25, 0.25, 0.25])
     return Drive(
