@@ -32,6 +32,8 @@ FUNCTIONS = (
     "mj_mulM",
     "mj_mulJacVec",
     "mj_jacBodyCom",
+    "mj_jac",
+    "mj_solveM",
     "mj_integratePos",
     "_mjPRIVATE_setTlsLogHandler",  # as in the Python binding: errors become exceptions
     "_mjPRIVATE_getGlobalLogHandler",
@@ -56,10 +58,11 @@ _MODEL_ARRAYS = (
     *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("solimp", "friction")),
     *("geom_priority", "flex_priority", "pair_geom1", "pair_geom2"),
     *("flex_vertbodyid", "flex_vert", "geom_bodyid", "body_rootid", "body_mocapid"),
+    *("body_dofnum", "body_weldid"),
 )
 _DATA_ARRAYS = (
     *("qpos", "qvel", "energy", "qfrc_actuator", "qfrc_applied", "xfrc_applied"),
-    *("xpos", "xmat", "flexvert_xpos", "mocap_pos", "mocap_quat"),
+    *("xpos", "xmat", "xipos", "flexvert_xpos", "mocap_pos", "mocap_quat"),
 )
 _END_ARRAYS = ("qvel", "energy", "xpos", "xmat", "flexvert_xpos", "cvel")
 _OTHER_ARRAYS = ("energy", "xpos", "xmat", "flexvert_xpos", "mocap_pos", "mocap_quat")

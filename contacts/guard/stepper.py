@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any
@@ -23,11 +22,9 @@ from tauguard.contacts.guard.followed_fields import (
     refuse_values,
     structure,
 )
-from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents
-from tauguard.models.cloth import flex_elements
 from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
 #: Settings of the native part; "held" pairs are those whose approach the solver stops.
@@ -55,8 +52,9 @@ class GuardedStepper:
     2. Otherwise the state is rolled back, and the pair is made stiff until it separates. The step
        is taken in sub-steps: one up to the touch, and others in which the solver stops the
        approach. A sub-step that still fails is halved.
-    3. If this does not help, the partners move rigidly together
-       (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`).
+    3. If this does not help, the partners move rigidly together in the sub-step: the velocity
+       changes by as little as possible, in the metric of the inertia (rigid impact zones: Provot
+       1997; Bridson, Fedkiw and Anderson 2002). If even then some pass through, all stand still.
 
     Between two steps everything in ``model`` and ``data`` may be changed; :meth:`step` uses the
     change or refuses it. The path on which an edit moves a geom is not checked. After an error of
@@ -119,7 +117,6 @@ class GuardedStepper:
             self._guard.sheet(sheet)
         self._guard.spins(_turning(model))
         self._guard.pulled(pulled(model))
-        self._elements = [flex_elements(model, flex) for flex in range(model.nflex)]
         self._tunnelling = None
         if covered.sheets:
             first = len(covered.pairs) - len(covered.sheets)
@@ -279,29 +276,6 @@ class GuardedStepper:
     def _tunnelling_events(self, x_t1: Array) -> list[tuple[int, list[int], float]]:
         assert self._tunnelling is not None
         return self._tunnelling.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
-
-    def _impact_zone(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
-        """Join the partners of ``rows`` in an impact zone; ``qpos`` is an address.
-
-        Returns the pairs that were joined, and the work of mocap bodies on them [J].
-        """
-        size = ctypes.c_double * self.model.nq
-        start = np.array(size.from_address(qpos))
-
-        def judge() -> list[Hit]:
-            return [self._hit(row) for row in self._guard.passing()]
-
-        hits = [self._hit(row) for row in rows]
-        stopped, work = impact_zone(self.model, self.data, start, length, hits, judge)
-        pairs = dict.fromkeys(hit.pair for hit in stopped)
-        return [self._pairs.index(pair) for pair in pairs], work
-
-    def _hit(self, row: tuple[int, bool, list[int], list[int]]) -> Hit:
-        number, _, features, corners = row
-        pair = self._pairs[number]
-        if not corners and pair[0][0] == "flex":
-            corners = np.unique(self._elements[pair[0][1]][features]).tolist()
-        return Hit(pair, np.array(corners, dtype=np.int32))
 
 
 def _turning(model: Any) -> NDArray[np.int32]:

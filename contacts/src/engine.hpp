@@ -38,6 +38,8 @@ struct Engine {
   Call<const void*, const void*, void*, int> copy_state;
   Call<const void*, const void*, double*, const double*> mul_m, mul_jac;
   Call<const void*, const void*, double*, double*, int> jac_com;
+  Call<const void*, const void*, double*, double*, const double*, int> jac;
+  Call<const void*, void*, double*, const double*, int> solve_m;
   Call<const void*, double*, const double*, double> integrate;
 
   int nq, nv, nbody, nmocap, ngeom, npair, nflex, nflexvert, ntendon;
@@ -54,12 +56,13 @@ struct Engine {
   int* priority[3];
   const int *pair_geom1, *pair_geom2;
   const int *flex_vertbodyid, *geom_bodyid, *body_rootid, *body_mocapid;
+  const int *body_dofnum, *body_weldid;
   const double* flex_vert;
 
   // Fields of `data`.
   double *time, *qpos, *qvel, *energy, *mocap_pos, *mocap_quat;
   const double *actuator, *applied, *wrench;
-  const double *xpos, *xmat, *flexvert;
+  const double *xpos, *xmat, *xipos, *flexvert;
   const int *ncon, *nefc;
   char* const* contacts;
   std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_row, at_pos, at_frame;

@@ -46,7 +46,8 @@ void set_functions(const Addresses& a, Engine* e) {
   a.set("mj_getState", &e->get_state), a.set("mj_setState", &e->set_state);
   a.set("mj_copyState", &e->copy_state), a.set("mj_mulM", &e->mul_m);
   a.set("mj_mulJacVec", &e->mul_jac);
-  a.set("mj_jacBodyCom", &e->jac_com), a.set("mj_integratePos", &e->integrate);
+  a.set("mj_jacBodyCom", &e->jac_com), a.set("mj_jac", &e->jac), a.set("mj_solveM", &e->solve_m);
+  a.set("mj_integratePos", &e->integrate);
   a.set("_mjPRIVATE_setTlsLogHandler", &e->logging.set);
   a.set("_mjPRIVATE_getGlobalLogHandler", &e->logging.global);
   a.set("log_error", &e->logging.error), a.set("at_subject", &e->logging.at_subject);
@@ -73,6 +74,7 @@ void set_model(const Addresses& a, Engine* e) {
   a.set("pair_geom1", &e->pair_geom1), a.set("pair_geom2", &e->pair_geom2);
   a.set("flex_vertbodyid", &e->flex_vertbodyid), a.set("flex_vert", &e->flex_vert);
   a.set("geom_bodyid", &e->geom_bodyid), a.set("body_rootid", &e->body_rootid);
+  a.set("body_dofnum", &e->body_dofnum), a.set("body_weldid", &e->body_weldid);
   a.set("body_mocapid", &e->body_mocapid), a.set("nmocap", &e->nmocap);
   a.set("nq", &e->nq), a.set("nv", &e->nv), a.set("nbody", &e->nbody);
   a.set("ngeom", &e->ngeom), a.set("npair", &e->npair), a.set("nflex", &e->nflex);
@@ -92,6 +94,7 @@ void set_data(const Addresses& a, Engine* e) {
   a.set("reset_qpos", &e->resets[0]), a.set("reset_qvel", &e->resets[1]);
   a.set("reset_qacc", &e->resets[2]);
   a.set("xfrc_applied", &e->wrench), a.set("xpos", &e->xpos), a.set("xmat", &e->xmat);
+  a.set("xipos", &e->xipos);
   a.set("flexvert_xpos", &e->flexvert), a.set("ncon", &e->ncon), a.set("nefc", &e->nefc);
   a.set("contact", &e->contacts), a.set("contact_size", &e->contact_size);
   a.set("at_dist", &e->at_dist), a.set("at_dim", &e->at_dim), a.set("at_geom", &e->at_geom);
@@ -119,18 +122,6 @@ Engine engine_of(const nb::dict& values) {
 
 nb::object array_of(const std::vector<double>& values) {
   return nb::cast(owned(std::vector<double>(values), std::array<std::size_t, 1>{values.size()}));
-}
-
-// Converts hits to rows: pair, passed, deepest simplices of a flex, crossed vertices of flexes.
-nb::list rows_of(const std::vector<PairHit>& hits) {
-  nb::list out;
-  for (const PairHit& hit : hits) {
-    nb::list features, corners;
-    for (const auto f : hit.features) features.append(f);
-    for (const auto c : hit.corners) corners.append(c);
-    out.append(nb::make_tuple(hit.pair, hit.passed, features, corners));
-  }
-  return out;
 }
 
 class Guard {
@@ -195,8 +186,7 @@ class Guard {
     clear();
     Stepper::TunnellingEvents find;
     if (sheets) find = [this](std::vector<PairHit>* hits) { add_tunnelling(hits); };
-    stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,
-                                         double length) { return joined(hits, qpos, length); });
+    stepper_->set_tunnelling(std::move(find));
   }
 
   // One step. Returns the number of contacts, or -1 if there is more to report. `owner` owns this
@@ -261,13 +251,6 @@ class Guard {
                           r.rolled_back ? array_of(stepper_->first()) : nb::none());
   }
 
-  // The pairs whose partners pass through each other from the start to the data's present state.
-  nb::typed<nb::list, nb::any> passing() {
-    std::vector<PairHit> through;
-    for (PairHit& hit : stepper_->judge())
-      if (hit.passed) through.push_back(std::move(hit));
-    return rows_of(through);
-  }
   Integers stiffened() const { return listed(&Stepper::stiffened); }
   Integers sunk() const { return listed(&Stepper::sunk); }
   Integers listed(std::vector<int> (Stepper::*ask)() const) const {
@@ -330,16 +313,6 @@ class Guard {
       hits->push_back(std::move(hit));
     }
   }
-  // The pairs that owner._impact_zone(rows, qpos, length) joined, and the work of mocap bodies.
-  Stepper::Stopped joined(const std::vector<PairHit>& hits, const double* qpos, double length) {
-    const nb::gil_scoped_acquire acquire;
-    Stepper::Stopped out{};
-    const auto from = reinterpret_cast<std::uintptr_t>(qpos);
-    const nb::object found = owner_.attr("_impact_zone")(rows_of(hits), from, length);
-    for (const nb::handle pair : found[0]) out.pairs.push_back(nb::cast<int>(pair));
-    out.work = nb::cast<double>(found[1]);
-    return out;
-  }
 
   Engine engine_;
   FollowedModel model_;
@@ -382,7 +355,6 @@ void bind_guard(nb::module_& m) {
       .def("start", &Guard::start, "sheets"_a)
       .def("step", &Guard::step, "owner"_a, "each"_a.none())
       .def("report", &Guard::report)
-      .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
       .def("sunk", &Guard::sunk)
       .def("follow", &Guard::follow, "fields"_a, "numbers"_a)

@@ -125,9 +125,7 @@ void Mocap::sub_step(double from, double to) {
 void Mocap::add_turns(double* turn) const {
   if (!moves_) return;
   for (int b = 1; b < e_.nbody; ++b) {
-    const int m = e_.body_mocapid[e_.body_rootid[b]];
-    if (m < 0) continue;
-    const Vec3 own = turn_between(from_[m].quat, to_[m].quat);
+    const Vec3 own = this->turn(b);
     for (int k = 0; k < 3; ++k) turn[3 * b + k] += own[k];
   }
 }
@@ -140,17 +138,19 @@ bool Mocap::shifted() {
   return true;
 }
 
-// The displacement of a point that moves with the mocap body to which `body` is attached. The point
-// is given in the present kinematics of the data, which are those of the start of a sub-step or of
-// the end of a whole step.
 Vec3 Mocap::way(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
-  if (m < 0) return {};
+  if (m < 0 || !moves_) return {};
   const Pose &from = from_[m], &to = to_[m], &at = jumps_ ? to : from;
   Vec3 arm, shift;
   for (int k = 0; k < 3; ++k) arm[k] = point[k] - at.pos[k], shift[k] = to.pos[k] - from.pos[k];
-  const Vec3 turn = turn_between(from.quat, to.quat);
-  return jumps_ ? shift + arm - turned(-1.0 * turn, arm) : shift + turned(turn, arm) - arm;
+  const Vec3 own = turn(body);
+  return jumps_ ? shift + arm - turned(-1.0 * own, arm) : shift + turned(own, arm) - arm;
+}
+
+Vec3 Mocap::turn(int body) const {
+  const int m = e_.body_mocapid[e_.body_rootid[body]];
+  return m < 0 || !moves_ ? Vec3{} : turn_between(from_[m].quat, to_[m].quat);
 }
 
 bool Mocap::carries(const Partners& pair) const {

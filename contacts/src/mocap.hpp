@@ -58,6 +58,11 @@ class Mocap {
   bool carries(const Partners& pair) const;
   // The distance by which mocap bodies separate the partners along the contact's normal [m].
   double parting(const Contact& contact) const;
+  // The displacement of a point that moves with the mocap body to which `body` is attached, and the
+  // rotation vector of this body [rad]. The point is given in the present kinematics of the data,
+  // which are those of the start of a sub-step or of the end of a whole step.
+  Vec3 way(int body, const double* point) const;
+  Vec3 turn(int body) const;
   // Work of mocap bodies on all others, by contacts and equality constraints [J]. `velocity` is the
   // mean velocity of the sub-step.
   double work(const double* velocity, double length);
@@ -72,7 +77,6 @@ class Mocap {
   void read(Poses* poses) const;
   void write(const Poses& poses);
   void stand(const Poses& poses);
-  Vec3 way(int body, const double* point) const;
 
   const Engine& e_;
   std::vector<char> pulled_;

@@ -13,6 +13,9 @@ constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 // length of the shortest sub-step by `longer`, up to the fraction `longest` of a step.
 constexpr double longer = 4, longest = 0.25;
 
+// Largest number of attempts to find all pairs of an impact zone.
+constexpr int rounds = 8;
+
 }  // namespace
 
 // `fresh` starts a new energy budget.
@@ -121,17 +124,14 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     change.gain -= work;
   };
   if (!through.empty()) {
-    const Stopped stopped = impact_zone_(through, qpos_.data(), length);
-    for (const int pair : stopped.pairs) in_zone_[pair] = 1;
-    work = stopped.work;
+    work = join(through, length);
     ++stops_, least_ = std::min(longer * least_, longest);
     again();
   }
   const std::vector<double> whole(e_.qvel, e_.qvel + e_.nv);
   const auto go = [&](double share) {
     for (int i = 0; i < e_.nv; ++i) e_.qvel[i] = share * whole[i];
-    std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
-    e_.integrate(e_.model, e_.qpos, e_.qvel, length);
+    move(length);
   };
   for (const double share : slower) {
     if (!budget_.exceeded(change)) break;
@@ -145,6 +145,42 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
   // speed again: too much energy is the smaller error.
   if (passes()) go(1), note_passed(), again();
   return change;
+}
+
+// Repeats the sub-step with the present velocity.
+void Stepper::move(double length) {
+  std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
+  e_.integrate(e_.model, e_.qpos, e_.qvel, length);
+}
+
+// Repeats a sub-step so that no partners pass through each other: the pairs in `through`, and those
+// that pass through on the new path, move rigidly together. If this does not help, all except mocap
+// bodies stand still. Returns the work of mocap bodies [J].
+double Stepper::join(const std::vector<PairHit>& through, double length) {
+  ImpactZone zone(e_, mocap_, length);
+  const auto add = [&](const std::vector<PairHit>& hits) {
+    bool fresh = false, passes = false;
+    for (const PairHit& hit : hits) {
+      if (!hit.passed) continue;
+      passes = true, in_zone_[hit.pair] = 1;
+      const bool simplices = !hit.features.empty() && hit.features[0] >= 0;
+      fresh |= zone.add(hit.pair, pairs_[hit.pair],
+                        simplices ? verdict_.vertices(hit.pair, hit.features) : hit.corners);
+    }
+    return std::pair(passes, fresh);
+  };
+  bool fresh = add(through).second;
+  for (int round = 0; round < rounds && fresh; ++round) {
+    double work = 0;
+    if (!zone.join(&work)) break;
+    move(length);
+    const auto [passes, more] = add(judge());
+    if (!passes) return work;
+    fresh = more;
+  }
+  std::fill(e_.qvel, e_.qvel + e_.nv, 0.0);
+  std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
+  return 0;
 }
 
 // Marks the pairs that pass through between the start and the present state.

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "energy_budget.hpp"
+#include "impact_zone.hpp"
 #include "rows.hpp"
 #include "verdict.hpp"
 
@@ -56,13 +57,6 @@ class Stepper {
  public:
   // Appends the pairs of flexes that cross in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
-  // Result of ImpactZone(hits, qpos, length), which repeats a sub-step of `length` [s] from `qpos`
-  // and joins the pairs of the hits to impact zones. `pairs`: all pairs in these zones.
-  struct Stopped {
-    std::vector<int> pairs;
-    double work;  // work of mocap bodies [J]
-  };
-  using ImpactZone = std::function<Stopped(const std::vector<PairHit>&, const double*, double)>;
 
   Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
           std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
@@ -71,13 +65,10 @@ class Stepper {
   const Report& report() const { return report_; }
   const std::vector<double>& first() const { return first_; }
   const std::vector<double>& vertices() const { return x_t1_; }
-  void set_callbacks(TunnellingEvents tunnelling, ImpactZone impact_zone) {
-    tunnelling_ = std::move(tunnelling), impact_zone_ = std::move(impact_zone);
-  }
+  void set_tunnelling(TunnellingEvents tunnelling) { tunnelling_ = std::move(tunnelling); }
   // Advances by one timestep; `each` is called after every sub-step. Returns true if the number of
   // contacts is all that the report contains.
   bool step(const std::function<void()>& each);
-  std::vector<PairHit> judge();
   std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
   // Restores every contact parameter.
   void close();
@@ -100,11 +91,14 @@ class Stepper {
 
  private:
   bool stands();
+  std::vector<PairHit> judge();
   bool finite() const;
   void number_pairs();
   void roll_back(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each);
   double sub_step(double length, const std::function<void()>& each);
   EnergyChange last_resort(double length, const std::vector<PairHit>& hits, EnergyChange change);
+  double join(const std::vector<PairHit>& through, double length);
+  void move(double length);
   double shorter(const std::vector<PairHit>& hits, double length);
   bool bearable(const std::vector<PairHit>& hits, double length) const;
   void note_lost(const std::vector<PairHit>& hits);
@@ -129,7 +123,6 @@ class Stepper {
   Stiffening stiffening_;
   Rows rows_;
   TunnellingEvents tunnelling_;
-  ImpactZone impact_zone_;
   std::unordered_map<std::uint64_t, int> number_;  // the number of a pair, by its partners
   std::vector<int> spins_;                         // rotational degrees of freedom
 

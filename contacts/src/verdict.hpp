@@ -11,6 +11,8 @@
 // the pair is not tested.
 #pragma once
 
+#include <set>
+
 #include "sweep.hpp"
 
 namespace tauguard::contacts {
@@ -42,6 +44,14 @@ class Verdict {
   void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
   std::size_t rigid_pairs() const { return pairs_.size(); }
+  // The vertices of some simplices of a pair with a flex, without repetition.
+  std::vector<std::int32_t> vertices(int pair, const std::vector<std::int32_t>& features) const {
+    const FlexPair& own = flex_pairs_[pair - pairs_.size()];
+    std::set<std::int32_t> out;
+    for (const std::int32_t f : features)
+      for (int i = 0; i < own.corners; ++i) out.insert(own.elements[own.corners * f + i]);
+    return {out.begin(), out.end()};
+  }
   // The memory of a pair from earlier steps: one entry, or one for each simplex.
   std::vector<char> known(std::size_t pair) const;
   // Sets the memory of a pair. Ignored if the number of entries differs.
