@@ -166,6 +166,8 @@ class Aim:
         quick = size >= (CLAMP_SPEED if plan.kind == "clamp" else 0.0)
         pushes /= np.where(size > 0, size, 1.0)[:, None]
         points, hit = self._hits(path.body, inside, pushes, quick)
+        if not hit.any():
+            return None
         if plan.kind == "clamp":
             hit &= self._stops_soon(plan, path, number, points, pushes)
         for taken in np.flatnonzero(hit):

@@ -67,16 +67,19 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
         return tau
     pushed = (wrenches.force != 0).any(axis=2) | (wrenches.torque != 0).any(axis=2)
     anchor, axis = poses.joints(q[touched])
+    sliding = np.array(poses.sliding)
     for link, moving in enumerate(poses.moving):
         here = np.flatnonzero(pushed[touched, link])
-        rows = touched[here]
-        force, torque = wrenches.force[rows, link], wrenches.torque[rows, link]
-        point = wrenches.point[rows, link]
-        for joint in moving:
-            along, arm = axis[here, joint], point - anchor[here, joint]
-            turned = torque + cross(arm, force)
-            work = force if poses.sliding[joint] else turned
-            tau[rows, joint] += np.einsum("ij,ij->i", along, work)
+        if not len(here):
+            continue
+        at = np.ix_(touched[here], moving)
+        force, torque, point = (
+            w[at[0], link] for w in (wrenches.force, wrenches.torque, wrenches.point)
+        )
+        along = axis[np.ix_(here, moving)]
+        turned = torque + cross(point - anchor[np.ix_(here, moving)], force)
+        work = np.where(sliding[moving][:, None], force, turned)
+        tau[at] += np.einsum("tij,tij->ti", along, work)
     return tau
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import mujoco
 import numpy as np
@@ -86,15 +86,27 @@ class SimulationLoop:
         mujoco.mj_setState(self.model, self.data, saved[0], mujoco.mjtState.mjSTATE_INTEGRATION)
         self._plant.restore(saved[1].tolist())
 
+    def take(self, other: SimulationLoop) -> None:
+        """Continue from the state of the arm and its drive in ``other``, a loop of the same arm."""
+        own, theirs = self.scene, other.scene
+        self.data.time = other.data.time
+        self.data.qpos[own.qpos_adr] = other.data.qpos[theirs.qpos_adr]
+        self.data.qvel[own.dof_adr] = other.data.qvel[theirs.dof_adr]
+        self.data.qacc_warmstart[own.dof_adr] = other.data.qacc_warmstart[theirs.dof_adr]
+        self._plant.restore(other._plant.state())
+
     def room_for(self, rows: int) -> Rollout:
-        """A rollout with allocated arrays of ``rows`` rows."""
+        """A rollout of ``rows`` rows without contact; obstacles are where they are now."""
         joints, links = len(self.scene.joint_names), self._sensors[1] // SENSOR_WIDTH
+        poses = np.empty((rows, len(self._obstacles), 7))
+        poses[..., :3] = self.data.xpos[self._obstacles]
+        poses[..., 3:] = self.data.xquat[self._obstacles]
         return Rollout(
             q=np.empty((rows, joints)),
             qd=np.empty((rows, joints)),
             current=np.empty((rows, joints)),
             contact=np.zeros((rows, links, SENSOR_WIDTH)),
-            poses=np.empty((rows, len(self._obstacles), 7)),
+            poses=poses,
         )
 
     def run(
@@ -155,6 +167,12 @@ class AlongMotion:
     motion: Motion
     feed_forward: Array  #: torque at every row [N m], shape (T, n)
     recorded: Rollout  #: states at all rows of the motion
+
+    def without_obstacles(self, loop: SimulationLoop) -> AlongMotion:
+        """The same motion in a loop of the same arm that records no contacts and obstacles."""
+        states = self.recorded
+        states = replace(states, contact=states.contact[:, :0], poses=states.poses[:, :0])
+        return replace(self, loop=loop, recorded=states)
 
     def __call__(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1

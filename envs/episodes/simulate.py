@@ -33,6 +33,7 @@ from tauguard.models import (
     set_payload,
     without_losses,
 )
+from tauguard.models.scene import masks_match
 from tauguard.traces import CheckedContacts, Trace, Truth
 
 if TYPE_CHECKING:
@@ -114,8 +115,7 @@ def scene_for(episode: Episode, visuals: bool = True) -> Scene:
 
 def can_touch(model: mujoco.MjModel) -> bool:
     """Whether contacts are enabled for any two geoms of the scene."""
-    makes, takes = model.geom_contype[:, None], model.geom_conaffinity
-    return bool(model.npair or model.nflex or (makes & takes).any())
+    return bool(model.npair or model.nflex or masks_match(model))
 
 
 class Simulation:
@@ -155,15 +155,29 @@ class Simulation:
         # The friction that the servo compensates.
         known = friction_torque(self.nominal.friction, self.motion.qd)
         self._feed_forward = needed + self.scene.facts.compensation * known
-        self.loop = SimulationLoop(self.scene, self.nominal)
-        self.loop.reset(self.motion.q[0])
-        self._rollout = self.loop.room_for(len(self.motion.t))
-        self._follow = AlongMotion(self.loop, self.motion, self._feed_forward, self._rollout)
-        self.striking = Striking(self.scene, self._follow, aim_rng)
+        struck = SimulationLoop(self.scene, self.nominal)
+        struck.reset(self.motion.q[0])
+        self._rollout = struck.room_for(len(self.motion.t))
+        whole = AlongMotion(struck, self.motion, self._feed_forward, self._rollout)
+        self._follow = self._apart(whole)
+        self.loop = self._follow.loop
+        self.striking = Striking(self.scene, self._follow, whole, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
         #: Planned collisions that did not occur, and why; filled by :meth:`run`.
         self.missed: list[str] = []
+
+    def _apart(self, whole: AlongMotion) -> AlongMotion:
+        """The motion in a scene without striker and clamp: a step takes 3/5 of the time.
+
+        It gives the same bits while neither can touch the arm.
+        """
+        if self.episode.objects or not self.scene.obstacle_names:
+            return whole
+        bare = scene_for(replace(self.episode, collisions=()), visuals=False)
+        loop = SimulationLoop(replace(bare, drive=self.scene.drive), self.nominal)
+        loop.reset(self.motion.q[0])
+        return whole.without_obstacles(loop)
 
     def run(self) -> Trace:
         """Simulate the whole episode."""
@@ -196,7 +210,8 @@ class Simulation:
 
     def _carry(self, grams: float) -> None:
         if self.scene.payload_body >= 0 and grams / 1000 != self._payload:
-            set_payload(self.loop.model, self.loop.data, self.scene.payload_body, grams / 1000)
+            for loop in {self.loop, self.striking.loop}:
+                set_payload(loop.model, loop.data, loop.scene.payload_body, grams / 1000)
             self._payload = grams / 1000
 
     def _contacts(self, rollout: Rollout) -> tuple[CheckedContacts, ...]:

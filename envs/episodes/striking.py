@@ -58,16 +58,22 @@ class Striking:
         self,
         scene: Scene,
         follow: AlongMotion,
+        struck: AlongMotion,
         rng: np.random.Generator,
     ) -> None:
-        """Prepare for one scene and motion; ``rng`` draws points and directions.
+        """Prepare for one motion; ``rng`` draws points and directions.
+
+        ``follow`` simulates the arm until an obstacle of ``scene`` comes near, ``struck`` the
+        whole scene; they may be the same.
 
         This object does not refer to the simulation that uses it: the reference cycle would keep
         megabytes of native memory until Python collects cycles.
         """
         motion = follow.motion
         self._scene, self._motion, self._loop, self._follow = scene, motion, follow.loop, follow
-        self._rng = rng
+        #: The loop with the obstacles.
+        self.loop, self._struck, self._rng = struck.loop, struck, rng
+        self._parked = struck.recorded.poses[:1].copy()
         self._aim, self._poses = Aim(scene, motion), Poses(scene)
         self._dt = float(scene.model.opt.timestep)
 
@@ -100,6 +106,8 @@ class Striking:
             if window is not None:
                 return begin, window
             self._loop.restore(saved)
+            failed = self._struck.recorded.rows(begin, target.row + tail)
+            failed.contact[:], failed.poses[:] = 0.0, self._parked
         self._follow(at, max(at, start))
         return max(at, start), self._why(
             plan, tried, (stop - tail - self._row(late.time)) * self._dt
@@ -148,7 +156,11 @@ class Striking:
                 return None
             if plan.severity is None or plan.severity[0] <= window.peak_tau < plan.severity[1]:
                 low, high = plan.force or (0.0, FORCE_LIMIT)
-                return window if low <= window.peak_force <= high else None
+                if not low <= window.peak_force <= high:
+                    return None
+                if plan.kind != "pulse":
+                    self._loop.take(self.loop)
+                return window
             bracket[int(window.peak_tau >= plan.severity[1])] = strength
             if bracket[0] is not None and bracket[1] is not None:
                 wanted = float(np.sqrt(bracket[0] * bracket[1]))
@@ -170,6 +182,8 @@ class Striking:
         dt = self._dt
         rows = end - begin
         wrench, body = None, -1
+        if plan.kind != "pulse":
+            self.loop.take(self._loop)
         if plan.kind == "pulse":
             com = self._poses.points(self._motion.q[begin:end], target.body)
             wrench = pulse_wrench(target, com, strength, plan.duration, dt, rows, 0)
@@ -178,22 +192,27 @@ class Striking:
             self._launch(target, strength)
         else:
             self._place_clamp(target, strength - CLAMP_OFFSET, end)
-        rollout = self._follow(begin, end, wrench, body)
+        along = self._follow if plan.kind == "pulse" else self._struck
+        clear = min(begin + self._row(CLEAR), end) if wrench is None else begin
+        overlaps = bool(along(begin, clear).contact[:, :, 1:4].any())
+        if not overlaps:
+            along(clear, end, wrench, body)
         self._park(plan.kind)
+        if overlaps:
+            return None
+        rollout = along.recorded.rows(begin, end)
         wrenches = (
             self._pulse_truth(wrench, target, rollout, dt)
             if wrench is not None
             else labels.Wrenches.from_contacts(rollout.contact)
         )
-        if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
-            return None
         tau = labels.external_torque(self._poses, rollout.q, wrenches)
         peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
         peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
         return Window(begin, rollout, wrenches, peak_tau, peak_force)
 
     def _launch(self, target: Target, speed: float) -> None:
-        model, data = self._scene.model, self._loop.data
+        model, data = self._scene.model, self.loop.data
         body = model.body("striker")
         position, velocity = launch(target, speed, float(model.geom_size[body.geomadr[0], 0]))
         joint = model.joint(int(body.jntadr[0]))
@@ -206,10 +225,10 @@ class Striking:
         references = self._motion.q[target.row : end]
         path = self._poses.points(references, target.body, target.point)
         radius = float(model.geom_size[int(body.geomadr[0]), 0])
-        self._loop.data.mocap_pos[body.mocapid[0]] = clamp_centre(target, path, depth, radius)
+        self.loop.data.mocap_pos[body.mocapid[0]] = clamp_centre(target, path, depth, radius)
 
     def _park(self, kind: str) -> None:
-        model, data = self._scene.model, self._loop.data
+        model, data = self._scene.model, self.loop.data
         if kind == "strike":
             joint = model.joint(int(model.body("striker").jntadr[0]))
             data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = [*PARKED, 1, 0, 0, 0]

@@ -94,7 +94,8 @@ def timed_parts(one: Planned) -> dict[str, float]:
     with clock(spent, "prepare"):
         simulation = Simulation(one.episode)
     striking: Any = simulation.striking
-    count_time(spent, "steps", simulation.loop, "run")
+    for loop in {simulation.loop, striking.loop}:
+        count_time(spent, "steps", loop, "run")
     count_time(spent, "targets", striking._aim, "find")
     with clock(spent, "labels"):
         trace = simulation.run()
