@@ -72,14 +72,13 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
         here = np.flatnonzero(pushed[touched, link])
         if not len(here):
             continue
-        at = np.ix_(touched[here], moving)
+        rows, columns = touched[here, None], np.array(moving, np.intp)
         force, torque, point = (
-            w[at[0], link] for w in (wrenches.force, wrenches.torque, wrenches.point)
+            each[rows, link] for each in (wrenches.force, wrenches.torque, wrenches.point)
         )
-        along = axis[np.ix_(here, moving)]
-        turned = torque + cross(point - anchor[np.ix_(here, moving)], force)
-        work = np.where(sliding[moving][:, None], force, turned)
-        tau[at] += np.einsum("tij,tij->ti", along, work)
+        turned = torque + cross(point - anchor[here[:, None], columns], force)
+        work = np.where(sliding[columns, None], force, turned)
+        tau[rows, columns] += np.einsum("tij,tij->ti", axis[here[:, None], columns], work)
     return tau
 
 
