@@ -19,15 +19,13 @@ COLOURS = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
 
 def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     """Draw counts by class, severity by kind, hours by speed and payload, and one collision."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     from tauguard.datasets.dataset_folder import lines
 
     every = list(lines(folder))
-    figure, axes = plt.subplots(2, 2, figsize=(13, 8.5), layout="constrained")
+    figure = Figure(figsize=(13, 8.5), layout="constrained")
+    axes = figure.subplots(2, 2)
     _classes(axes[0, 0], report)
     _severity(axes[0, 1], every)
     _speeds(axes[1, 0], every)
@@ -36,7 +34,6 @@ def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     figure.suptitle(f"{report['name']}: {splits}", parse_math=False)  # names may have dollar signs
     with atomic_file(path) as stream:
         figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
-    plt.close(figure)
 
 
 def _classes(axes: Axes, report: Mapping[str, Any]) -> None:

@@ -15,18 +15,14 @@ def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
         joints: names.
         likeness: from :func:`tauguard.twin.compare`.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
     from scipy.signal import welch
 
     kinds = {"real": likeness.real_residuals, "twin": likeness.twin_residuals}
     t, n = likeness.times[0], len(joints)
     rate = 1 / float(np.median(np.diff(t)))
-    figure, axes = plt.subplots(
-        n, 2, figsize=(11, 1.6 * n + 1), squeeze=False, sharex="col", layout="constrained"
-    )
+    figure = Figure(figsize=(11, 1.6 * n + 1), layout="constrained")
+    axes = figure.subplots(n, 2, squeeze=False, sharex="col")
     for (kind, logs), colour in zip(kinds.items(), ("0.2", "tab:orange"), strict=True):
         every = np.concatenate(logs)
         for j, (name, row) in enumerate(zip(joints, axes, strict=True)):
@@ -42,7 +38,6 @@ def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
     axes[0, 1].set_title("power of the residual [(N m)$^2$/Hz]", fontsize=8)
     figure.suptitle(verdict(likeness), fontsize=9)
     figure.savefig(path, dpi=90)
-    plt.close(figure)
 
 
 def verdict(likeness: Likeness) -> str:

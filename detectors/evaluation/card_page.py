@@ -193,17 +193,13 @@ def times(log: CrossValidatedLog) -> str:
 
 def draw(target: Path, card: ThresholdCard) -> None:
     """The card as a picture (PNG)."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
     import numpy as np
+    from matplotlib.figure import Figure
 
     lines = [line for part in _lines(card) for line in _wrapped(part)]
     sizes = (4.6, 0.3 + 0.17 * len(lines))
-    figure, (bars, words) = plt.subplots(
-        2, 1, figsize=(9, sum(sizes)), height_ratios=sizes, layout="constrained"
-    )
+    figure = Figure(figsize=(9, sum(sizes)), layout="constrained")
+    bars, words = figure.subplots(2, 1, height_ratios=sizes)
     place = np.arange(len(card.joints))
     for k, (name, (level, _)) in enumerate(COLUMNS.items()):
         drawn = bars.bar(place + 0.2 * (k - 1.5), getattr(card, level), 0.2, label=name)
@@ -220,4 +216,3 @@ def draw(target: Path, card: ThresholdCard) -> None:
     words.text(0, 1, "\n".join(lines), va="top", fontsize=8.5, family="monospace")
     with atomic_file(target) as stream:
         figure.savefig(stream, dpi=130, format=target.suffix[1:] or "png")
-    plt.close(figure)

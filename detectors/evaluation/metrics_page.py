@@ -104,18 +104,15 @@ def diagnosis_text(found: Mapping[str, Any]) -> str:
 
 def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) -> None:
     """Sensitivity and delay over severity, the confusion matrix, and delays by kind."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
+    figure = Figure(figsize=(14, 4.6), layout="constrained")
+    axes = figure.subplots(1, 3)
     _draw_strata(axes[0], summary["strata"])
     _draw_confusion(axes[1], summary["confusion"], summary["false_alarms_per_hour"])
     _draw_delays(axes[2], matchings)
     with atomic_file(path) as stream:
         figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
-    plt.close(figure)
 
 
 def _draw_strata(axes: Axes, strata: Mapping[str, Any]) -> None:

@@ -214,17 +214,14 @@ def brief(module: Any, rows: list[Row]) -> list[Row]:
 def chart(module: Any, rows: list[Row], kind: str = "png") -> bytes:
     """The figure of a part's rows as a file of ``kind``, in the style of all figures."""
     import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     out = io.BytesIO()
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=getattr(module, "SIZE", None), layout="constrained")
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=getattr(module, "SIZE", None), layout="constrained")
         if hasattr(module, "draw"):
             module.draw(rows, figure)
         else:
             draw_points(importlib.import_module(module.__package__).points(rows), figure)
         figure.savefig(out, format=kind)
-        plt.close(figure)
     return out.getvalue()

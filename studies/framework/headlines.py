@@ -137,17 +137,15 @@ def _quiet(found: Sequence[Found]) -> str:
 
 def _shown(text: str, draw: Callable[[Any], None], bars: int, what: str) -> str:
     import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    with plt.rc_context({"font.size": 9, "svg.hashsalt": what}):
-        figure, axes = plt.subplots(figsize=(5.2, 0.9 + 0.36 * bars), layout="constrained")
+    with matplotlib.rc_context({"font.size": 9, "svg.hashsalt": what}):
+        figure = Figure(figsize=(5.2, 0.9 + 0.36 * bars), layout="constrained")
+        axes = figure.subplots()
         draw(axes)
         axes.set_ylim(-0.5, bars - 0.2)
         axes.spines[["top", "right", "left"]].set_visible(False)
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
-        plt.close(figure)
     image = picture(out.getvalue().encode(), "svg+xml", what)
     return f'<figure class="first"><p>{text}</p>{image}</figure>'

@@ -28,17 +28,14 @@ def front(points: Sequence[Point]) -> list[Point]:
 def svg(points: Sequence[Point]) -> str:
     """The points of one question as an SVG picture, readable at half of a page's width."""
     import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    with plt.rc_context({"font.size": 10, "svg.hashsalt": points[0].question}):
+    with matplotlib.rc_context({"font.size": 10, "svg.hashsalt": points[0].question}):
         height = 3.4 + 0.19 * ((len({p.method for p in points}) + 1) // 2)
-        figure = plt.figure(figsize=(5.6, height), layout="constrained")
+        figure = Figure(figsize=(5.6, height), layout="constrained")
         _draw(points, figure)
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
-        plt.close(figure)
     return out.getvalue()
 
 

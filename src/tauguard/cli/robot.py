@@ -119,12 +119,12 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         if row.refused:
             print(f"{row.environment}: refused: {row.refused}")
     if pictures is not None:
-        import matplotlib.pyplot as plt
         import numpy as np
+        from matplotlib.image import imsave
 
         shown = [picture(row.environment, robot) for row in rows if not row.refused]
         if shown:
-            plt.imsave(pictures, np.concatenate(shown, axis=1))
+            imsave(pictures, np.concatenate(shown, axis=1))
             print(f"wrote {pictures}")
     if not all(row.passed for row in rows):
         raise SystemExit(1)
