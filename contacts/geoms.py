@@ -8,7 +8,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
-from tauguard.contacts.checker import Index, geom_kinds
+from tauguard.contacts.checker import geom_kinds
 
 #: Native numbers of shapes, by kind of geom.
 _CORES = {"plane": 0, "sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 4, "box": 5, "mesh": 6}
@@ -17,14 +17,13 @@ CONVEX = tuple(_CORES)
 _NONE = np.zeros((0, 3))
 
 
-def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool = False) -> Scene:
+def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
     """Make a native scene of ``geoms``; their positions in the list are their native numbers.
 
     Args:
         model: MjModel.
         geoms: Ids of the geoms.
         checker: Name of the checker, for error messages.
-        surfaces: Whether to use the surface of a mesh instead of its convex hull.
 
     Raises:
         ValueError: a geom of a kind that has no convex shape (the message names the geom).
@@ -39,8 +38,6 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool 
                 f"{', '.join(CONVEX)} (skip=({kind!r},) excludes this kind)"
             )
         _add(scene, model, int(geom), kind)
-        if surfaces and kind == "mesh":
-            scene.surface(*mesh_surface(model, int(geom)))
     return scene
 
 
@@ -68,16 +65,6 @@ def hull_vertices(model: Any, geom: int) -> Array:
     number = int(model.mesh_graph[graph])
     ids = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
     return np.asarray(vertices[ids], dtype=np.float64)
-
-
-def mesh_surface(model: Any, geom: int) -> tuple[Array, Index]:
-    """Vertices (V, 3) [m] and faces (F, 3) of a mesh geom, in the geom's frame."""
-    mesh = int(model.geom_dataid[geom])
-    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    first, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-    vertices = np.ascontiguousarray(model.mesh_vert[start : start + count], dtype=np.float64)
-    faces = np.ascontiguousarray(model.mesh_face[first : first + number], dtype=np.int32)
-    return vertices, faces
 
 
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:

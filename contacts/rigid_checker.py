@@ -10,7 +10,6 @@ from tauguard.arrays import Array
 from tauguard.contacts.checker import Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import geom_pairs
-from tauguard.contacts.surface_pairs import SurfacePairs
 
 
 @dataclass(frozen=True)
@@ -43,38 +42,25 @@ class RigidChecker:
             gap, below which MuJoCo lists contacts. If the surfaces do not touch, ``distance`` is
             positive.
         skip: Kinds of geoms to leave out.
-        mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo. ``"surface"``: a mesh is its
-            triangles, without inside; contacts with meshes and boxes then have no margin or depth.
 
     Raises:
         ValueError: a geom of an unsupported kind that can touch another geom (the message names
-            it), or an unknown ``threshold`` or ``mesh``.
+            it), or an unknown ``threshold``.
     """
 
     name = "rigid"
 
-    def __init__(
-        self, model: Any, threshold: str = "margin", skip: Sequence[str] = (), mesh: str = "hull"
-    ) -> None:
+    def __init__(self, model: Any, threshold: str = "margin", skip: Sequence[str] = ()) -> None:
         """Choose the pairs and copy the shapes."""
-        if mesh not in ("hull", "surface"):
-            raise ValueError(f"mesh {mesh!r}: expected hull or surface")
         kinds = np.array(geom_kinds(model))
         pairs = geom_pairs(model)
         keep = ~(np.isin(kinds[pairs.first], skip) | np.isin(kinds[pairs.second], skip))
         self.pairs = pairs.where(keep)
-        trees = np.zeros(len(self.pairs), dtype=bool)
-        if mesh == "surface":
-            flat = np.isin(kinds[self.pairs.first], ("box", "mesh"))
-            trees = flat & (kinds[self.pairs.second] == "mesh")
-        swept, meshes = self.pairs.where(~trees), self.pairs.where(trees)
-        rows = zip(meshes.first.tolist(), meshes.second.tolist(), strict=True)
-        self._surfaces = SurfacePairs(model, list(rows)) if len(meshes) else None
-        geoms, index = np.unique([swept.first, swept.second], return_inverse=True)
+        geoms, index = np.unique([self.pairs.first, self.pairs.second], return_inverse=True)
         self._geoms = geoms.astype(np.int32)
-        self._scene = native_scene(model, self._geoms, self.name, surfaces=mesh == "surface")
+        self._scene = native_scene(model, self._geoms, self.name)
         numbered = index.reshape(2, -1).T.astype(np.int32)
-        self._scene.pairs(np.ascontiguousarray(numbered), swept.reach(threshold))
+        self._scene.pairs(np.ascontiguousarray(numbered), self.pairs.reach(threshold))
         self.covers = frozenset(
             pair_kind(a, b) for a in CONVEX for b in CONVEX if not a == b == "plane"
         )
@@ -95,10 +81,7 @@ class RigidChecker:
         )
         ids, values, work = self._scene.find(before.xpos, before.xmat, after.xpos, after.xmat)
         self.work = Work(*work)
-        found = self._rows(ids, values) if len(ids) else Contacts.empty()
-        if self._surfaces is None:
-            return found
-        return Contacts.concatenate([found, self._surfaces.check(before, after)])
+        return self._rows(ids, values) if len(ids) else Contacts.empty()
 
     def _rows(self, ids: Index, values: Array) -> Contacts:
         none = np.full((len(ids), 2), -1, dtype=np.int32)

@@ -42,27 +42,6 @@ class Scene {
     geoms_.add(std::move(shape), body, frame);
   }
 
-  // Sets the surface of the geom that was added last, which replaces its hull.
-  void surface(Rows3 vertices, IntRows faces) {
-    const std::vector<Vec3> points = vectors(vertices);
-    Surface surface;
-    for (std::size_t i = 0; i < faces.shape(0); ++i) {
-      Shape triangle{Core::hull, {0, 0, 0}, 0, {}, {}, {}, {}, {}};
-      Vec3 middle{};
-      for (int k = 0; k < 3; ++k) {
-        const Vec3& p = points[faces.data()[3 * i + k]];
-        triangle.x.push_back(p[0]), triangle.y.push_back(p[1]), triangle.z.push_back(p[2]);
-        middle = middle + (1.0 / 3) * p;
-      }
-      double radius = 0;
-      for (int k = 0; k < 3; ++k)
-        radius = std::max(radius, norm(points[faces.data()[3 * i + k]] - middle));
-      surface.triangles.push_back(std::move(triangle));
-      surface.centre.push_back(middle), surface.radius.push_back(radius);
-    }
-    geoms_.add_surface(std::move(surface));
-  }
-
   void pairs(IntRows pairs, Doubles reach) {
     std::vector<GeomPair> list(pairs.shape(0));
     for (std::size_t i = 0; i < list.size(); ++i)
@@ -162,7 +141,6 @@ NB_MODULE(_contacts, m) {
       .def(nb::init<>())
       .def("add", &Scene::add, "core"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
            "vertices"_a, "normals"_a, "edges"_a)
-      .def("surface", &Scene::surface, "vertices"_a, "faces"_a)
       .def("pairs", &Scene::pairs, "pairs"_a, "reach"_a)
       .def("find", &Scene::find, "xpos_t0"_a, "xmat_t0"_a, "xpos_t1"_a, "xmat_t1"_a)
       .def("find_flex", &Scene::find_flex, "xpos_t0"_a, "xmat_t0"_a, "xpos_t1"_a, "xmat_t1"_a,

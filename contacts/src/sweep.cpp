@@ -59,7 +59,6 @@ Aabb swept(SupportShape m, const RigidMotion& motion) {
 
 void Geoms::add(Shape shape, int body, const LocalFrame& in_body) {
   shapes_.push_back(std::move(shape));
-  surfaces_.emplace_back();
   in_body_.push_back(in_body);
   body_.push_back(body);
   if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
@@ -109,34 +108,6 @@ Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec3& orig
                   impact.t);
 }
 
-// First contact of geom a with a triangle of b's surface; the deepest, if several are first.
-Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec3& origin,
-                    std::int32_t* face) {
-  const Surface& surface = geoms.surface(pair.b);
-  const RigidMotion& motion = geoms.motion(pair.b);
-  const LocalFrame &in_body = geoms.in_body(pair.b),
-                   body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
-  const Aabb near = widened(geoms.box(pair.a), threshold);
-  const double drift = norm(motion.linear);
-  SupportShape a = geoms.mover(pair.a, origin);
-  Touch first;
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const Vec3 y = in_body.out(surface.centre[i]), c = body.out(y);
-    // `way` bounds the motion of the triangle's points; the factor covers rounding.
-    const double way =
-        (surface.radius[i] * (1 + motion.speed) + drift + motion.speed * norm(y)) * (1 + 0x1p-40);
-    bool far = false;
-    for (int k = 0; k < 3; ++k) far = far || c[k] + way < near.lo[k] || c[k] - way > near.hi[k];
-    if (far) continue;
-    SupportShape b(surface.triangles[i], in_body, motion, origin);
-    const Touch touch = first_contact(a, b, threshold, 0);
-    if (!touch.hit) continue;
-    if (!first.hit || touch.t < first.t || (touch.t == first.t && touch.distance < first.distance))
-      first = touch, *face = static_cast<std::int32_t>(i);
-  }
-  return first;
-}
-
 }  // namespace
 
 Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows) {
@@ -156,10 +127,7 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     ++counts.candidates;
     const Vec3 origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0
                                                                      : geoms.motion(pair.a).x0;
-    std::int32_t face = -1;
     const auto touch_within = [&](double threshold) {
-      if (!geoms.surface(pair.b).triangles.empty() && geoms.shape(pair.a).core != Core::half_space)
-        return surface_touch(geoms, pair, threshold, origin, &face);
       SupportShape a = geoms.mover(pair.a, origin), b = geoms.mover(pair.b, origin);
       const bool polytopes = geoms.shape(pair.a).polytope() && geoms.shape(pair.b).polytope();
       return polytopes && threshold == 0 ? polytopes_touch(geoms, pair, origin, a, b)
@@ -169,8 +137,7 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     if (!touch.hit && pair.reach > 0) touch = touch_within(pair.reach);
     if (!touch.hit) continue;
     cached.hit = true;
-    cached.row = {pair.a,      pair.b, face, touch.t, touch.distance, touch.point + origin,
-                  touch.normal};
+    cached.row = {pair.a, pair.b, -1, touch.t, touch.distance, touch.point + origin, touch.normal};
     rows->push_back(cached.row);
   }
   return counts;

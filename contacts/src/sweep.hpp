@@ -38,18 +38,9 @@ struct Counts {
   std::int64_t moved = 0, reused = 0, candidates = 0;
 };
 
-// The triangles of a mesh, for pairs that test its surface instead of its hull.
-struct Surface {
-  std::vector<Shape> triangles;
-  std::vector<Vec3> centre;    // centre of a ball around each triangle, in the geom's frame
-  std::vector<double> radius;  // radius of the ball
-};
-
 class Geoms {
  public:
   void add(Shape shape, int body, const LocalFrame& in_body);
-  // Sets the surface of the geom that was added last.
-  void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
   // Updates motions and swept boxes, except of bodies at rest in this and the last step.
@@ -60,7 +51,6 @@ class Geoms {
   }  // at rest in this and the last step
   const Aabb& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
-  const Surface& surface(int geom) const { return surfaces_[geom]; }
   const LocalFrame& in_body(int geom) const { return in_body_[geom]; }
   const RigidMotion& motion(int geom) const { return motions_[body_[geom]]; }
   SupportShape mover(int geom, const Vec3& origin) const;
@@ -68,7 +58,6 @@ class Geoms {
 
  private:
   std::vector<Shape> shapes_;
-  std::vector<Surface> surfaces_;
   std::vector<LocalFrame> in_body_;
   std::vector<int> body_;
   std::vector<int> bodies_;           // bodies with geoms
