@@ -34,6 +34,15 @@ TAUGUARD_INLINE bool all(Mask4 m) {
 TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) == -1; }
 #endif
+TAUGUARD_INLINE Double4 sqrt(Double4 x) {
+#if defined(__x86_64__)
+  const Double2 low = __builtin_ia32_sqrtpd(__builtin_shufflevector(x, x, 0, 1)),
+                high = __builtin_ia32_sqrtpd(__builtin_shufflevector(x, x, 2, 3));
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3);
+#else
+  return {std::sqrt(x[0]), std::sqrt(x[1]), std::sqrt(x[2]), std::sqrt(x[3])};
+#endif
+}
 // `all_eight` does not overload `all`, because Clang treats vectors of equal size as one type.
 TAUGUARD_INLINE bool all_eight(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)); }
 TAUGUARD_INLINE double largest(Double4 x) {

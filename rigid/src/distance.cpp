@@ -2,6 +2,9 @@
 
 #include "gjk.hpp"
 
+// The descent is inlined, so that it is compiled for the vector unit of each clone.
+#define TAUGUARD_FLAT TAUGUARD_CLONES __attribute__((flatten))
+
 namespace tauguard::rigid {
 namespace {
 
@@ -104,7 +107,8 @@ Distance of_half_space(const SupportShape& a, const SupportShape& b) {
 
 }  // namespace
 
-bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation) {
+TAUGUARD_FLAT bool separating_direction(const PointList& a, const PointList& b, Vec3* n,
+                                        double* separation) {
   *separation = -INFINITY;
   Separating watch(a, b, n, separation);
   descend_hulls(a, b, watch);
@@ -116,7 +120,7 @@ Vec3 middle_point(const PointList& a, const PointList& b) {
   return 0.5 * (near.a + near.b);
 }
 
-Nearest nearest(const PointList& a, const PointList& b) {
+TAUGUARD_FLAT Nearest nearest(const PointList& a, const PointList& b) {
   ToRounding watch;
   const Simplex<Rows> s = descend_hulls(a, b, watch);
   Nearest out{{}, {}, s.size(), {}};
@@ -129,8 +133,8 @@ Nearest nearest(const PointList& a, const PointList& b) {
   return out;
 }
 
-Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
-                     double needed) {
+TAUGUARD_FLAT Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
+                                   double needed) {
   if (a.half_space()) return of_half_space(a, b);
   Distance out;
   const auto support = [&](const Vec3& v) {

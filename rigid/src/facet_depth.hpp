@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "convex_lanes.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
@@ -64,14 +65,23 @@ class FacetDepth {
 
   // False if the sign is uncertain or the bounds of the depth differ by more than `slack`. Sets
   // `apart` if the bodies are certainly apart.
-  bool solve(const BodyEdges& ea, const BodyEdges& eb, double slack) {
-    for (const BodyEdges* e : {&ea, &eb})
-      for (int f = 0; f < e->faces; ++f)
-        if (!consider(e->edge[e->face[f][0]], e->edge[e->face[f][1]], false)) return false;
-    for (int i = 0; i < ea.edges; ++i)
-      for (int j = 0; j < eb.edges; ++j)
-        if (!consider(ea.edge[i], eb.edge[j], ea.parallel && eb.parallel)) return false;
-    return way > 0 && way < INFINITY && low_ >= way - slack;
+  TAUGUARD_INLINE bool solve(const BodyEdges& ea, const BodyEdges& eb, double slack) {
+    for (const BodyEdges* e : {&ea, &eb}) {
+      const int last = e->faces - 1;
+      if (last >= 0 &&
+          !consider(lanes(*e, [&](int f) { return e->face[std::min(f, last)][0]; }),
+                    lanes(*e, [&](int f) { return e->face[std::min(f, last)][1]; }), false))
+        return false;
+    }
+    Edges y[2];
+    for (int k = 0; 4 * k < eb.edges; ++k)
+      y[k] = lanes(eb, [&](int j) { return std::min(4 * k + j, eb.edges - 1); });
+    for (int i = 0; i < ea.edges; ++i) {
+      const Edges x = lanes(ea, [&](int) { return i; });
+      for (int k = 0; 4 * k < eb.edges; ++k)
+        if (!consider(x, y[k], ea.parallel && eb.parallel)) return false;
+    }
+    return way > 0 && way < INFINITY && lower_bound() >= way - slack;
   }
 
   double way = INFINITY;
@@ -79,46 +89,84 @@ class FacetDepth {
   bool apart = false;
 
  private:
+  struct Edges {
+    Vec3x4 edge;
+    Double4 length;
+  };
+  // Four facets and their opposites.
+  struct Facets {
+    Vec3x4 normal;
+    Double4 top[2], slack;
+  };
+
+  // Four edges of a body, which number(lane) lists. Repeated ones change nothing.
+  template <class Number>
+  static TAUGUARD_INLINE Edges lanes(const BodyEdges& body, const Number& number) {
+    Edges out;
+    for (int lane = 0; lane < 4; ++lane) {
+      const Vec3& e = body.edge[number(lane)];
+      out.edge.x[lane] = e.x, out.edge.y[lane] = e.y, out.edge.z[lane] = e.z;
+    }
+    out.length = sqrt(dot(out.edge, out.edge));
+    return out;
+  }
+
   // If two edges of parallelepipeds enclose a sine of at most 2^-49, changing one edge by this
   // fraction of its length makes them parallel, so that they span no facet. The edges of one body
   // add up to at most 3 times the size.
-  bool consider(const Vec3& x, const Vec3& y, bool may_skip) {
-    const Vec3 c = cross(x, y);
-    const double length = norm(c), both = norm(x) * norm(y);
-    if (!(length > 0x1p-49 * both)) return may_skip;
-    const double slack = 0x1p-46 * (both / length) * size_;
-    const Vec3 n = (1 / length) * c;
-    const Range ra = range(a_, n), rb = range(b_, n);
-    return bound(n, ra.high - rb.low, slack) && bound(-1.0 * n, rb.high - ra.low, slack);
+  TAUGUARD_INLINE bool consider(const Edges& x, const Edges& y, bool may_skip) {
+    const Vec3x4 c = cross(x.edge, y.edge);
+    const Double4 length = sqrt(dot(c, c)), both = x.length * y.length;
+    const Mask4 spans = length > 0x1p-49 * both;
+    if (!may_skip && !all(spans)) return false;
+    Facets& f = facets_[count_++];
+    const Double4 scale = 1 / length;
+    f.normal = scale * c;
+    f.slack = spans ? 0x1p-46 * (both * scale) * size_ : Double4{};
+    const Range ra = range(a_, f.normal), rb = range(b_, f.normal);
+    f.top[0] = spans ? ra.high - rb.low : splat(INFINITY);
+    f.top[1] = spans ? rb.high - ra.low : splat(INFINITY);
+    const Double4 least = min(f.top[0], f.top[1]);
+    apart = any(least < -f.slack);
+    way = std::min(way, -largest(-least));
+    return all(least > f.slack);
   }
 
   struct Range {
-    double low = INFINITY, high = -INFINITY;
+    Double4 low, high;
   };
-  static Range range(const Points<double>& points, const Vec3& n) {
-    Range r;
+  static TAUGUARD_INLINE Range range(const Points<double>& points, const Vec3x4& n) {
+    Range r{splat(INFINITY), splat(-INFINITY)};
     for (const Vec3& p : points) {
-      const double x = dot(n, p);
-      r.low = std::min(r.low, x), r.high = std::max(r.high, x);
+      const Double4 x = dot(n, Vec3x4{splat(p.x), splat(p.y), splat(p.z)});
+      r.low = min(x, r.low), r.high = max(x, r.high);
     }
     return r;
   }
 
-  bool bound(const Vec3& n, double top, double slack) {
-    if (top < way) way = top, normal = n;
-    if (!(top > slack)) {
-      apart = top < -slack;
-      return false;
+  // The least lower bound of all facets that have one below `way`. Sets `normal`.
+  TAUGUARD_INLINE double lower_bound() {
+    double low = INFINITY;
+    bool known = false;
+    for (const Facets* f = facets_; f < facets_ + count_; ++f) {
+      if (!any(min(f->top[0], f->top[1]) - 2 * f->slack < way)) continue;
+      for (int lane = 0; lane < 4; ++lane)
+        for (int back = 0; back < 2; ++back) {
+          const double top = f->top[back][lane], slack = f->slack[lane];
+          if (top - 2 * slack >= way) continue;
+          const Vec3 n =
+              (back ? -1.0 : 1.0) * Vec3{f->normal.x[lane], f->normal.y[lane], f->normal.z[lane]};
+          if (top == way && !known) normal = n, known = true;
+          low = std::min(low, top - spread(a_, n, slack) - spread(b_, -1.0 * n, slack));
+        }
     }
-    if (top - 2 * slack >= std::min(low_, way)) return true;
-    low_ = std::min(low_, top - spread(a_, n, slack) - spread(b_, -1.0 * n, slack));
-    return true;
+    return low;
   }
 
   // The largest distance below the top, among the vertices within `slack` of the top.
   static double spread(const Points<double>& points, const Vec3& n, double slack) {
-    const double top = range(points, n).high;
-    double most = 0;
+    double top = -INFINITY, most = 0;
+    for (const Vec3& p : points) top = std::max(top, dot(n, p));
     for (const Vec3& p : points) {
       const double below = top - dot(n, p);
       if (below <= slack) most = std::max(most, below);
@@ -128,7 +176,8 @@ class FacetDepth {
 
   const Points<double>&a_, &b_;
   const double size_;
-  double low_ = INFINITY;
+  Facets facets_[14];
+  int count_ = 0;
 };
 
 }  // namespace tauguard::rigid

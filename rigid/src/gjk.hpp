@@ -5,9 +5,16 @@
 
 #include <algorithm>
 
+#include "tauguard/geometry/lanes.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
+
+using geometry::Double4;
+using geometry::Mask4;
+using geometry::splat;
+using geometry::store4;
+using geometry::Vec3x4;
 
 // A corner of the simplex, and its weight in the nearest point.
 template <class Source>
@@ -16,35 +23,6 @@ struct Corner {
   Source from;
   double weight;
 };
-
-// The weights of the point nearest to the origin in the affine hull of the corners c[0], ...,
-// c[m - 1]. False if the corners are affinely dependent or the point is outside their simplex.
-template <class Source>
-bool weigh(const Corner<Source>* const* c, int m, double* l) {
-  l[0] = 1;
-  if (m == 1) return true;
-  const Vec3& w = c[0]->w;
-  const Vec3 e[3] = {c[1]->w - w, m > 2 ? c[2]->w - w : Vec3{}, m > 3 ? c[3]->w - w : Vec3{}};
-  if (m == 2) {
-    const double ee = dot(e[0], e[0]);
-    if (!(ee > 0)) return false;
-    l[1] = -dot(e[0], w) / ee;
-  } else if (m == 3) {
-    const double aa = dot(e[0], e[0]), ab = dot(e[0], e[1]), bb = dot(e[1], e[1]);
-    const double det = aa * bb - ab * ab, x = -dot(e[0], w), y = -dot(e[1], w);
-    if (!(det > 1e-24 * aa * bb)) return false;
-    l[1] = (x * bb - y * ab) / det, l[2] = (y * aa - x * ab) / det;
-  } else {
-    const double det = dot(e[0], cross(e[1], e[2]));
-    if (!(std::fabs(det) > 1e-14 * norm(e[0]) * norm(e[1]) * norm(e[2]))) return false;
-    const Vec3 o = -1.0 * w;
-    l[1] = dot(o, cross(e[1], e[2])) / det;
-    l[2] = dot(e[0], cross(o, e[2])) / det;
-    l[3] = dot(e[0], cross(e[1], o)) / det;
-  }
-  for (int i = 1; i < m; ++i) l[0] -= l[i];
-  return *std::min_element(l, l + m) >= 0;
-}
 
 template <class Source>
 class Simplex {
@@ -60,32 +38,94 @@ class Simplex {
   }
   // Adds a corner and reduces the simplex to the face nearest to the origin among those with this
   // corner. If that face is no nearer than the simplex, nothing changes; returns false.
-  bool add(const Corner<Source>& next) {
+  TAUGUARD_INLINE bool add(const Corner<Source>& next) {
     c_[m_] = next;
-    double best = dot(nearest_, nearest_), weight[4] = {};
-    int kept = 0;
-    for (int mask = 1 << m_; mask < 2 << m_; ++mask) {
-      const Corner<Source>* face[4];
-      double l[4];
-      int size = 0;
-      for (int i = 0; i <= m_; ++i)
-        if (mask >> i & 1) face[size++] = &c_[i];
-      if (!weigh(face, size, l)) continue;
-      Vec3 p = face[0]->w;  // sum of offsets: less cancellation than a sum of weighted corners
-      for (int i = 1; i < size; ++i) p += l[i] * (face[i]->w - face[0]->w);
-      if (dot(p, p) < best)
-        best = dot(p, p), kept = mask, nearest_ = p, std::copy(l, l + size, weight);
+    // Bit i of a number of a face: the face has the old corner i.
+    double square[8] = {};
+    Faces edges{}, triangles{};
+    square[0] = dot(next.w, next.w);
+    weigh(&edges, &triangles);
+    square[1] = edges.square[0], square[2] = edges.square[1], square[4] = edges.square[2];
+    square[3] = triangles.square[0], square[5] = triangles.square[1];
+    square[6] = triangles.square[2];
+    double l[4] = {1, 0, 0, 0};
+    Vec3 p = next.w;
+    if (m_ == 3) square[7] = inside(l, &p);
+    double best = dot(nearest_, nearest_);
+    int kept = -1;
+    for (int face = 0; face < 1 << m_; ++face)
+      if (square[face] < best) best = square[face], kept = face;
+    if (kept < 0) return false;
+    if (kept != 7) {
+      constexpr int lane[7] = {0, 0, 1, 0, 2, 1, 2};
+      const Faces& f = kept == 3 || kept > 4 ? triangles : edges;
+      const int i = lane[kept];
+      l[1] = kept ? f.weight[0][i] : 0, l[2] = f.weight[1][i], l[0] = 1 - l[1] - l[2];
+      p = kept ? Vec3{f.x[i], f.y[i], f.z[i]} : next.w;
     }
-    if (!kept) return false;
+    nearest_ = p;
     int size = 0;
     for (int i = 0; i <= m_; ++i)
-      if (kept >> i & 1) c_[size] = c_[i], c_[size].weight = weight[size], ++size;
+      if ((kept | 1 << m_) >> i & 1) c_[size] = c_[i], c_[size].weight = l[size], ++size;
     m_ = size;
     return true;
   }
 
  private:
-  Corner<Source> c_[5];
+  // Of faces in lanes: the points nearest to the origin in their planes or lines, the weights of
+  // the second and third corners there, and the squares of the distances. A square is infinite if
+  // corners are affinely dependent or the point is outside the face.
+  struct Faces {
+    double square[4], weight[2][4], x[4], y[4], z[4];
+    TAUGUARD_INLINE void set(const Vec3x4& p, Double4 first, Double4 second, Mask4 regular) {
+      const Mask4 known = regular & (first >= 0) & (second >= 0) & (1 - first - second >= 0);
+      store4(square, known ? dot(p, p) : splat(INFINITY));
+      store4(weight[0], first), store4(weight[1], second);
+      store4(x, p.x), store4(y, p.y), store4(z, p.z);
+    }
+  };
+
+  // Edges of the new corner to the old corners 0, 1 and 2, and its triangles with 0 and 1, 0 and 2,
+  // 1 and 2. The point is a sum of offsets: less cancellation than a sum of weighted corners.
+  TAUGUARD_INLINE void weigh(Faces* edges, Faces* triangles) const {
+    const Vec3 &n = c_[m_].w, &p = c_[0].w, &q = c_[1].w, &r = c_[std::min(2, m_)].w;
+    const Vec3x4 w = {{p.x, q.x, r.x, r.x}, {p.y, q.y, r.y, r.y}, {p.z, q.z, r.z, r.z}};
+    const Vec3x4 e = Vec3x4{splat(n.x), splat(n.y), splat(n.z)} - w;
+    const Double4 ee = dot(e, e), x = -dot(e, w), l = x / ee;
+    edges->set(w + l * e, l, Double4{}, ee > 0);
+    if (m_ == 1) return;
+    const Vec3x4 v = first(w), a = {second(w.x) - v.x, second(w.y) - v.y, second(w.z) - v.z};
+    const Vec3x4 b = first(e);
+    const Double4 aa = dot(a, a), ab = dot(a, b), bb = first(ee), xa = -dot(a, v), xb = first(x);
+    const Double4 det = aa * bb - ab * ab, s = (xa * bb - xb * ab) / det,
+                  t = (xb * aa - xa * ab) / det;
+    triangles->set(v + s * a + t * b, s, t, det > 1e-24 * aa * bb);
+  }
+  static TAUGUARD_INLINE Double4 first(Double4 x) {
+    return __builtin_shufflevector(x, x, 0, 0, 1, 1);
+  }
+  static TAUGUARD_INLINE Double4 second(Double4 x) {
+    return __builtin_shufflevector(x, x, 1, 2, 2, 2);
+  }
+  static TAUGUARD_INLINE Vec3x4 first(const Vec3x4& v) {
+    return {first(v.x), first(v.y), first(v.z)};
+  }
+
+  // Writes the weights of the origin in the tetrahedron of all corners, and their sum of corners;
+  // returns its square, infinite as above.
+  double inside(double* l, Vec3* p) const {
+    const Vec3 &w = c_[0].w, e = c_[1].w - w, f = c_[2].w - w, g = c_[3].w - w, o = -1.0 * w;
+    const Vec3 fg = cross(f, g);
+    const double det = dot(e, fg);
+    l[1] = dot(o, fg) / det, l[2] = dot(e, cross(o, g)) / det, l[3] = dot(e, cross(f, o)) / det;
+    l[0] = 1 - l[1] - l[2] - l[3];
+    if (!(*std::min_element(l, l + 4) >= 0)) return INFINITY;
+    if (!(std::fabs(det) > 1e-14 * norm(e) * norm(f) * norm(g))) return INFINITY;
+    *p = w + l[1] * e + l[2] * f + l[3] * g;
+    return dot(*p, *p);
+  }
+
+  Corner<Source> c_[4];
   int m_;
   Vec3 nearest_;
 };

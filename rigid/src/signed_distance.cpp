@@ -115,12 +115,17 @@ bool certified_apart(const Points<double>& a, const Points<double>& b, double si
   return certified() || (ends.size == 3 && between_faces(a, b, ends, size, out) && certified());
 }
 
+TAUGUARD_CLONES bool solve(FacetDepth* facets, const BodyEdges& ea, const BodyEdges& eb,
+                           double slack) {
+  return facets->solve(ea, eb, slack);
+}
+
 bool certified_depth(const Points<double>& a, const Points<double>& b, const Bodies& bodies_a,
                      const Bodies& bodies_b, std::size_t row, double size, double* way, Vec3* n) {
   BodyEdges ea, eb;
   if (edges_of(bodies_a, row, &ea) && edges_of(bodies_b, row, &eb)) {
     FacetDepth facets(a, b, size);
-    if (facets.solve(ea, eb, certain * size)) {
+    if (solve(&facets, ea, eb, certain * size)) {
       *way = facets.way, *n = facets.normal;
       return *way > near * size;
     }
