@@ -213,8 +213,10 @@ class Regimes {
     Joint& one = joints_[j];
     one.close = !one.rest && ratio > near ? one.close + 1 : 0;
     if (one.close < samples || fastest_ < braking * before_) return;
+    if (near_for_ == 0.0 && ratio < nearest_ratio_) return;  // another joint in this sample
     near_for_ = 0.0;
     nearest_ = j;
+    nearest_ratio_ = ratio;
   }
 
   double confirmed(Joint& one, double ratio, double dt) const {
@@ -304,7 +306,8 @@ class Regimes {
   double peak_ = 0.0, still_ = 0.0;      // its ratio; time without a change [s]
   double fastest_ = 0.0, before_ = 0.0;  // speed of the fastest joint, now and recently [rad/s]
   double near_for_ = recent;             // time since a joint in motion was near its bound [s]
-  std::size_t nearest_ = 0;              // the joint that was near its bound
+  std::size_t nearest_ = 0;              // the joint that was nearest to its bound
+  double nearest_ratio_ = 0.0;           // its ratio
   double stirred_ = 1.0, usual_ = 1.0;  // recent motion in [0, 1]; sample interval without gaps [s]
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]

@@ -282,6 +282,23 @@ def test_a_stop_confirms_the_short_contact_before_it_and_is_none(fitted):
     assert np.mean(found, axis=0)[2] >= 0.9
 
 
+def test_a_stop_confirms_the_joint_that_was_nearest_to_its_bound(fitted):
+    """80 ms on all joints, 1.35 times the bound of one of them, 1.05 times those of the others."""
+    detector = fitted.carrying(Load())
+    bound, right = detector.judge(record(8, dwell=(99.0, 100.0))).bound, []
+    for stop in np.arange(5.0, 20.0, 2.5):
+        stopping, k = record(8, dwell=(stop, stop + 3.0), ramp=0.15), round(100 * (stop - 0.1))
+        for strong in range(3):
+            part = np.where(np.arange(3) == strong, 1.35, 1.05)
+            torque = tuple(-part * np.sign(stopping.qd[k]) * bound[k])
+            struck = add_contact(stopping, GAIN, Added(stop - 0.14, 0.08, torque, "push"))
+            confirmed = detector.judge(struck).ratio[k - 8 : k + 60] > 1
+            first = confirmed[confirmed.any(axis=1)][:1]
+            right += [np.flatnonzero(row).tolist() == [strong] for row in first]
+    assert len(right) > 12
+    assert np.mean(right) >= 0.9
+
+
 def test_few_seconds_leave_the_friction_level_unsure(fitted):
     logs = [Recording(record(seed)) for seed in range(3)]
     short = [Recording(record(0, seconds=12.0))]
