@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.motion_regimes import SEEN, SHORTLY, motion_regimes, unseen_text
-from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.free_motion import FittedFreeMotion, Judged
 from tauguard.traces.trace import Detection, Trace
 
 STRANGE = 0.2  # fraction of a log in alarm above which it may be the log of another arm
@@ -65,8 +66,8 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     detection = replace(monitored.detection, residual=residual)
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     strange = bool(detection.alarm[rows].mean() > STRANGE)
-    judged = rows if strange else rows & ~_near(detection)
-    doubts = check_torques(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange)
+    quiet = rows if strange else rows & ~_near(detection)
+    doubts = check_torques(arm.robot, trace, tau, residual, quiet, LOG_GAIN, touched=strange)
     notes = [] if strange else list(doubts)
     if strange:
         load = "check the load (--payload)" if load_known else "give the load (--payload)"
@@ -76,14 +77,14 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
         )
     unwatched = 0.0
     if isinstance(alarm.detector, FittedFreeMotion):
-        unwatched, said = _unwatched(
-            alarm.detector, trace, rows & ~_inside(monitored.faults, trace)
-        )
+        judged, names = alarm.detector.judge(trace), trace.joint_names
+        watched = rows & ~_inside(monitored.faults, trace)
+        unwatched, said = _unwatched(judged, names, watched)
         notes += said
         notes += _prior_knowledge(alarm.detector, trace)
-        seconds, levels = alarm.detector.beyond(trace)
+        seconds, levels = alarm.detector.beyond(judged)
         if levels:
-            text = ", ".join(f"{name} {level:.0f} N m" for name, level in levels.items())
+            text = ", ".join(f"{names[j]} {level:.0f} N m" for j, level in levels.items())
             notes.append(
                 f"for {seconds:.1f} s joints are faster, or accelerate more, than in the training "
                 f"logs: the bounds there reach {text} (90 % quantile), and lower torques may raise "
@@ -100,38 +101,24 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     )
 
 
-def _unwatched(detector: FittedFreeMotion, trace: Trace, rows: Bools) -> tuple[float, list[str]]:
-    """Time of ``rows`` in which some joint is not watched [s], and notes that say why.
-
-    Nothing is watched while a joint moves that moves in no training log, and in the settling time
-    after it. Moving joints are not watched while such a joint stands elsewhere than in the logs.
-    """
-    hidden, bound = ~detector.bound.shown, detector.bound
-    if not hidden.any():
-        return 0.0, []
-    away = hidden & ((trace.q < bound.low) | (trace.q > bound.high))
-    slow = np.where(away, _observer.REGIME_SLOW, _observer.REGIME_FULL_SPEED)
-    moves = hidden & (np.abs(trace.qd) >= slow)
-    first = np.flatnonzero(moves.any(axis=1))
-    after = np.searchsorted(trace.t, trace.t[first] + _observer.REGIME_SETTLES)
-    count = np.zeros(len(trace.t) + 1, dtype=np.int64)
-    np.add.at(count, first, 1)
-    np.add.at(count, after, -1)
-    blind = np.cumsum(count)[:-1] > 0
-    partly = away.any(axis=1) & ~detector.judge(trace).rest.all(axis=1) & ~blind
-    steps, total, notes = np.diff(trace.t, append=trace.t[-1]), 0.0, []
-    for on, own, text in (
-        (blind, moves, "moves here, but in none of the training logs: no collision is detected in"),
+def _unwatched(judged: Judged, names: Sequence[str], rows: Bools) -> tuple[float, list[str]]:
+    """Time of ``rows`` in which some joint is not judged [s], and notes that say why."""
+    steps, total, notes = np.diff(judged.t, append=judged.t[-1]), 0.0, []
+    for reason, text in (
         (
-            partly,
-            away,
+            _observer.HIDES_BY_MOTION,
+            "moves here, but in none of the training logs: no collision is detected in",
+        ),
+        (
+            _observer.HIDES_BY_PLACE,
             "stands elsewhere than in the training logs, which do not show its motion: moving "
             "joints are not watched for",
         ),
     ):
-        if seconds := float(steps[on & rows].sum()):
-            names = np.array(trace.joint_names)[(own & on[:, None]).any(axis=0)].tolist()
-            notes.append(f"{', '.join(names)}: {text} {seconds:.1f} s of this log")
+        own = (judged.hides == reason) & rows[:, None]
+        if seconds := float(steps[own.any(axis=1)].sum()):
+            joints = ", ".join(names[j] for j in np.flatnonzero(own.any(axis=0)))
+            notes.append(f"{joints}: {text} {seconds:.1f} s of this log")
         total += seconds
     return total, notes
 

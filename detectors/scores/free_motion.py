@@ -97,6 +97,14 @@ class Judged:
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: minus the estimated errors of the model [N m], shape (T, n)
     rest: Bools  #: whether each joint is at rest, shape (T, n)
+    hides: Array
+    """Why joints are not judged: 1 at a joint that moves, and 2 at one that stands elsewhere, if no
+    training log shows its motion; else 0, shape (T, n)"""
+
+    @property
+    def dt(self) -> float:
+        """Median sample interval [s]."""
+        return float(np.median(np.diff(self.t)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,23 +135,22 @@ class FittedFreeMotion(Frozen):
         scores = _observer.free_scores(native(self.arm, self.bound, self.load))
         return NativeStream(scores, self.dt)
 
-    def beyond(self, trace: Trace) -> tuple[float, dict[str, float]]:
+    def beyond(self, judged: Judged) -> tuple[float, dict[int, float]]:
         """Time in which joints are faster, or accelerate more, than in the training logs [s].
 
-        Also returned are the joints' names, with the 90 % quantile of the bound in this time [N m].
+        Also returned are the joints, with the 90 % quantile of the bound in this time [N m].
         """
-        judged, bound = self.judge(trace), self.bound
+        bound = self.bound
         times = np.abs(judged.qd) / bound.fast - 1, judged.qdd / bound.hard - 1
         more = np.maximum(times[0], 0) + _observer.REGIME_HARDER * np.maximum(times[1], 0)
         rows = ~judged.rest & bound.shown & (more > FURTHER)
         rows &= (judged.t - judged.t[0] > self.settle)[:, None]
-        rows &= rows.sum(axis=0) * trace.dt > SHORTLY
+        rows &= rows.sum(axis=0) * judged.dt > SHORTLY
         found = {
-            name: float(np.quantile(judged.bound[rows[:, j], j], 0.9))
-            for j, name in enumerate(trace.joint_names)
-            if rows[:, j].any()
+            int(j): float(np.quantile(judged.bound[rows[:, j], j], 0.9))
+            for j in np.flatnonzero(rows.any(axis=0))
         }
-        return float(rows.any(axis=1).sum() * trace.dt), found
+        return float(rows.any(axis=1).sum() * judged.dt), found
 
     def judge(self, trace: Trace) -> Judged:
         """Ratios, bounds and residuals of a trace.
@@ -156,13 +163,13 @@ class FittedFreeMotion(Frozen):
             raise ValueError(
                 f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
             )
-        ratio, bound, residual, qdd, rest = (np.empty_like(trace.q) for _ in range(5))
+        ratio, bound, residual, qdd, rest, hides = (np.empty_like(trace.q) for _ in range(6))
         steps = np.concatenate([[self.dt], intervals(trace.t, len(trace.t))])
         q, qd, current = (np.ascontiguousarray(x) for x in (trace.q, trace.qd, trace.current))
         native(self.arm, self.bound, self.load).run(
-            steps, q, qd, current, ratio, bound, residual, qdd, rest
+            steps, q, qd, current, ratio, bound, residual, qdd, rest, hides
         )
-        return Judged(trace.t, trace.qd, qdd, ratio, bound, residual, rest > 0)
+        return Judged(trace.t, trace.qd, qdd, ratio, bound, residual, rest > 0, hides)
 
 
 @dataclass(frozen=True)
@@ -242,7 +249,7 @@ def _calmest(judged: Sequence[Judged], joints: int) -> Array:
     """Standard deviation of the residual in the calmest tenth of pieces [N m], shape (n,)."""
     found = [np.full((1, joints), np.inf)]
     for part in judged:
-        length = max(4, round(PIECE / float(np.median(np.diff(part.t)))))
+        length = max(4, round(PIECE / part.dt))
         still = part.rest.all(axis=1) & (part.t - part.t[0] > 2 * SETTLE)
         if len(still) < length:
             continue
@@ -306,8 +313,7 @@ def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
     peaks: list[list[Array]] = [[], [], []]
     seconds = np.zeros((3, n))
     for part in judged:
-        dt = float(np.median(np.diff(part.t)))
-        settled = (part.t - part.t[0] > 2 * SETTLE)[:, None]
+        dt, settled = part.dt, (part.t - part.t[0] > 2 * SETTLE)[:, None]
         signal = part.ratio * part.bound
         stirred = (part.bound - prior.rest) / prior.stop
         moving = ~part.rest & settled
@@ -344,7 +350,8 @@ def _in_motion(bound: Bound, part: Judged) -> Array:
 
 def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
     """Each joint's quantile of the residual in motion, shape (n, 5)."""
-    rows = [np.flatnonzero(p.t - p.t[0] > 2 * SETTLE)[:: _stride(p)] for p in judged]
+    settled = [np.flatnonzero(p.t - p.t[0] > 2 * SETTLE) for p in judged]
+    rows = [r[:: max(1, round(EVERY / p.dt))] for p, r in zip(judged, settled, strict=True)]
     pairs = list(zip(judged, rows, strict=True))
 
     def stacked(name: str) -> Array:
@@ -364,16 +371,11 @@ def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
     return found
 
 
-def _stride(part: Judged) -> int:
-    return max(1, round(EVERY / float(np.median(np.diff(part.t)))))
-
-
 def _noise(judged: Sequence[Judged], prior: Array) -> Array:
     """Standard deviation of the residual at rest [N m], (n,); ``prior`` if a joint never rests."""
     changes = []
     for part in judged:
-        dt = float(np.median(np.diff(part.t)))
-        step, settled = max(1, round(0.05 / dt)), max(1, round(1.0 / dt))
+        step, settled = max(1, round(0.05 / part.dt)), max(1, round(1.0 / part.dt))
         still = sustained(part.rest.all(axis=1).astype(float), settled) > 0
         changes.append((part.residual[step:] - part.residual[:-step])[still[step:]])
     all_of = np.concatenate(changes or [np.empty((0, len(prior)))])

@@ -37,6 +37,7 @@ class FreeMotion {
   // Absolute accelerations [rad/s^2].
   const std::vector<double>& qdd() const { return estimator_.acceleration(); }
   bool rest(std::size_t j) const { return regimes_.rest(j); }
+  Regimes::Hides hides(std::size_t j) const { return regimes_.hides(j); }
 
   void reset() {
     count_ = 0;

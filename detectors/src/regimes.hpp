@@ -101,15 +101,24 @@ class Regimes {
     near_for_ = recent;
     stirred_ = usual_ = 1.0;
     age_ = unknown_for_ = 0.0;
-    elsewhere_ = false;
+    elsewhere_ = moving_ = false;
   }
 
   bool rest(std::size_t j) const { return joints_[j].rest; }
+
+  // Whether joint j is the reason why joints are not judged: it moves (or did soon before), or it
+  // stands elsewhere while joints move, and no log shows its motion.
+  enum Hides { nothing = 0, by_motion = 1, by_place = 2 };
+  Hides hides(std::size_t j) const {
+    if (unknown_for_ > 0.0) return joints_[j].unknown_for > 0.0 ? by_motion : nothing;
+    return joints_[j].away && moving_ ? by_place : nothing;
+  }
 
   // Positions [rad] and speeds [rad/s], `dt` s after the last; goes before judge().
   void motion(const double* q, const double* qd, double dt) {
     double fastest = 0.0;
     elsewhere_ = false;
+    unknown_for_ = 0.0;
     const double keep = std::exp(-dt / settles), own = std::exp(-dt / after);
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& one = joints_[j];
@@ -125,13 +134,14 @@ class Regimes {
       one.slow_for = stands ? one.slow_for + dt : 0.0;
       one.moved = stands ? 0.0 : one.moved + dt;
       one.own *= own;
-      if (unknown && !stands) unknown_for_ = settles;
+      one.unknown_for = std::max(0.0, (unknown && !stands ? settles : one.unknown_for) - dt);
+      one.away = away;
+      unknown_for_ = std::max(unknown_for_, one.unknown_for);
       elsewhere_ = elsewhere_ || away;
     }
     fastest_ = fastest;
     before_ = std::max(fastest, before_ * std::exp(-dt / brakes));
     near_for_ += dt;
-    unknown_for_ = std::max(0.0, unknown_for_ - dt);
     stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
     usual_ = std::min(dt, forget * usual_);
     age_ += dt;
@@ -145,11 +155,13 @@ class Regimes {
     double hardest = 0.0;
     for (std::size_t j = 0; j < joints_.size(); ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
     bool begins = false;
+    moving_ = false;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& one = joints_[j];
       const bool was = one.rest;
       one.since += dt;
       one.rest = one.slow_for >= wait;
+      moving_ = moving_ || !one.rest;
       one.held = one.held && one.rest;
       double signal = left[j];
       if (one.rest) {
@@ -193,7 +205,9 @@ class Regimes {
     int count = 0;                    // number of successive samples above the bound
     double shaken = 0.0, hard = 0.0;  // parts of the bound due to acceleration [N m], [beyond]
     int close = 0;                    // successive samples in motion above `near` times the bound
+    double unknown_for = 0.0;         // remaining time of motion that no log shows [s]
     bool rest = false, held = false;  // held: takes part in a contact
+    bool away = false;                // stands where no log shows it
   };
 
   double moving(std::size_t j, double qd, double qdd, double hardest, double dt) {
@@ -312,6 +326,7 @@ class Regimes {
   double age_ = 0.0;                    // time since the first sample [s]
   double unknown_for_ = 0.0;            // remaining time in which nothing is judged [s]
   bool elsewhere_ = false;              // a joint stands where no log shows it
+  bool moving_ = false;                 // a joint is not at rest
 };
 
 }  // namespace tauguard::detectors

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
-from tauguard.detectors._observer import REGIME_SETTLES
+from tauguard.detectors._observer import HIDES_BY_MOTION, HIDES_BY_PLACE, REGIME_SETTLES
 from tauguard.detectors.alarms.log_detection import detect_in_log
 from tauguard.detectors.alarms.training import carrying
 from tauguard.detectors.calibration.recording import Load, Recording
@@ -17,7 +17,7 @@ from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
 from tauguard.detectors.features.motion_regimes import exceeded
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
-from tests.detectors.synthetic_arm import GAIN, nominal, record
+from tests.detectors.synthetic_arm import GAIN, held_joint, nominal, record
 from tests.oracles.added_contact import Added, add_contact
 
 
@@ -69,15 +69,15 @@ def test_half_a_second_is_meant_at_every_rate(dt):
 
 def test_motion_beyond_the_logs_is_told_with_the_torque_that_it_hides(fitted):
     trace = record(7)
-    assert fitted.beyond(trace) == (0.0, {})
+    assert fitted.beyond(fitted.judge(trace)) == (0.0, {})
     slow = replace(fitted, bound=replace(fitted.bound, fast=fitted.bound.fast * [0.4, 1.0, 1.0]))
-    seconds, levels = slow.beyond(trace)
     judged = slow.judge(trace)
+    seconds, levels = slow.beyond(judged)
     over = (np.abs(trace.qd[:, 0]) > 1.25 * slow.bound.fast[0]) & (trace.t > 0.5)
-    assert list(levels) == ["a"]
+    assert list(levels) == [0]
     assert seconds == pytest.approx(0.01 * over.sum(), rel=0.2)
-    assert (judged.bound[over, 0] < levels["a"]).mean() > 0.85
-    assert levels["a"] > 1.2 * np.quantile(fitted.judge(trace).bound[over, 0], 0.9)
+    assert (judged.bound[over, 0] < levels[0]).mean() > 0.85
+    assert levels[0] > 1.2 * np.quantile(fitted.judge(trace).bound[over, 0], 0.9)
 
 
 def test_what_the_card_says_at_twice_the_speed_is_found_there(fitted):
@@ -297,6 +297,22 @@ def test_a_stop_confirms_the_joint_that_was_nearest_to_its_bound(fitted):
             right += [np.flatnonzero(row).tolist() == [strong] for row in first]
     assert len(right) > 12
     assert np.mean(right) >= 0.9
+
+
+def test_each_sample_says_which_joint_hides_contacts():
+    """Joint c stands in all logs; it turns from 14 to 15 s, and then stands elsewhere."""
+    detector = FreeMotion().fit([held_joint(k) for k in range(3)], ArmModel(nominal(), GAIN))
+    trace = held_joint(7)
+    q, qd, t = trace.q.copy(), trace.qd.copy(), trace.t
+    q[:, 2] += 0.6 * np.clip(t - 14.0, 0.0, 1.0)
+    qd[:, 2] += np.where((t > 14.0) & (t < 15.0), 0.6, 0.0)
+    judged = detector.judge(replace(trace, q=q, qd=qd))
+    hides = judged.hides
+    moving, later = (t > 14.02) & (t < 14.98 + REGIME_SETTLES), t > 15.03 + REGIME_SETTLES
+    assert (hides[t < 14.0] == 0).all()
+    assert (hides[moving] == [0, 0, HIDES_BY_MOTION]).all()
+    assert (hides[later] == [0, 0, HIDES_BY_PLACE]).all()
+    assert not (judged.ratio[moving] > 0).any()
 
 
 def test_few_seconds_leave_the_friction_level_unsure(fitted):
