@@ -1,7 +1,7 @@
 """Read the logs of one real arm for the commands: files, joints, units and loads."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 from tauguard.datasets.columns import ANGLES, AS_IS, Reading, column_map
 from tauguard.datasets.log_checks import saturated
 from tauguard.datasets.logs import Log, chosen, read_log
-from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
+from tauguard.datasets.real_arms import is_torque, of_log, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
@@ -120,19 +120,15 @@ def read_logs(
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
     files = log_files(logs)
-    joints = robot_numbers(robot)[0].joint_names if columns in ("auto", None) else ()
+    numbers = robot_numbers(robot)
+    joints = numbers.joint_names if columns in ("auto", None) else ()
     reading = of_one_unit(files, columns, reading or AS_IS, joints)
     read = {path.name: read_one(path, columns, torque, reading, joints) for path in files}
     for name, log in read.items():
         _refuse_touched(name, log)
     notes = _gathered(read)
-    numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
-    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
-    if linear := ", ".join(name for name, is_linear in pairs if is_linear):
-        _refuse_linear_degrees(read, linear)
-        held += (
-            f"{linear}: linear, so its numbers are in m, m/s and N, not in rad, rad/s and N m",
-        )
+    numbers, held = of_log(numbers, next(iter(read.values())).trace.joint_names, robot)
+    held += linear_axes(numbers, read)
     traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
     for name, trace in traces.items():
         _refuse_saturated(name, trace)
@@ -162,14 +158,26 @@ def of_one_unit(
     return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
 
 
-def _refuse_linear_degrees(read: dict[str, Log], linear: str) -> None:
-    """Raise ``ValueError`` if columns of the axes ``linear`` are read in degrees."""
+def linear_axes(numbers: RobotNumbers, read: Mapping[str, Log]) -> tuple[str, ...]:
+    """A note on the units of linear axes; none for an arm without them.
+
+    Args:
+        numbers: the robot's numbers for the joints of the logs.
+        read: logs by file name.
+
+    Raises:
+        ValueError: the columns of these axes are read in degrees.
+    """
+    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
+    if not (linear := ", ".join(name for name, is_linear in pairs if is_linear)):
+        return ()
     for name, log in read.items():
         if log.columns is not None and log.columns.degrees is True:
             raise ValueError(
                 f"{name}: {linear} is a linear axis, but is read in degrees as the others: "
                 'give a column map in which "degrees" is a list, false for this axis [m]'
             )
+    return (f"{linear}: linear, so its numbers are in m, m/s and N, not in rad, rad/s and N m",)
 
 
 def _gathered(read: dict[str, Log]) -> list[str]:

@@ -30,21 +30,34 @@ from tauguard.untrusted_input import read_text
 SAME_PLACE = 1e-3
 
 
-def robot_numbers(
-    robot: Path, given: tuple[str, ...] | None = None
+def robot_numbers(robot: Path) -> RobotNumbers:
+    """The numbers of a robot file (URDF or MJCF).
+
+    Raises:
+        ValueError: the file cannot be read; the message names it.
+    """
+    try:
+        return RobotNumbers.from_pin(pin_model(robot))
+    except ValueError as error:
+        name = "" if str(robot) in str(error) else f"{robot}: "
+        raise ValueError(f"{name}{error}") from None
+
+
+def of_log(
+    numbers: RobotNumbers, given: tuple[str, ...], robot: Path
 ) -> tuple[RobotNumbers, tuple[str, ...]]:
-    """The numbers of a robot file, and a note on joints that the log lacks (they are held at 0).
+    """The numbers for the joints of a log, and a note on joints that it lacks (held at 0).
 
     Args:
-        robot: URDF or MJCF.
-        given: joints of the log, in any order, or ``joint_1``, ... (default: all of the robot's).
+        numbers: those of the file ``robot``.
+        given: joints of the log, in any order, or ``joint_1``, ...
+        robot: named in the note.
 
     Raises:
         ValueError: joints that the robot does not have.
     """
-    numbers = RobotNumbers.from_pin(pin_model(robot))
     names = numbers.joint_names
-    if given is None or len(given) >= len(names):
+    if len(given) >= len(names):
         return numbers, ()
     kept = names[: len(given)] if given == unnamed(len(given)) else given
     if not set(kept) <= set(names):
@@ -67,19 +80,14 @@ def is_torque(trace: Trace) -> bool:
 # -- consistency of robot file, model and logs -----------------------------------------------------
 
 
-def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
-    """Refuse a robot file that cannot be read, or that describes another arm than a trained model.
+def check_robot(numbers: RobotNumbers, robot: Path, trained: RobotNumbers, model: Path) -> None:
+    """Refuse the numbers of a robot file if a model was trained on another arm.
 
     Names and placements of the joints must agree. Masses may differ: calibration changes them.
 
     Raises:
         ValueError: one line that names both files.
     """
-    try:
-        numbers = RobotNumbers.from_pin(pin_model(robot))
-    except ValueError as error:
-        name = "" if str(robot) in str(error) else f"{robot}: "
-        raise ValueError(f"{name}{error}") from None
     own, names = numbers.joint_names, trained.joint_names
     if not set(names) <= set(own):
         raise ValueError(

@@ -61,9 +61,17 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
         raise ValueError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
             f"{1e3 * dt:g} ms: "
-            + (f"resample it to that (--resample {1 / dt:g}), or " if trace.dt < dt else "")
+            + (f"resample it to that (--resample {plain_rate(dt):g}), or " if trace.dt < dt else "")
             + "train a detector on recordings of its rate"
         )
+
+
+def plain_rate(dt: float) -> float:
+    """Samples per second; a number with few digits if one is within 3 %, as times jitter [Hz]."""
+    hz = 1 / dt
+    steps = (1,) if abs(hz - round(hz)) < 1e-4 * hz else (100, 50, 25, 10, 5, 1)
+    near = (step * round(hz / step) for step in steps)
+    return next((rate for rate in near if abs(rate - hz) < 0.03 * hz), hz)
 
 
 def same_rate(dt: float, trained: float) -> bool:

@@ -9,6 +9,7 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.cli.detect import explained
+from tauguard.datasets import real_arms
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.events import Alarm
 from tauguard.models import pin_model
@@ -69,6 +70,24 @@ def test_columns_are_found_by_the_names_of_the_robots_joints(log, capsys):
     np.savetxt(log / "log.csv", table, delimiter=",", fmt="%.9g", header=header, comments="")
     run(log, "--columns", "auto", "--gains", "8", "5")
     assert "1 alarm in 8.0 s watched" in capsys.readouterr().out
+
+
+def test_the_robot_file_is_read_once_and_a_linear_axis_in_degrees_is_refused(
+    log, capsys, monkeypatch
+):
+    table = np.loadtxt(log / "log.csv", delimiter=",")
+    table[:, 1:5] *= 180 / np.pi
+    header = "t,q_j1,q_j2,qd_j1,qd_j2,current_j1,current_j2"
+    np.savetxt(log / "log.csv", table, delimiter=",", fmt="%.9g", header=header, comments="")
+    parsed = []
+    monkeypatch.setattr(real_arms, "pin_model", lambda file: parsed.append(file) or pin_model(file))
+    run(log, "--columns", "auto", "--gains", "8", "5")
+    assert "1 alarm in 8.0 s watched" in capsys.readouterr().out
+    assert parsed == [log / "arm.xml"]
+    (log / "arm.xml").write_text(ARM.replace('name="j2"', 'name="j2" type="slide"'))
+    with pytest.raises(SystemExit):
+        run(log, "--columns", "auto", "--gains", "8", "5")
+    assert "log.csv: j2 is a linear axis, but is read in degrees" in capsys.readouterr().err
 
 
 def test_the_push_is_found_and_nothing_else(log, capsys):

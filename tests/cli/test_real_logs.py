@@ -344,7 +344,7 @@ def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
 
 
 def test_where_the_scale_comes_from_is_said(folder):
-    numbers, _ = real_arms.robot_numbers(folder / "arm.xml")
+    numbers = real_arms.robot_numbers(folder / "arm.xml")
     recordings = arm_logs.with_loads({"a": record(0, 12.0)}, ())
     assert real_arms.initial_arm(numbers, recordings, None, tuple(GAIN), "auto")[1] == "gains"
     assert real_arms.initial_arm(numbers, recordings, None, (), "auto")[1] == "masses"

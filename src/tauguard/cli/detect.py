@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.datasets.logs import Log
-    from tauguard.detectors import CollisionAlarm, Diagnosis
+    from tauguard.detectors import CollisionAlarm, Diagnosis, RobotNumbers
     from tauguard.detectors.alarms.log_detection import LogDetection
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
     from tauguard.traces import Trace
@@ -101,16 +101,16 @@ def command(
         raise ValueError("--quiet and --gains cannot be combined with --model (trained already)")
     robot = bodies_file(robot)
     check_no_device(log)
-    joints = robot_numbers(robot)[0].joint_names if columns in ("auto", None) else ()
+    numbers = robot_numbers(robot)
+    joints = numbers.joint_names if columns in ("auto", None) else ()
     read = read_one(log, columns, torque, reading, joints)
     print_notes(read.notes)
-    trace = read.trace
     if model is not None:
-        trace, alarm = trained(model, log.name, trace, payload, robot)
+        trace, alarm = trained(model, log.name, read, payload, robot, numbers)
     else:
         seconds = QUIET if quiet is None else quiet
         refuse_touched(log, read, seconds)
-        trace, alarm = learned(log, trace, robot, columns, seconds, gains, payload)
+        trace, alarm = learned(log, read, robot, numbers, columns, seconds, gains, payload)
     found = detect_in_log(alarm, trace, payload is not None)
     causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
@@ -138,14 +138,14 @@ def refuse_touched(log: Path, read: Log, quiet: float) -> None:
 
 
 def trained(
-    model: Path, log: str, trace: Trace, payload: str | None, robot: Path
+    model: Path, log: str, read: Log, payload: str | None, robot: Path, numbers: RobotNumbers
 ) -> tuple[Trace, CollisionAlarm]:
     """The log in the joint order of a trained detector, and the detector.
 
     A note names joints whose columns do not fit the detector's arm.
     """
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import matched, parse_load
+    from tauguard.datasets.arm_logs import linear_axes, matched, parse_load
     from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.training import carrying
@@ -156,8 +156,9 @@ def trained(
     if payload is not None:
         alarm = carrying(alarm, parse_load(payload))
     arm = alarm.detector.arm
-    check_robot(robot, arm.robot, model)
-    trace = matched(trace, arm.robot.joint_names)
+    check_robot(numbers, robot, arm.robot, model)
+    trace = matched(read.trace, arm.robot.joint_names)
+    print_notes(linear_axes(arm.robot, {log: read}))
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")
     for check in (check_signs, check_order):
@@ -171,8 +172,9 @@ def trained(
 
 def learned(
     log: Path,
-    trace: Trace,
+    read: Log,
     robot: Path,
+    numbers: RobotNumbers,
     columns: str | None,
     quiet: float,
     gains: tuple[float, ...],
@@ -183,14 +185,14 @@ def learned(
 
     from tauguard.cli.free_logs import free_arm, free_detector
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import matched, parse_load
-    from tauguard.datasets.real_arms import robot_numbers
+    from tauguard.datasets.arm_logs import linear_axes, matched, parse_load
+    from tauguard.datasets.real_arms import of_log
     from tauguard.detectors.alarms.training import free_alarm
     from tauguard.detectors.calibration.recording import Load, Recording, cut
 
-    numbers, held = robot_numbers(robot, trace.joint_names)
-    print_notes(held)
-    trace = matched(trace, numbers.joint_names)
+    numbers, held = of_log(numbers, read.trace.joint_names, robot)
+    print_notes((*held, *linear_axes(numbers, {log.name: read})))
+    trace = matched(read.trace, numbers.joint_names)
     length = float(trace.t[-1] - trace.t[0])
     if not 0 < quiet < length:
         raise ValueError(
@@ -205,8 +207,8 @@ def learned(
         detector = free_detector(arm, first)
     except ValueError as error:
         raise ValueError(
-            f"{log}, its first {quiet:g} s (--quiet): {error}; `tauguard train --free` has "
-            "--accept for a log that nothing touched"
+            f"{log}, its first {quiet:g} s (--quiet): {error}; or did something touch the arm in "
+            "them? `tauguard train --free` has --accept for a log that nothing touched"
         ) from None
     print_notes([f"learned from the first {quiet:g} s; gains: {source}"])
     detector = dataclasses.replace(detector, settle=quiet)

@@ -63,7 +63,7 @@ def command(
         rerun: `view` opens the rerun viewer; FILE.rrd records the same display in a file.
     """
     from tauguard.cli import expect
-    from tauguard.datasets.real_arms import check_robot
+    from tauguard.datasets.real_arms import check_robot, robot_numbers
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.monitor import Monitor
     from tauguard.live.display import BackgroundDisplay
@@ -88,7 +88,7 @@ def command(
     alarm = with_load(load_model(model), model, payload, torque)
     if alarm.inputs is None:
         raise ValueError(f"{model}: has no limits of usual samples; train the detector anew")
-    check_robot(robot, alarm.detector.arm.robot, model)
+    check_robot(robot_numbers(robot), robot, alarm.detector.arm.robot, model)
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)
         source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))

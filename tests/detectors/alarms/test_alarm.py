@@ -18,6 +18,7 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.alarms.training import left_out, train_and_score, with_rate
 from tauguard.detectors.features.front_end import FrontEndSettings
+from tauguard.detectors.samples import plain_rate
 from tauguard.detectors.scores.baselines import MovingThresholds
 from tauguard.detectors.thresholds.free_scores import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
@@ -199,6 +200,22 @@ def test_absurd_samples_are_named_and_not_taken_for_silence(alarm, unseen):
     stream.step(trace.q[0], trace.qd[0], trace.current[0])
     with pytest.raises(ValueError, match="score is not a number"):
         [stream.step(trace.q[k], qd[4000], trace.current[k]) for k in range(1, 20)]
+
+
+@pytest.mark.parametrize(
+    ("milliseconds", "hz"),
+    [
+        (8.2, 125),
+        (8.0, 125),
+        (2.0, 500),
+        (1000 / 60, 60),
+        (20.3, 50),
+        (1000 / 240.1, 240),
+        (70, 14),
+    ],
+)
+def test_a_rate_is_proposed_in_few_digits(milliseconds, hz):
+    assert plain_rate(milliseconds / 1e3) == hz
 
 
 def test_another_rate_is_refused_in_batch_and_online(alarm, unseen):
