@@ -117,7 +117,7 @@ def _unwatched(judged: Judged, names: Sequence[str], rows: Bools) -> tuple[float
     ):
         own = (judged.hides == reason) & rows[:, None]
         if seconds := float(steps[own.any(axis=1)].sum()):
-            joints = ", ".join(names[j] for j in np.flatnonzero(own.any(axis=0)))
+            joints = ", ".join(names[j] for j in np.flatnonzero(own.any(axis=0)).tolist())
             notes.append(f"{joints}: {text} {seconds:.1f} s of this log")
         total += seconds
     return total, notes
