@@ -29,7 +29,8 @@ def read_head(folder: Path) -> dict[str, Any]:
     """The content of ``dataset.json``.
 
     Raises:
-        ValueError: the folder holds no dataset, a damaged one, or one of a newer format.
+        ValueError: the folder holds no dataset, a damaged one (also one whose numbers of shards
+            are not those of its configuration), or one of a newer format.
         FileNotFoundError: no such folder.
     """
     path = folder / HEAD
@@ -47,11 +48,15 @@ def read_head(folder: Path) -> dict[str, Any]:
                 f"{folder}: a dataset of format {version}; this tauguard reads up to {FORMAT}: "
                 "install a newer version"
             )
-        Configuration.from_json(json.dumps(head["configuration"]))
+        own = Configuration.from_json(json.dumps(head["configuration"]))
+        counts = {split.name: shard_count(own, split.name) for split in own.splits}
+        if head.get("shards", counts) != counts:
+            raise LookupError("shards: not those of the configuration")
     except (
         LookupError,
         TypeError,
         AttributeError,
+        ArithmeticError,
         json.JSONDecodeError,
         UnicodeDecodeError,
         RecursionError,

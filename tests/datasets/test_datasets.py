@@ -198,6 +198,16 @@ def test_a_newer_format_is_refused_with_its_number(tiny, tiny_toml, tmp_path):
     assert contents(folder) == before
 
 
+@pytest.mark.parametrize("episodes", [0, 5])
+def test_a_head_with_another_number_of_episodes_is_damaged(tiny, tmp_path, episodes):
+    """It would be read as a dataset without them, or as one that is not complete."""
+    head = json.loads((tiny / HEAD).read_text())
+    head["configuration"]["splits"][0]["episodes"] = episodes
+    (tmp_path / HEAD).write_text(json.dumps(head))
+    with pytest.raises(ValueError, match="damaged"):
+        next(read(tmp_path))
+
+
 def test_the_quick_part_is_the_beginning_of_the_whole(tiny, tiny_toml, tmp_path):
     generate_dataset(load(tiny_toml).quick(), tmp_path / "quick", workers=1)
     name = "data/train-000000.parquet"
