@@ -48,8 +48,8 @@ void leaf_candidates_in(const FeatureTree& a, const FeatureTree& b, NodePair lea
   LeafLanes<Bound> left = a.lanes_of<Bound>(leaves.a);
   const LeafLanes<Bound> right = b.lanes_of<Bound>(leaves.b);
   if (!same)  // the first three axes reject nearly all rows that can be rejected
-    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block,
-                                          a.times(), left.occupied);
+    left.occupied = kernels.lanes_of_node(b.node<Bound>(b.leaves() + leaves.b), a.slots(),
+                                          left.block, a.times(), left.occupied);
   Overlaps found;
   kernels.leaf_pair(left, right, a.axes(), a.times(), same, found);
   out.adjacent += found.adjacent;

@@ -19,7 +19,15 @@ using geometry::ThreadPool;
 // Largest number of features per leaf in a build: `full` until update() first adds features, and
 // `with_room` from then on, which leaves free slots for later additions.
 constexpr std::size_t full = lanes, with_room = 13;
-constexpr float infinity = std::numeric_limits<float>::infinity();
+// Bounds of nothing: below and above all bounds of points.
+template <class Bound>
+constexpr Bound nothing_high = std::numeric_limits<Bound>::lowest();
+template <class Bound>
+constexpr Bound nothing_low = std::numeric_limits<Bound>::max();
+template <>
+constexpr float nothing_high<float> = -std::numeric_limits<float>::infinity();
+template <>
+constexpr float nothing_low<float> = std::numeric_limits<float>::infinity();
 
 struct Centroid {
   double x[3];
@@ -69,8 +77,8 @@ void FeatureTree::build(const Features& features, const Ends& x, const Groups& g
   vertices_.assign(n * lanes * arity_, -1);
   occupied_.assign(n, 0);
   free_.assign(2 * n, lanes);
-  nodes_.clear();
-  blocks_.clear();
+  floats_ = {};
+  shorts_ = {};
 
   const auto at = centroids(features, x, groups);
   std::vector<std::int32_t> order(features.size());
@@ -136,149 +144,183 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
 }
 
 // One bound of a feature on every axis slot at both ends of the step, [end][slot].
-template <int slots>
+template <int slots, class Bound>
 struct Row {
-  using Four = geometry::Float4;
-  static constexpr int fours = slots / 2;
-  Four value[fours];
+  static constexpr int size = 2 * slots, wide = 16 / sizeof(Bound), count = size / wide;
+  typedef Bound Wide __attribute__((vector_size(16)));
+  Wide value[count];
 
-  float& operator[](int r) { return reinterpret_cast<float*>(value)[r]; }
-  void fill(float x) { std::fill(value, value + fours, Four{x, x, x, x}); }
-  void load(const float* from) { std::memcpy(value, from, sizeof value); }
+  void fill(Bound x) { std::fill(value, value + count, Wide{} + x); }
+  void load(const Bound* from) { std::memcpy(value, from, sizeof value); }
   void lower_to(const Row& o) {
-    for (int i = 0; i < fours; ++i) value[i] = o.value[i] < value[i] ? o.value[i] : value[i];
+    for (int i = 0; i < count; ++i) value[i] = o.value[i] < value[i] ? o.value[i] : value[i];
   }
   void raise_to(const Row& o) {
-    for (int i = 0; i < fours; ++i) value[i] = value[i] < o.value[i] ? o.value[i] : value[i];
+    for (int i = 0; i < count; ++i) value[i] = value[i] < o.value[i] ? o.value[i] : value[i];
   }
-  void add(const Row& o, float sign) {
-    for (int i = 0; i < fours; ++i) value[i] += sign * o.value[i];
+  // Exchanges both ends of the step.
+  Row other_end() const {
+    Row other;
+    std::memcpy(&other, reinterpret_cast<const Bound*>(value) + slots, sizeof value / 2);
+    std::memcpy(reinterpret_cast<Bound*>(other.value) + slots, value, sizeof value / 2);
+    return other;
   }
 };
 
-// Exchanges both ends of the step.
+// The lower and the upper bounds of a point.
 template <int slots>
-Row<slots> other_end(const Row<slots>& row) {
-  Row<slots> other;
-  for (int i = 0; i < row.fours; ++i) other.value[i] = row.value[(i + row.fours / 2) % row.fours];
-  return other;
+TAUGUARD_INLINE void load(const Projection& points, std::int32_t v, Row<slots, std::int16_t>& low,
+                          Row<slots, std::int16_t>& high) {
+  low.load(points.shorts_of(v));
+  high.load(points.shorts_of(v) + 2 * slots);
 }
-
-// Writes the lower or upper bounds of 16 volumes into a block, 4 x 4 at a time.
-template <int slots, class Bound>
-void write_lanes(const Row<slots>* rows, int axes, int times, Bound* block) {
-  for (int r = 0; r < times * slots; r += 4) {
-    const int t = r / slots;
-    for (int lane = 0; lane < lanes; lane += 4) {
-      const auto a = rows[lane].value[r / 4], b = rows[lane + 1].value[r / 4],
-                 c = rows[lane + 2].value[r / 4], d = rows[lane + 3].value[r / 4];
-      const auto ab = __builtin_shufflevector(a, b, 0, 4, 1, 5);
-      const auto cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
-      const auto later_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-      const auto later_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-      const typename Row<slots>::Four columns[] = {
-          __builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(ab, cd, 2, 3, 6, 7),
-          __builtin_shufflevector(later_ab, later_cd, 0, 1, 4, 5),
-          __builtin_shufflevector(later_ab, later_cd, 2, 3, 6, 7)};
-      for (int j = 0; j < 4; ++j) {
-        const int axis = r % slots + j;
-        if (axis < axes) convert(columns[j], block + (axis * times + t) * 2 * lanes + lane);
-      }
-    }
+template <int slots>
+TAUGUARD_INLINE void load(const Projection& points, std::int32_t v, Row<slots, float>& low,
+                          Row<slots, float>& high) {
+  Row<slots, float> pad;
+  for (int r = 0; r < 2 * slots; r += slots)
+    std::memcpy(reinterpret_cast<float*>(pad.value) + r, points.pad(), slots * sizeof(float));
+  low.load(points.of(v));
+  for (int i = 0; i < low.count; ++i) {
+    high.value[i] = low.value[i] + pad.value[i];
+    low.value[i] -= pad.value[i];
   }
 }
 
-template <int slots>
-void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
+TAUGUARD_INLINE geometry::Float4 alternate(geometry::Float4 a, geometry::Float4 b, bool first) {
+  return first ? __builtin_shufflevector(a, b, 0, 4, 1, 5)
+               : __builtin_shufflevector(a, b, 2, 6, 3, 7);
+}
+using Short8 = std::int16_t __attribute__((vector_size(16)));
+TAUGUARD_INLINE Short8 alternate(Short8 a, Short8 b, bool first) {
+  return first ? __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11)
+               : __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
+}
+
+// Writes the lower or upper bounds of 16 volumes into a block. Squares of values are transposed:
+// each round brings values of two rows that are half a square apart side by side.
+template <int slots, class Bound>
+void write_lanes(const Row<slots, Bound>* rows, int axes, int times, Bound* block) {
+  using R = Row<slots, Bound>;
+  for (int i = 0; i * R::wide < times * slots; ++i)
+    for (int lane = 0; lane < lanes; lane += R::wide) {
+      typename R::Wide square[R::wide], next[R::wide];
+#pragma GCC unroll 8
+      for (int j = 0; j < R::wide; ++j) square[j] = rows[lane + j].value[i];
+#pragma GCC unroll 3
+      for (int round = 1; round < R::wide; round *= 2) {
+#pragma GCC unroll 8
+        for (int j = 0; j < R::wide; ++j)
+          next[j] = alternate(square[j / 2], square[j / 2 + R::wide / 2], j % 2 == 0);
+#pragma GCC unroll 8
+        for (int j = 0; j < R::wide; ++j) square[j] = next[j];
+      }
+#pragma GCC unroll 8
+      for (int j = 0; j < R::wide; ++j) {
+        const int r = i * R::wide + j, t = r / slots, axis = r % slots;
+        if (axis < axes && t < times)
+          std::memcpy(block + (axis * times + t) * 2 * lanes + lane, &square[j], sizeof square[j]);
+      }
+    }
+}
+
+template <int slots, class Bound>
+void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points, Bounds<Bound>& out) const {
+  using R = Row<slots, Bound>;
   const std::int32_t* v = vertices(leaf);
   // Vertices are scattered in memory, so the vertices of the next leaf are prefetched.
   if (leaf + 1 < leaves_)
-    for (int i = 0; i < lanes * arity_; ++i)
-      __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));
-  Row<slots> pad, point, low[lanes], high[lanes], node_low, node_high;
-  for (int r = 0; r < 2 * slots; ++r) pad[r] = points.pad()[r % slots];
-  node_low.fill(infinity);
-  node_high.fill(-infinity);
+    for (int i = 0; i < lanes * arity_; ++i) {
+      const std::int32_t next = std::max(v[lanes * arity_ + i], 0);
+      __builtin_prefetch(short_ ? static_cast<const void*>(points.shorts_of(next))
+                                : static_cast<const void*>(points.of(next)));
+    }
+  R low[lanes], high[lanes], node_low, node_high, least, most;
+  node_low.fill(nothing_low<Bound>);
+  node_high.fill(nothing_high<Bound>);
   for (int lane = 0; lane < lanes; ++lane) {
     if (!(occupied_[leaf] >> lane & 1)) {
-      low[lane].fill(infinity);
-      high[lane].fill(-infinity);
+      low[lane].fill(nothing_low<Bound>);
+      high[lane].fill(nothing_high<Bound>);
       continue;
     }
-    point.load(points.of(v[lane]));
-    Row<slots> least = point, most = point;
+    R lows, highs;
+    load(points, v[lane], lows, highs);
     for (int j = 1; j < arity_; ++j) {
-      point.load(points.of(v[j * lanes + lane]));
-      least.lower_to(point);
-      most.raise_to(point);
+      load(points, v[j * lanes + lane], least, most);
+      lows.lower_to(least);
+      highs.raise_to(most);
     }
     if (times_ == 1) {
-      least.lower_to(other_end(least));
-      most.raise_to(other_end(most));
+      lows.lower_to(lows.other_end());
+      highs.raise_to(highs.other_end());
     }
-    least.add(pad, -1);
-    most.add(pad, 1);
-    node_low.lower_to(least);
-    node_high.raise_to(most);
-    low[lane] = least;
-    high[lane] = most;
+    node_low.lower_to(lows);
+    node_high.raise_to(highs);
+    low[lane] = lows;
+    high[lane] = highs;
   }
-  const auto write = [&](auto* out) {
-    out += leaf * block_stride();
-    write_lanes(low, axes_, times_, out);
-    write_lanes(high, axes_, times_, out + lanes);
-  };
-  short_ ? write(short_blocks_.data()) : write(blocks_.data());
-  float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
-  for (int t = 0; t < times_; ++t, node += 2 * slots)
-    for (int k = 0; k < slots; ++k) {
-      node[k] = node_low[t * slots + k];
-      node[slots + k] = node_high[t * slots + k];
-    }
+  Bound* block = out.blocks.data() + leaf * block_stride();
+  write_lanes(low, axes_, times_, block);
+  write_lanes(high, axes_, times_, block + lanes);
+  Bound* node = out.nodes.data() + (leaves_ + std::size_t(leaf)) * node_stride();
+  for (int t = 0; t < times_; ++t, node += 2 * slots) {
+    std::memcpy(node, reinterpret_cast<const Bound*>(node_low.value) + t * slots,
+                slots * sizeof(Bound));
+    std::memcpy(node + slots, reinterpret_cast<const Bound*>(node_high.value) + t * slots,
+                slots * sizeof(Bound));
+  }
 }
 
-void FeatureTree::fit_inner(std::int32_t i) {
-  float* out = nodes_.data() + i * node_stride();
-  const float *a = node(2 * i), *b = node(2 * i + 1);
-  for (int t = 0; t < times_; ++t, out += 2 * slots_, a += 2 * slots_, b += 2 * slots_)
-    for (int k = 0; k < slots_; ++k) {
-      out[k] = std::min(a[k], b[k]);
-      out[slots_ + k] = std::max(a[slots_ + k], b[slots_ + k]);
-    }
-}
-
-void FeatureTree::refit(const Projection& points, bool in_short, int threads) {
-  axes_ = points.kind().axes();
-  slots_ = points.kind().slots();
-  times_ = points.kind().times();
-  const std::size_t n = leaves_;
-  if (std::exchange(short_, in_short) != in_short) {  // frees the other blocks
-    short_blocks_ = {};
-    blocks_ = {};
-  }
-  short_blocks_.resize(short_ ? n * block_stride() : 0);
-  blocks_.resize(short_ ? 0 : n * block_stride());
-  nodes_.resize(2 * n * node_stride());
-  const auto fit = slots_ == 4   ? &FeatureTree::fit_leaf<4>
-                   : slots_ == 8 ? &FeatureTree::fit_leaf<8>
-                                 : &FeatureTree::fit_leaf<16>;
+template <int slots, class Bound>
+void FeatureTree::fit(const Projection& points, int threads, Bounds<Bound>& out) {
+  const std::size_t n = leaves_, stride = node_stride();
+  out.blocks.resize(n * block_stride());
+  out.nodes.resize(2 * n * stride);
   auto& pool = ThreadPool::shared();
   pool.parallel_for(n, threads, 128, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) (this->*fit)(static_cast<std::int32_t>(i), points);
+    for (auto i = begin; i < end; ++i)
+      fit_leaf<slots, Bound>(static_cast<std::int32_t>(i), points, out);
   });
   std::size_t level = 1;
   while (2 * level < n) level *= 2;
   for (; level >= 1 && n > 1; level /= 2)
-    pool.parallel_for(std::min(2 * level, n) - level, threads, 1024,
-                      [&](auto begin, auto end, auto) {
-                        for (auto i = level + begin; i < level + end; ++i)
-                          fit_inner(static_cast<std::int32_t>(i));
-                      });
-  spread_ = 0;
+    pool.parallel_for(
+        std::min(2 * level, n) - level, threads, 1024, [&](auto begin, auto end, auto) {
+          Bound* up = out.nodes.data() + (level + begin) * stride;
+          const Bound *a = out.nodes.data() + 2 * (level + begin) * stride, *b = a + stride;
+          for (auto i = begin; i < end; ++i, a += stride, b += stride)
+            for (int t = 0; t < times_; ++t, up += 2 * slots, a += 2 * slots, b += 2 * slots) {
+              Side<slots, Bound> x[2], y[2];  // low, high
+              std::memcpy(x, a, sizeof x);
+              std::memcpy(y, b, sizeof y);
+              x[0] = y[0] < x[0] ? y[0] : x[0];
+              x[1] = x[1] < y[1] ? y[1] : x[1];
+              std::memcpy(up, x, sizeof x);
+            }
+        });
+  double sum = 0;
   for (std::size_t i = n; i < 2 * n; ++i) {
-    const float* v = node(static_cast<std::int32_t>(i));
-    for (int k = 0; k < 3 && occupied_[i - n]; ++k) spread_ += double(v[slots_ + k]) - v[k];
+    const Bound* v = out.nodes.data() + i * stride;
+    for (int k = 0; k < 3 && occupied_[i - n]; ++k) sum += double(v[slots + k]) - v[k];
   }
+  spread_ = short_ ? sum / shorts_of_unit : sum;
+}
+
+void FeatureTree::refit(const Projection& points, int threads) {
+  axes_ = points.kind().axes();
+  slots_ = points.kind().slots();
+  times_ = points.kind().times();
+  if (std::exchange(short_, points.in_short()) != short_) {  // frees the other bounds
+    shorts_ = {};
+    floats_ = {};
+  }
+  const auto fit_as = [&](auto& out) {
+    slots_ == 4   ? fit<4>(points, threads, out)
+    : slots_ == 8 ? fit<8>(points, threads, out)
+                  : fit<16>(points, threads, out);
+  };
+  short_ ? fit_as(shorts_) : fit_as(floats_);
 }
 
 std::int32_t FeatureTree::free_leaf_near(std::int32_t leaf) const {
@@ -345,14 +387,13 @@ void FeatureTree::prefetch(std::int32_t leaf) const {
   };
   short_ ? bytes(lanes_of<std::int16_t>(leaf).block, block_stride())
          : bytes(lanes_of<float>(leaf).block, block_stride());
-  bytes(node(leaves_ + leaf), node_stride());
+  bytes(static_cast<const char*>(node(leaves_ + leaf)), node_bytes());
   bytes(vertices(leaf), lanes * arity_);
   bytes(ids(leaf), 1);
 }
 
 std::size_t FeatureTree::bytes() const {
-  return (nodes_.capacity() + blocks_.capacity()) * sizeof(float) +
-         short_blocks_.capacity() * sizeof(std::int16_t) +
+  return floats_.bytes() + shorts_.bytes() +
          (ids_.capacity() + vertices_.capacity() + free_.capacity()) * sizeof(std::int32_t) +
          occupied_.capacity() * sizeof(Mask) +
          (members_.capacity() + partners_.capacity()) * sizeof(std::uint64_t);

@@ -38,9 +38,8 @@ class FeatureTree {
   // Places every feature by the centroid that its vertices have at the start of the step. The upper
   // levels of the tree divide the groups, the lower ones divide space.
   void build(const Features& features, const Ends& x, const Groups& groups, int threads);
-  // Computes the bounds of every leaf and node for this step. Bounds of features have 16 bits or
-  // are floats.
-  void refit(const Projection& points, bool in_short, int threads);
+  // Computes the bounds of every leaf and node for this step, in 16 bits or floats as the points.
+  void refit(const Projection& points, int threads);
   // Replaces the features by `features`. Old feature i becomes new_id[i]; -1 removes it. New
   // features are placed near features that share their vertices. False if there are not enough free
   // slots; then build() must be called.
@@ -53,13 +52,21 @@ class FeatureTree {
   int axes() const { return axes_; }
   int slots() const { return slots_; }
   bool is_leaf(std::int32_t node) const { return node >= leaves_; }
-  const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
-  // Whether the volumes of features are in 16 bits.
+  template <class Bound>
+  const Bound* node(std::int32_t i) const {
+    return bounds<Bound>().nodes.data() + std::size_t(i) * node_stride();
+  }
+  const void* node(std::int32_t i) const {
+    if (short_) return node<std::int16_t>(i);
+    return node<float>(i);
+  }
+  std::size_t node_bytes() const { return node_stride() * (short_ ? 2 : 4); }
+  // Whether bounds have 16 bits.
   bool is_short() const { return short_; }
   template <class Bound>
   LeafLanes<Bound> lanes_of(std::int32_t leaf) const {
-    return {blocks<Bound>().data() + std::size_t(leaf) * block_stride(), vertices(leaf), arity_,
-            occupied_[leaf]};
+    return {bounds<Bound>().blocks.data() + std::size_t(leaf) * block_stride(), vertices(leaf),
+            arity_, occupied_[leaf]};
   }
   // Prefetches the volumes and vertices of a leaf.
   void prefetch(std::int32_t leaf) const;
@@ -81,15 +88,21 @@ class FeatureTree {
   std::size_t node_stride() const { return 2 * std::size_t(slots_) * times_; }
   std::size_t block_stride() const { return 2 * std::size_t(lanes) * times_ * axes_; }
   template <class Bound>
-  const std::vector<Bound>& blocks() const {
+  struct Bounds {
+    LineVector<Bound> nodes, blocks;
+    std::size_t bytes() const { return (nodes.capacity() + blocks.capacity()) * sizeof(Bound); }
+  };
+  template <class Bound>
+  const Bounds<Bound>& bounds() const {
     if constexpr (sizeof(Bound) == sizeof(std::int16_t))
-      return short_blocks_;
+      return shorts_;
     else
-      return blocks_;
+      return floats_;
   }
-  template <int slots>
-  void fit_leaf(std::int32_t leaf, const Projection& points);
-  void fit_inner(std::int32_t node);
+  template <int slots, class Bound>
+  void fit_leaf(std::int32_t leaf, const Projection& points, Bounds<Bound>& out) const;
+  template <int slots, class Bound>
+  void fit(const Projection& points, int threads, Bounds<Bound>& out);
   void put(std::int32_t leaf, int lane, std::int32_t id, const Features& features);
   std::int32_t free_leaf_near(std::int32_t leaf) const;
   void fill_groups(const Features& features, const Groups& groups);
@@ -99,10 +112,10 @@ class FeatureTree {
   bool added_ = false;  // update() has added features
   bool short_ = false;
   double spread_ = 0;
-  std::vector<float> nodes_, blocks_;
-  std::vector<std::int16_t> short_blocks_;  // this or blocks_ is empty
-  std::vector<std::int32_t> ids_, vertices_,
-      free_;  // free_: number of empty slots below every node
+  Bounds<float> floats_;
+  Bounds<std::int16_t> shorts_;           // this or floats_ is empty
+  std::vector<std::int32_t> ids_, free_;  // free_: number of empty slots below every node
+  LineVector<std::int32_t> vertices_;
   std::vector<Mask> occupied_;
   std::vector<std::uint64_t> members_,
       partners_;  // bits (modulo 64): groups below a node; groups that these may meet

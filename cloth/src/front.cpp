@@ -29,7 +29,12 @@ struct Total {
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
-      : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
+      : a_(a),
+        b_(b),
+        self_(&a == &b),
+        test_(a.is_short() ? node_test<std::int16_t>(a.slots(), a.times())
+                           : node_test<float>(a.slots(), a.times())),
+        total_(total) {}
 
   // Splits each node that is not a leaf. If the depths differ, the node of less depth is a leaf.
   int children(NodePair p, NodePair* child) const {
@@ -147,9 +152,8 @@ class Walk {
   }
 
   static void fetch(const FeatureTree& tree, std::int32_t node) {
-    constexpr int line = 16;  // floats
-    const float* at = tree.node(node);
-    for (int i = 0; i < 2 * tree.slots() * tree.times(); i += line) __builtin_prefetch(at + i);
+    const char* at = static_cast<const char*>(tree.node(node));
+    for (std::size_t i = 0; i < tree.node_bytes(); i += 64) __builtin_prefetch(at + i);
   }
 
   const FeatureTree &a_, &b_;

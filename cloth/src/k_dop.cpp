@@ -2,14 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "tauguard/geometry/aabb.hpp"
 #include "tauguard/geometry/k_dop.hpp"
+#include "tauguard/geometry/lanes.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 namespace tauguard::cloth {
 namespace {
@@ -41,6 +48,18 @@ double shrink(double size) {
   return std::ldexp(1.0, std::clamp(-(std::ilogb(size) + 1), -1030, 1000));
 }
 
+TAUGUARD_INLINE void convert(geometry::Float4 x, std::int16_t* to) {
+  constexpr float most = shorts_of_unit;
+  x = most * x;
+  x = x < most ? x : geometry::Float4{} + most;
+#if defined(__x86_64__)
+  const __m128i whole = _mm_cvttps_epi32(x);  // -2^31 for any x below -2^31
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packs_epi32(whole, whole));
+#else
+  for (int i = 0; i < 4; ++i) to[i] = static_cast<std::int16_t>(x[i] > -most ? x[i] : -most);
+#endif
+}
+
 }  // namespace
 
 const std::int8_t (*axes_of(int k))[3] {
@@ -58,43 +77,52 @@ const std::int8_t (*axes_of(int k))[3] {
   }
 }
 
-void Projection::set(const Ends& x, std::size_t n, VolumeKind kind, double min_distance,
-                     int threads) {
+void Projection::scale_to(const Ends& x, std::size_t n, VolumeKind kind, double min_distance,
+                          int threads) {
   kind_ = kind;
-  const int axes = kind.axes();
   const auto* axis = axes_of(kind.k);
-  const int slots = kind.slots();
-  values_.resize(2 * slots * n);
   std::fill(pad_, pad_ + most_slots, 0.0f);
   double largest = 0;
   const Aabb raw = bounds(x, n, threads);
   for (int k = 0; k < 3 && n > 0; ++k) largest = std::max({largest, -raw.lo[k], raw.hi[k]});
-  const double first = shrink(largest);
-  double centre[3] = {0, 0, 0}, extent = 0;
+  first_ = shrink(largest);
+  double extent = 0;
   for (int k = 0; k < 3 && n > 0; ++k) {
-    const double lo = raw.lo[k] * first, hi = raw.hi[k] * first;
-    centre[k] = (lo + hi) / 2;
-    extent = std::max({extent, hi - centre[k], centre[k] - lo});
+    const double lo = raw.lo[k] * first_, hi = raw.hi[k] * first_;
+    centre_[k] = (lo + hi) / 2;
+    extent = std::max({extent, hi - centre_[k], centre_[k] - lo});
   }
-  const double second = shrink(extent);
-  unit_ = first * second;
+  second_ = shrink(extent);
 
-  for (int a = 0; a < axes; ++a) {
+  for (int a = 0; a < kind.axes(); ++a) {
     const int terms = std::abs(axis[a][0]) + std::abs(axis[a][1]) + std::abs(axis[a][2]);
     // Half of the minimum distance in scaled units, times |axis| / 2^(terms - 1). If it is too
     // large for float32, it becomes infinite; then nothing is apart, which is conservative.
     const double margin =
-        0.5 * min_distance * first * second * std::sqrt(double(terms)) / (1 << (terms - 1));
+        0.5 * min_distance * first_ * second_ * std::sqrt(double(terms)) / (1 << (terms - 1));
     const double padded = margin * (1 + 0x1p-20) + 0x1p-22;
     pad_[a] = padded < 1e30 ? static_cast<float>(padded) : std::numeric_limits<float>::infinity();
   }
+}
+
+void Projection::set(const Ends& x, std::size_t n, bool in_short, int threads) {
+  const int axes = kind_.axes(), slots = kind_.slots();
+  const auto* axis = axes_of(kind_.k);
+  if (std::exchange(in_short_, in_short) != in_short) {  // frees the other values
+    values_ = {};
+    shorts_ = {};
+  }
+  values_.resize(in_short ? 0 : 2 * slots * n);
+  shorts_.resize(in_short ? 4 * slots * n : 0);
+  const double first = first_, second = second_;
   ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
-      float* out = values_.data() + 2 * slots * i;
+      float own[2 * most_slots];
+      float* out = in_short ? own : values_.data() + 2 * slots * i;
       for (const bool end : {false, true}) {
         const double* p = x.at(end, static_cast<std::int32_t>(i));
         double z[3];
-        for (int k = 0; k < 3; ++k) z[k] = (p[k] * first - centre[k]) * second;
+        for (int k = 0; k < 3; ++k) z[k] = (p[k] * first - centre_[k]) * second;
         for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(z[a]);
         for (int a = 3; a < axes; ++a) {
           const auto& s = axis[a];
@@ -102,6 +130,14 @@ void Projection::set(const Ends& x, std::size_t n, VolumeKind kind, double min_d
           *out++ = static_cast<float>(sum * (s[0] != 0 && s[1] != 0 && s[2] != 0 ? 0.25 : 0.5));
         }
         for (int a = axes; a < slots; ++a) *out++ = 0;
+      }
+      std::int16_t *low = shorts_.data() + 4 * slots * i, *high = low + 2 * slots;
+      for (int r = 0; in_short && r < 2 * slots; r += 4) {
+        geometry::Float4 at, pad;
+        std::memcpy(&at, own + r, sizeof at);
+        std::memcpy(&pad, pad_ + r % slots, sizeof pad);
+        convert(at - pad, low + r);
+        convert(at + pad, high + r);
       }
     }
   });

@@ -41,26 +41,42 @@ const std::int8_t (*axes_of(int k))[3];
 // the margin on the axis for half of the minimum distance. pad = m (1 + 2^-20) + 2^-22 covers m and
 // all errors:
 //   2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
+//
+// A bound is a float, or an integer of 16 bits where that precision suffices. The conversion is
+// monotone, so that volumes that overlap also overlap in 16 bits, and minima and maxima can be
+// taken after it.
+inline constexpr int shorts_of_unit = 32000;
 class Projection {
  public:
-  // Projects n vertices with finite coordinates.
-  void set(const Ends& x, std::size_t n, VolumeKind kind, double min_distance, int threads);
+  // Chooses the scale for n vertices with finite coordinates.
+  void scale_to(const Ends& x, std::size_t n, VolumeKind kind, double min_distance, int threads);
+  // Projects the vertices, into 16 bits or floats.
+  void set(const Ends& x, std::size_t n, bool in_short, int threads);
 
   VolumeKind kind() const { return kind_; }
+  bool in_short() const { return in_short_; }
   // [end of the step][axis slot]
   const float* of(std::int32_t vertex) const {
     return values_.data() + 2 * kind_.slots() * std::size_t(vertex);
   }
+  // In 16 bits, with the pad subtracted and with the pad added, [low, high][end of the step][slot].
+  const std::int16_t* shorts_of(std::int32_t vertex) const {
+    return shorts_.data() + 4 * kind_.slots() * std::size_t(vertex);
+  }
   const float* pad() const { return pad_; }  // [axis slot]
   // The projection on x of a vector of length 1 along x.
-  double unit() const { return unit_; }
-  std::size_t bytes() const { return values_.capacity() * sizeof(float); }
+  double unit() const { return first_ * second_; }
+  std::size_t bytes() const {
+    return values_.capacity() * sizeof(float) + shorts_.capacity() * sizeof(std::int16_t);
+  }
 
  private:
   VolumeKind kind_;
   float pad_[most_slots] = {};
-  double unit_ = 1;
-  std::vector<float> values_;
+  double first_ = 1, second_ = 1, centre_[3] = {};  // 2^a, 2^b and c
+  bool in_short_ = false;
+  LineVector<float> values_;  // this or shorts_ is empty
+  LineVector<std::int16_t> shorts_;
 };
 
 }  // namespace tauguard::cloth

@@ -234,7 +234,8 @@ Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, dou
     // Projecting a vertex costs 18 ns and saves 6 ns per query, so it pays from 4 queries on.
     constexpr std::size_t pays = 4;
     if (Method(method) == Method::ab2pf && min_distance == 0 && n >= pays * x_t0.shape(0)) {
-      points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
+      points.scale_to(ends, x_t0.shape(0), seven_axes, 0, 1);
+      points.set(ends, x_t0.shape(0), false, 1);
       axes.points = &points;
     }
     if (method < first_comparator)

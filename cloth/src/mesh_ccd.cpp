@@ -109,14 +109,15 @@ bool MeshCcd::is_fast() const {
 
 void MeshCcd::place(double min_distance) {
   Clock clock;
-  points_.set(ends(), lines_.size(), volume_, min_distance, threads_);
-  stats_.project_s = clock.lap();
+  points_.scale_to(ends(), lines_.size(), volume_, min_distance, threads_);
   const bool in_short = over_edges(1 / (points_.unit() * shorts_of_unit)) <= fine;
+  points_.set(ends(), lines_.size(), in_short, threads_);
+  stats_.project_s = clock.lap();
   FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
   const Features* features[] = {&topology_.vertices, &topology_.edges, &topology_.faces};
   for (int i = 0; i < 3; ++i) {
     if (built_spread_[i] >= 0) {
-      trees[i]->refit(points_, in_short, threads_);
+      trees[i]->refit(points_, threads_);
       stats_.refit_s += clock.lap();
     }
     // Spread is in units of the scene's extent, which also makes it comparable between steps.
@@ -124,7 +125,7 @@ void MeshCcd::place(double min_distance) {
       trees[i]->build(*features[i], ends(), groups_, threads_);
       ++stats_.builds;
       stats_.build_s += clock.lap();
-      trees[i]->refit(points_, in_short, threads_);
+      trees[i]->refit(points_, threads_);
       built_spread_[i] = trees[i]->spread();
       if (i != 1) vf_front_.reset();
       if (i == 1) ee_front_.reset();

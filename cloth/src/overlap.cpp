@@ -11,20 +11,7 @@ struct RowStride {
   int axis, end, side;
 };
 constexpr RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
-constexpr RowStride in_near{1, 8, 4};
-
-// The bounds of a node on the first three axes, [end of the step][low, high][axis].
-template <class Bound>
-struct Near {
-  Bound bound[16];
-  TAUGUARD_INLINE Near(const float* node, int slots, int times) {
-    for (int i = 0; i < 2 * times; ++i) {
-      geometry::Float4 x;
-      std::memcpy(&x, node + i * slots, sizeof x);
-      convert(x, bound + 4 * i);
-    }
-  }
-};
+constexpr RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
 // The lanes with which a row is compared: all in use, or those after the row in the same leaf.
 template <class Bound>
@@ -55,9 +42,8 @@ TAUGUARD_INLINE Mask overlap_portable(const Bound* row, RowStride s, const Bound
 }
 
 template <class Bound>
-Mask node_portable(const float* node, int slots, const Bound* block, int times, Mask wanted) {
-  const Near<Bound> near(node, slots, times);
-  return overlap_portable(near.bound, in_near, block, 3, times, wanted);
+Mask node_portable(const Bound* node, int slots, const Bound* block, int times, Mask wanted) {
+  return overlap_portable(node, in_node(slots), block, 3, times, wanted);
 }
 // The lanes of b that share a vertex with one lane of a.
 template <class Bound>
@@ -136,11 +122,10 @@ TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const std::int16_t* row, RowStri
 }
 
 template <class Bound>
-TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const Bound* block, int times,
+TAUGUARD_AVX2 Mask node_avx2(const Bound* node, int slots, const Bound* block, int times,
                              Mask wanted) {
-  const Near<Bound> near(node, slots, times);
-  return times == 1 ? overlap_avx2<1>(near.bound, in_near, block, 3, wanted)
-                    : overlap_avx2<2>(near.bound, in_near, block, 3, wanted);
+  return times == 1 ? overlap_avx2<1>(node, in_node(slots), block, 3, wanted)
+                    : overlap_avx2<2>(node, in_node(slots), block, 3, wanted);
 }
 template <int arity_a, int arity_b, class Bound>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask sharing_avx2(const LeafLanes<Bound>& a, int row,

@@ -18,23 +18,8 @@ inline constexpr int lanes = 16;
 using Mask = std::uint32_t;  // one bit per lane
 
 // A block has 16 volumes, [axis][end of the step][low, high][lane]. A node has one volume,
-// [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) on every axis.
-//
-// A bound is a float, or an integer of 16 bits where that precision suffices. The conversion is
-// monotone, so that volumes that overlap also overlap in 16 bits.
-inline constexpr int shorts_of_unit = 32000;  // a projection is at most 1 (k_dop.hpp)
-TAUGUARD_INLINE void convert(geometry::Float4 x, float* to) { std::memcpy(to, &x, sizeof x); }
-TAUGUARD_INLINE void convert(geometry::Float4 x, std::int16_t* to) {
-  constexpr float most = shorts_of_unit;  // also of the bounds of empty lanes
-  x = most * x;
-  x = x < most ? x : geometry::Float4{} + most;
-#if defined(__x86_64__)
-  const __m128i whole = _mm_cvttps_epi32(x);  // -2^31 for any x below -2^31
-  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packs_epi32(whole, whole));
-#else
-  for (int i = 0; i < 4; ++i) to[i] = static_cast<std::int16_t>(x[i] > -most ? x[i] : -most);
-#endif
-}
+// [end of the step][low, high][axis slot]. Bounds are floats or 16 bits (k_dop.hpp). An empty lane
+// or node has a lower bound above every upper bound on every axis.
 
 // The 16 features of a leaf: volumes, vertices [vertex of the feature][lane], and the lanes in use.
 template <class Bound>
@@ -59,7 +44,7 @@ struct Overlaps {
 template <class Bound>
 struct OverlapKernels {
   // The lanes of `block`, among `candidates`, that `node` overlaps on the first three axes.
-  Mask (*lanes_of_node)(const float* node, int slots, const Bound* block, int times,
+  Mask (*lanes_of_node)(const Bound* node, int slots, const Bound* block, int times,
                         Mask candidates);
   // Finds pairs of features whose volumes overlap and that share no vertex. same: b is a, and each
   // unordered pair is found once. Features with a common vertex always overlap, so the order of the
@@ -75,28 +60,39 @@ const OverlapKernels<Bound>& overlap_kernels();
 template <class Bound>
 const OverlapKernels<Bound>* overlap_kernels(const char* name);
 
+// The lower or upper bounds of a node at one end of the step.
+template <int slots, class Bound>
+struct SideOf {
+  typedef Bound Type __attribute__((vector_size(slots * sizeof(Bound))));
+};
+template <int slots, class Bound>
+using Side = typename SideOf<slots, Bound>::Type;
+
 // Whether no axis separates two nodes on the same side at all ends.
-template <int slots, int times>
-bool nodes_overlap(const float* a, const float* b) {
-  int apart = 0;
-  constexpr int high = slots, end = 2 * slots;
-  for (int k = 0; k < slots; ++k)
-    if constexpr (times == 1) {
-      apart |= (a[high + k] < b[k]) | (b[high + k] < a[k]);
-    } else {
-      apart |= ((a[high + k] < b[k]) & (a[end + high + k] < b[end + k])) |
-               ((b[high + k] < a[k]) & (b[end + high + k] < a[end + k]));
-    }
-  return apart == 0;
+template <int slots, int times, class Bound>
+bool nodes_overlap(const void* node_a, const void* node_b) {
+  Side<slots, Bound> a[2 * times], b[2 * times];  // [end][low, high]
+  std::memcpy(a, node_a, sizeof a);
+  std::memcpy(b, node_b, sizeof b);
+  constexpr int end = 2 * (times - 1);
+  const auto apart =
+      ((a[1] < b[0]) & (a[end + 1] < b[end])) | ((b[1] < a[0]) & (b[end + 1] < a[end]));
+  std::uint64_t word[sizeof apart / 8], any = 0;
+  std::memcpy(word, &apart, sizeof apart);
+  for (const auto w : word) any |= w;
+  return any == 0;
 }
 
-using NodeTest = bool (*)(const float*, const float*);
-inline NodeTest node_test(int slots, int times) {
-  if (times == 1)
-    return slots == 4   ? nodes_overlap<4, 1>
-           : slots == 8 ? nodes_overlap<8, 1>
-                        : nodes_overlap<16, 1>;
-  return slots == 4 ? nodes_overlap<4, 2> : slots == 8 ? nodes_overlap<8, 2> : nodes_overlap<16, 2>;
+using NodeTest = bool (*)(const void*, const void*);
+template <int times, class Bound>
+NodeTest node_test(int slots) {
+  return slots == 4   ? nodes_overlap<4, times, Bound>
+         : slots == 8 ? nodes_overlap<8, times, Bound>
+                      : nodes_overlap<16, times, Bound>;
+}
+template <class Bound>
+NodeTest node_test(int slots, int times) {
+  return times == 1 ? node_test<1, Bound>(slots) : node_test<2, Bound>(slots);
 }
 
 }  // namespace tauguard::cloth
