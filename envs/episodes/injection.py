@@ -20,6 +20,8 @@ CLAMP_TRAVEL = (0.002, 0.06)
 CLAMP_HOLD = 0.1
 STRIDE = 0.02  #: interval at which targets are searched for along a motion [s]
 CASTS = 8  #: number of rays at each of these times
+CHUNK = 64  #: number of these times for which a clamp's travel is bounded at once
+ROUNDING = 1e-9  #: more than the rounding errors of these bounds [m]
 #: A striker starts this time before it reaches its target [s].
 LEAD = 0.15
 
@@ -75,6 +77,8 @@ class Aim:
             np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
             for body in scene.link_bodies
         ]
+        #: Direction of each geom's axis in its body.
+        self._lines = np.array([_matrix(quat)[2::3] for quat in model.geom_quat])
         self._still = np.abs(motion.qd).max(axis=1) <= 1e-9
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
@@ -83,6 +87,11 @@ class Aim:
         path = self._link_path(plan, range(first, max(first + 1, last), self._stride))
         usable = self._quick_enough(plan, path)
         for number, row in enumerate(path.rows):
+            if plan.kind == "clamp" and not plan.at_rest and number % CHUNK == 0:
+                some = slice(number, number + CHUNK)
+                usable[some] &= self._may_stop_soon(
+                    plan, path, np.arange(len(path.rows))[some], rng
+                )
             if plan.at_rest and not self._still[row]:
                 continue
             if not usable[number]:
@@ -121,13 +130,49 @@ class Aim:
         model, count = self._scene.model, len(path.rows)
         fastest = np.zeros(count)
         for geom in self._geoms[plan.link - 1]:
-            turned = np.zeros(9)
-            mujoco.mju_quat2Mat(turned, model.geom_quat[geom])
             for end in (-0.8, 0.8):
-                local = model.geom_pos[geom] + end * model.geom_size[geom, 1] * turned[2::3]
+                local = model.geom_pos[geom] + end * model.geom_size[geom, 1] * self._lines[geom]
                 speed = path.speed + cross(path.spin, path.rotation[:count] @ local)
                 fastest = np.maximum(fastest, np.linalg.norm(speed, axis=1))
         return fastest > 0.999 * CLAMP_SPEED
+
+    def _may_stop_soon(
+        self, plan: CollisionPlan, path: _LinkPath, rows: NDArray[np.intp], rng: np.random.Generator
+    ) -> NDArray[np.bool_]:
+        """Whether a ray that :meth:`_cast` would draw at these successive rows may give a clamp.
+
+        The ray of push p through the point x of the link meets its surface at x - m p with m from 0
+        to M. While the link turns by R, this point travels -p.dx - m (1 - p.R p) against p: at most
+        the travel of x, and at least that less M (1 - p.R p).
+        """
+        before, model, size = rng.bit_generator.state, self._scene.model, (len(rows), CASTS, -1)
+        geoms, places, _ = self._draw(plan, rng, len(rows) * CASTS)
+        rng.bit_generator.state = before
+        local = (model.geom_pos[geoms] + places[:, None] * self._lines[geoms]).reshape(size)
+        position, rotation = path.position[rows, None], path.rotation[rows]
+        inside = local @ rotation.transpose(0, 2, 1)
+        velocity = path.speed[rows, None] + cross(path.spin[rows, None], inside)
+        speed = np.linalg.norm(velocity, axis=2)
+        push = -velocity / np.maximum(speed, ROUNDING)[..., None]
+        own = np.flatnonzero(model.geom_bodyid == path.body)
+        away = np.linalg.norm(local[:, :, None] - model.geom_pos[own], axis=3)
+        depth = (away + model.geom_rbound[own]).max(axis=2)
+        later = rows[:, None] + np.arange(len(range(0, self._standing(plan), self._stride)))
+        later = np.minimum(later, len(path.position) - 1)
+        turned = path.rotation[later].reshape(*later.shape, 9)
+        moved = np.concatenate([path.position[later] - position, turned], axis=2)
+
+        def travel(deep: Array) -> Array:
+            lever = deep[..., None] * (push @ rotation) - local
+            factors = (push[..., None] * lever[..., None, :]).reshape(*deep.shape, 9)
+            factors = np.concatenate([-push, factors], axis=2)
+            end = (moved @ factors.transpose(0, 2, 1)).max(axis=1)
+            return np.asarray(end + (push * inside).sum(axis=2) - deep)
+
+        possible = speed >= CLAMP_SPEED - ROUNDING
+        possible &= travel(np.zeros_like(depth)) >= CLAMP_TRAVEL[0] - ROUNDING
+        possible &= travel(depth) <= CLAMP_TRAVEL[1] + ROUNDING
+        return np.asarray(possible.any(axis=1))
 
     def _draw(
         self, plan: CollisionPlan, rng: np.random.Generator, count: int
@@ -230,6 +275,13 @@ class Aim:
         along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
         reach = (-along).max(axis=0)
         return np.asarray((reach >= CLAMP_TRAVEL[0]) & (reach <= CLAMP_TRAVEL[1]))
+
+
+def _matrix(quat: Array) -> Array:
+    """The rotation matrix of a quaternion (wxyz), row by row, shape (9,)."""
+    turned = np.zeros(9)
+    mujoco.mju_quat2Mat(turned, quat)
+    return turned
 
 
 def pulse_wrench(

@@ -31,11 +31,18 @@ class Wrenches:
         """Wrenches from sensors, whose columns are: found, force by the link, torque, point."""
         return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
 
+    def at(self, rows: NDArray[np.intp]) -> Wrenches:
+        """The wrenches of some samples."""
+        return Wrenches(self.force[rows], self.torque[rows], self.point[rows])
+
     def rows(self) -> NDArray[np.intp]:
         """The samples with a force or a torque on some link, shape (K,)."""
-        pushed = (self.force != 0).any(axis=(1, 2))
-        pushed |= (self.torque != 0).any(axis=(1, 2))
-        return np.flatnonzero(pushed)
+        return np.flatnonzero(self.pushed().any(axis=1))
+
+    def pushed(self) -> NDArray[np.bool_]:
+        """The links with a force or a torque, shape (T, links)."""
+        parts = [part[..., k] != 0 for part in (self.force, self.torque) for k in range(3)]
+        return np.asarray(np.logical_or.reduce(parts))
 
 
 def homogeneous(positions: Array, quaternions: Array) -> Array:
@@ -47,7 +54,9 @@ def homogeneous(positions: Array, quaternions: Array) -> Array:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     out = np.zeros((*w.shape, 4, 4))
-    out[..., :3, :3] = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            out[..., i, j] = entry
     out[..., :3, 3] = positions
     out[..., 3, 3] = 1
     return out
@@ -62,10 +71,10 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
         wrenches: external wrenches on the links.
     """
     tau = np.zeros_like(q)
-    touched = wrenches.rows()
+    pushed = wrenches.pushed()
+    touched = np.flatnonzero(pushed.any(axis=1))
     if not len(touched):
         return tau
-    pushed = (wrenches.force != 0).any(axis=2) | (wrenches.torque != 0).any(axis=2)
     anchor, axis = poses.joints(q[touched])
     sliding = np.array(poses.sliding)
     for link, moving in enumerate(poses.moving):

@@ -180,13 +180,12 @@ class Striking:
     ) -> Window | None:
         """Simulate with this strength; ``None`` if the obstacle overlaps at its start."""
         dt = self._dt
-        rows = end - begin
         wrench, body = None, -1
         if plan.kind != "pulse":
             self.loop.take(self._loop)
         if plan.kind == "pulse":
             com = self._poses.points(self._motion.q[begin:end], target.body)
-            wrench = pulse_wrench(target, com, strength, plan.duration, dt, rows, 0)
+            wrench = pulse_wrench(target, com, strength, plan.duration, dt, end - begin, 0)
             body = target.body
         elif plan.kind == "strike":
             self._launch(target, strength)
@@ -206,9 +205,11 @@ class Striking:
             if wrench is not None
             else labels.Wrenches.from_contacts(rollout.contact)
         )
-        tau = labels.external_torque(self._poses, rollout.q, wrenches)
+        rows = wrenches.rows()
+        felt = wrenches.at(rows)
+        tau = labels.external_torque(self._poses, rollout.q[rows], felt)
         peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
-        peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
+        peak_force = float(np.linalg.norm(felt.force, axis=2).max(initial=0.0))
         return Window(begin, rollout, wrenches, peak_tau, peak_force)
 
     def _launch(self, target: Target, speed: float) -> None:

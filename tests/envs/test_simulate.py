@@ -12,6 +12,7 @@ from tauguard.cli.simulate import described
 from tauguard.datasets import write_dataset
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, simulate
 from tauguard.envs.episodes import labels
+from tauguard.envs.episodes.injection import Aim
 from tauguard.envs.episodes.poses import Poses
 from tauguard.models import Mismatch, SceneSpec, compose
 from tauguard.traces import STRATA, read_mcap
@@ -104,6 +105,32 @@ def test_an_arm_apart_from_its_obstacles_moves_as_in_the_whole_scene(episode, tr
         for name, values in vars(one).items():
             if isinstance(values, np.ndarray):
                 assert np.array_equal(values, vars(other)[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize("arm", ["cura6", "ur5e"])
+def test_bounds_of_a_clamps_travel_exclude_no_target(arm, monkeypatch):
+    aims = [Simulation(Episode(seed, 30.0, 60.0, arm=arm)).striking._aim for seed in range(7, 10)]
+    plans = [CollisionPlan("clamp", 0.5, link, duration=0.6) for link in range(2, 6)]
+    cases = [(n, plan) for n in range(len(aims)) for plan in plans]
+    casts = []
+    cast = Aim._cast
+    monkeypatch.setattr(Aim, "_cast", lambda *a: casts.append(1) or cast(*a))
+
+    def targets():
+        casts.clear()
+        draws = [np.random.default_rng([4, n]) for n, _ in cases]
+        found = [
+            aims[n].find(plan, rng, 29000) for (n, plan), rng in zip(cases, draws, strict=True)
+        ]
+        rows = [None if one is None else (one.row, *one.point, *one.direction) for one in found]
+        return rows, [rng.random() for rng in draws], len(casts)
+
+    bounded = targets()
+    monkeypatch.setattr(Aim, "_may_stop_soon", lambda self, plan, path, rows, rng: True)
+    cast_all = targets()
+    assert bounded[:2] == cast_all[:2]
+    assert any(row is not None for row in bounded[0])
+    assert bounded[2] < cast_all[2]
 
 
 def test_pulse_truth_is_the_applied_generalised_force():
