@@ -1,14 +1,17 @@
 """Read the logs of one real arm for the commands: files, joints, units and loads."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tauguard.arrays import Array
 from tauguard.datasets.columns import ANGLES, AS_IS, Reading, column_map
 from tauguard.datasets.log_checks import saturated
-from tauguard.datasets.logs import Log, chosen, read_log
+from tauguard.datasets.logs import Log, read_log
 from tauguard.datasets.real_arms import is_torque, of_log, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
@@ -19,6 +22,11 @@ from tauguard.traces.resample import averaged
 
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
 HEAVIEST = 100.0
+
+#: Positions are far from a range if they are outside by more than this [rad].
+NEARBY = 0.5
+#: Joints travel alike in two logs if their ranges differ by less than this factor.
+ALIKE = 3.0
 
 
 @dataclass(frozen=True)
@@ -119,11 +127,16 @@ def read_logs(
         ValueError: labelled contacts, a saturated current, currents in one log and torques in
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
-    files = log_files(logs)
+    files, reading = log_files(logs), reading or AS_IS
     numbers = robot_numbers(robot)
     joints = numbers.joint_names if columns in ("auto", None) else ()
-    reading = of_one_unit(files, columns, reading or AS_IS, joints)
-    read = {path.name: read_one(path, columns, torque, reading, joints) for path in files}
+
+    def one(path: Path, word: tuple[str, ...] = ()) -> Log:
+        mended = dataclasses.replace(reading, mend=(*reading.mend, *word))
+        return read_one(path, columns, torque, mended, joints)
+
+    decided = columns != "auto" or not ANGLES.keys().isdisjoint(reading.mend)
+    read = {path.name: one(path) for path in files} if decided else of_one_unit(files, one)
     for name, log in read.items():
         _refuse_touched(name, log)
     notes = _gathered(read)
@@ -137,25 +150,61 @@ def read_logs(
     return ArmLogs(traces, numbers, (*notes, *held))
 
 
-def of_one_unit(
-    files: Sequence[Path], columns: str | None, reading: Reading, joints: Sequence[str] = ()
-) -> Reading:
-    """The reading, with the unit of angles that all files have if "auto" finds different ones.
+def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log]:
+    """Logs by file name, with the unit of angles that the others have where a log does not show it.
 
-    A log of small motions has angles that may be degrees or radians: the other logs decide.
+    Angles of small motions may be in degrees or radians. If another log of the same columns is in
+    degrees, they are degrees.
+
+    Args:
+        files: logs whose columns are recognised.
+        one: reads a log, also in the unit ``("deg",)`` or ``("rad",)``.
+
+    Raises:
+        ValueError: a log whose angles fit those of the others as radians, but not as degrees.
     """
-    if columns != "auto" or not ANGLES.keys().isdisjoint(reading.mend):
-        return reading
-    maps, undecided = [], False
-    for file in [file for file in files if file.suffix == ".csv"]:
+    read, doubts = {}, {}
+    for path in files:
         try:
-            maps.append(chosen("auto", file, (), joints))
-        except ValueError:  # an error other than an undecided unit is raised again by `read_one`
-            undecided = True
-    units = {found.degrees for found in maps}
-    if len({found.q for found in maps}) != 1 or len(units) + undecided == 1:
-        return reading
-    return dataclasses.replace(reading, mend=(*reading.mend, "deg" if True in units else "rad"))
+            read[path.name] = one(path)
+        except ValueError as error:  # perhaps because the unit is open
+            doubts[path.name] = error
+    maps = {name: log.columns for name, log in read.items() if log.columns is not None}
+    if len({found.q for found in maps.values()}) != 1:
+        if doubts:
+            raise next(iter(doubts.values()))
+        return read
+    degrees = {name: read[name] for name, found in maps.items() if found.degrees}
+    radians = [name for name in maps if degrees and name not in degrees]
+    for name in radians:
+        _refuse_radians(name, read[name].trace.q, degrees)
+    for path in files:
+        if path.name in doubts or path.name in radians:
+            read[path.name] = one(path, ("deg" if degrees else "rad",))
+    return {path.name: read[path.name] for path in files}
+
+
+def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
+    """Raise ``ValueError`` if positions [rad] are like those of other logs, and in degrees not.
+
+    In degrees, two joints or more would be where the other logs never are, and fewer in radians; or
+    half of the joints travel as far as in the other logs, and would travel 57 times less.
+    """
+    others = [log.trace.q for log in degrees.values()]
+    least, most = (np.array([f(x, axis=0) for x in others]) for f in (np.min, np.max))
+    low, high = q.min(axis=0), q.max(axis=0)
+    far_in = [
+        int(((u * high < least.min(0) - NEARBY) | (u * low > most.max(0) + NEARBY)).sum())
+        for u in (1.0, np.pi / 180)
+    ]
+    ratio = (high - low) / np.maximum((most - least).max(axis=0), 1e-9)
+    alike = int(((ratio > 1 / ALIKE) & (ratio < ALIKE)).sum())
+    if (far_in[1] >= 2 and far_in[0] < far_in[1]) or 2 * alike >= q.shape[1]:
+        raise ValueError(
+            f"{name}: its positions are like those of {', '.join(degrees)} if they are radians, "
+            f"but these are degrees, by their values: convert one of them, or say --mend deg or "
+            "--mend rad for all"
+        )
 
 
 def linear_axes(numbers: RobotNumbers, read: Mapping[str, Log]) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from tauguard.datasets.arm_logs import log_files, of_one_unit, read_logs
-from tauguard.datasets.columns import AS_IS, ColumnMap, Reading
+from tauguard.datasets.arm_logs import read_logs
+from tauguard.datasets.columns import ColumnMap, Reading
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.recognition import described, recognised
 from tests.datasets.test_recognition import motion, written
@@ -232,16 +232,45 @@ def test_one_joint_beyond_two_turns_does_not_make_degrees(tmp_path):
     assert "[deg]" in read_log(path, "auto", mend=("deg",)).notes[0]
 
 
+def three_joints(path):
+    inner = '<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/>'
+    bodies = "".join(f'<body pos="0 0 .3"><joint name="j{k}"/>{inner}' for k in range(3))
+    path.write_text(f"<mujoco><worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>")
+    return path
+
+
 def test_logs_of_one_command_have_one_unit_of_angles(tmp_path):
+    arm = three_joints(tmp_path / "arm.xml")
     turned(tmp_path / "slow.csv", speed=0.5)
-    turned(tmp_path / "usual.csv", speed=3.0, turns=3.0)
-    files = log_files([tmp_path])
-    assert of_one_unit(files, "auto", AS_IS).mend == ("rad",)
-    assert of_one_unit(files, "ur3", AS_IS) == AS_IS
+    usual = turned(tmp_path / "usual.csv", speed=3.0, turns=3.0)
+    read = read_logs([tmp_path], "auto", arm).traces
+    assert read["slow.csv"].q[-1, 2] == pytest.approx(16.0, rel=0.01)
     turned(tmp_path / "degrees.csv", speed=1.0, scale=57.3, turns=3.0)
-    files = log_files([tmp_path])
-    assert of_one_unit(files, "auto", AS_IS).mend == ("deg",)
-    assert of_one_unit(files, "auto", Reading(mend=("rad",))).mend == ("rad",)
+    said = r"usual.csv: its positions are like those of degrees.csv if they are radians, .*--mend"
+    with pytest.raises(ValueError, match=said):
+        read_logs([tmp_path], "auto", arm)
+    read = read_logs([tmp_path], "auto", arm, reading=Reading(mend=("deg",))).traces
+    assert np.abs(read["usual.csv"].q[:, 0]).max() == pytest.approx(np.pi / 180, rel=0.01)
+    turned(usual, speed=3.0, turns=0.3, motion_of_others=0.1)  # small motions: the others decide
+    read = read_logs([tmp_path], "auto", arm).traces
+    assert np.abs(read["usual.csv"].q[:, 0]).max() == pytest.approx(0.1 * np.pi / 180, rel=0.01)
+    assert read["slow.csv"].q[-1, 2] == pytest.approx(16.0 * np.pi / 180, rel=0.01)
+
+
+def test_a_standing_log_in_radians_is_not_read_in_degrees(tmp_path):
+    """It stands where another log, in degrees, begins."""
+    arm, place = three_joints(tmp_path / "arm.xml"), np.array([1.6, -1.2, 0.9])
+    t = 0.01 * np.arange(400)
+    names = ["t", *(f"{name}{k}" for name in ("q", "qd", "tau") for k in range(3))]
+    q = place + 0.3 * np.sin(t[:, None] + np.arange(3))
+    noise = 0.001 * np.random.default_rng(0).standard_normal(q.shape)
+    written(tmp_path / "a.csv", names, t, np.rad2deg(q), np.rad2deg(np.gradient(q, t, axis=0)), q)
+    written(tmp_path / "b.csv", names, t, place + 0 * q, 0 * q, q)
+    with pytest.raises(ValueError, match=r"b.csv: its positions are like those of a.csv"):
+        read_logs([tmp_path], "auto", arm)
+    written(tmp_path / "b.csv", names, t, np.rad2deg([0.1, -0.1, 0.2]) + noise, 0 * q, q)
+    read = read_logs([tmp_path], "auto", arm).traces
+    assert read["b.csv"].q[0] == pytest.approx([0.1, -0.1, 0.2], abs=0.01)
 
 
 @pytest.mark.data
@@ -254,10 +283,7 @@ def test_all_logs_of_a_ur3_are_in_radians(data_dir):
 
 
 def test_a_note_on_several_logs_is_given_once(tmp_path):
-    arm = tmp_path / "arm.xml"
-    inner = '<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/>'
-    bodies = "".join(f'<body pos="0 0 .3"><joint name="j{k}"/>{inner}' for k in range(3))
-    arm.write_text(f"<mujoco><worldbody>{bodies}{'</body>' * 3}</worldbody></mujoco>")
+    arm = three_joints(tmp_path / "arm.xml")
     for name in ("a", "b"):
         turned(tmp_path / f"{name}.csv", speed=3.0, turns=3.0)
     notes = read_logs([tmp_path], "auto", arm).notes
