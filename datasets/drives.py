@@ -16,13 +16,13 @@ DRIVES = {
 }
 
 
-def preset_gains(columns: str | None, logs: Sequence[Trace]) -> tuple[float, ...]:
-    """Drive gains of the preset of the logs' columns, else of ``columns``; empty: not known.
+def preset_gains(logs: Sequence[Trace]) -> tuple[float, ...]:
+    """Drive gains of the preset of the logs' columns; empty: not known.
 
     Raises:
         ValueError: the logs have columns of different presets, and the drive of one is known.
     """
-    names = sorted({str(log.meta.get("columns") or columns or "no preset") for log in logs})
+    names = sorted({log.meta.get("columns", "no preset") for log in logs})
     if len(names) > 1 and not DRIVES.keys().isdisjoint(names):
         raise ValueError(
             f"logs of {', '.join(names)}, whose drive gains differ: give logs of one preset, "

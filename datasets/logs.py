@@ -64,7 +64,7 @@ def read_log(
 
     Returns:
         The trace, without truth and with the log's own times, and notes on repairs. Only faults
-        that the map's ``repair`` names are repaired.
+        that the map's ``repair`` names are repaired. ``meta["columns"]`` is the preset, if any.
 
     Raises:
         ValueError: a missing column, a bad number, a cut-off row, time that does not increase, a
@@ -74,19 +74,26 @@ def read_log(
     """
     path = Path(path)
     with reading(path):
-        try:
-            if path.suffix == ".mcap":
-                from tauguard.datasets.logs_mcap import read_joint_states
+        if path.suffix == ".mcap":
+            from tauguard.datasets.logs_mcap import read_joint_states
 
-                return read_joint_states(path, joint_names)
-            own = chosen(columns, path, mend, robot_joints).mended(mend)
-            told = columns == "auto" and set(own.joint_names) <= set(robot_joints)
-            names = own.joint_names or joint_names if told else joint_names
-            return read_csv(path, own, names, columns == "auto")
-        except UnicodeDecodeError as error:
-            raise ValueError("not a text file; expected CSV or MCAP") from error
-        except csv.Error as error:
-            raise ValueError(f"not CSV ({error})") from error
+            log, own = read_joint_states(path, joint_names), None
+        else:
+            try:
+                own = chosen(columns, path, mend, robot_joints).mended(mend)
+                told = columns == "auto" and set(own.joint_names) <= set(robot_joints)
+                names = own.joint_names or joint_names if told else joint_names
+                log = read_csv(path, own, names, columns == "auto")
+            except UnicodeDecodeError as error:
+                raise ValueError("not a text file; expected CSV or MCAP") from error
+            except csv.Error as error:
+                raise ValueError(f"not CSV ({error})") from error
+    preset = preset_of(own) if own else None
+    if isinstance(columns, str) and columns in PRESETS:
+        preset = columns
+    if preset is not None:
+        log = replace(log, trace=replace(log.trace, meta={**log.trace.meta, "columns": preset}))
+    return log
 
 
 def chosen(
@@ -191,8 +198,6 @@ def read_csv(
     kept_parts = {name: np.ascontiguousarray(value[keep]) for name, value in parts.items()}
     signals: dict[str, Any] = _in_si_units(kept_parts, columns)
     meta = {"log": path.name}
-    if preset := preset_of(columns):
-        meta["columns"] = preset
     if auto and columns not in PRESETS.values():
         notes.insert(0, f"read as {described(columns)}")
     if columns.torque:

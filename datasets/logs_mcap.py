@@ -12,7 +12,7 @@ from mcap.exceptions import McapError
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.traces.mcap import read_mcap
+from tauguard.traces.mcap import decode
 from tauguard.traces.mcap_container import Contents
 from tauguard.traces.trace import Trace
 
@@ -38,7 +38,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
     except (McapError, struct.error) as error:
         raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
     if "tauguard.trace" in contents.metadata:
-        own = read_mcap(path)
+        own = decode(contents)
         return Log(own, checked(own, lambda row: f"sample {row}"))
     topic, messages = _messages(contents)
     trace = assemble(topic, messages, joint_names)

@@ -106,7 +106,7 @@ def check_robot(numbers: RobotNumbers, robot: Path, trained: RobotNumbers, model
         )
 
 
-def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> None:
+def check_named(robot: Path, traces: Sequence[Trace]) -> None:
     """Refuse a robot file of one UR model with a column preset of another UR model.
 
     The preset would supply the gains of the wrong arm. Files and presets of other names are
@@ -119,7 +119,7 @@ def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> No
     name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', read_text(robot))
     names = f"{name.group(1) if name else ''} {robot.stem}".lower()
     arms = re.findall(rf"(?<![a-z0-9]){known}(?![a-z0-9])", names)
-    presets = {str(trace.meta.get("columns") or columns) for trace in traces}
+    presets = {trace.meta.get("columns", "") for trace in traces}
     others = sorted(p for p in presets if re.fullmatch(known, p) and arms and p not in arms)
     if others:
         raise ValueError(
@@ -135,7 +135,6 @@ def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> No
 def initial_arm(
     numbers: RobotNumbers,
     recordings: Sequence[Recording],
-    columns: str | None,
     gains: tuple[float, ...],
     scale: str,
 ) -> tuple[ArmModel, str]:
@@ -144,7 +143,6 @@ def initial_arm(
     Args:
         numbers: the robot file's geometry and inertia.
         recordings: logs with their loads.
-        columns: the given preset or column map.
         gains: the given drive gains [N m/A], one per joint; empty: none.
         scale: "gains", "payload", "masses", or "auto": given gains, else a known payload, else the
             preset's gains, else masses.
@@ -164,7 +162,7 @@ def initial_arm(
             )
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     traces = [r.trace for r in recordings]
-    preset = () if gains else preset_gains(columns, traces)
+    preset = () if gains else preset_gains(traces)
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
         otherwise = "payload" if known else "masses"
@@ -183,7 +181,6 @@ def known_arm(
     robot: Path,
     numbers: RobotNumbers,
     recordings: Sequence[Recording],
-    columns: str | None,
     gains: tuple[float, ...],
 ) -> tuple[ArmModel, str]:
     """The initial arm for the method free-motion, and the source of its gains as text.
@@ -200,10 +197,10 @@ def known_arm(
             raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
         return arm, f"those of the calibration in {robot.name}"
     if not gains:
-        check_named(robot, columns, [r.trace for r in recordings])
-    arm, scale = initial_arm(numbers, recordings, columns, gains, "gains")
+        check_named(robot, [r.trace for r in recordings])
+    arm, scale = initial_arm(numbers, recordings, gains, "gains")
     words = {"gains": "those given", "torques": "none, the log holds torques"}
-    preset = recordings[0].trace.meta.get("columns") or columns
+    preset = recordings[0].trace.meta.get("columns")
     return arm, words.get(scale, f"those of the preset {preset}")
 
 

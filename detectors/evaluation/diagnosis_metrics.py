@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -202,22 +202,16 @@ class JudgedRecording(NamedTuple):
         return match_diagnoses(said, self.trace)
 
 
-def judged_recordings(
-    alarm: CollisionAlarm, recordings: Iterable[Trace]
-) -> Iterator[JudgedRecording]:
-    """Detect in each recording and match with its truth.
+def judge_recording(alarm: CollisionAlarm, name: str, trace: Trace) -> JudgedRecording:
+    """Detect in a recording and match with its truth.
 
     Raises:
-        ValueError: no truth, another sample rate, or other joints; names the recording's number,
-            counted from 0.
+        ValueError: no truth, another sample rate, or other joints; the last two give ``name``.
     """
-    own = alarm.detector.arm.robot.joint_names
-    for number, trace in enumerate(recordings):
-        check_interval(f"recording {number}", trace, alarm.detector.dt)
-        if trace.joint_names != own:
-            raise ValueError(
-                f"recording {number} has joints {', '.join(trace.joint_names)}, the model "
-                f"{', '.join(own)}"
-            )
-        found = alarm.detect(trace)
-        yield JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))
+    check_interval(name, trace, alarm.detector.dt)
+    if trace.joint_names != (own := alarm.detector.arm.robot.joint_names):
+        raise ValueError(
+            f"{name} has joints {', '.join(trace.joint_names)}, the model {', '.join(own)}"
+        )
+    found = alarm.detect(trace)
+    return JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))

@@ -52,7 +52,7 @@ def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike)
     read = read_logs((data_dir / name / "free",), columns, data_dir / name / f"{name}.urdf")
     traces, _ = moving(read.traces)
     own = {log: Recording(trace) for log, trace in traces.items()}
-    arm, _ = initial_arm(read.numbers, list(own.values()), columns, (), "auto")
+    arm, _ = initial_arm(read.numbers, list(own.values()), (), "auto")
     check_order(arm, own)
     for a, b in ((0, 2), (3, 4), (4, 5)):
         order = [b if j == a else a if j == b else j for j in range(6)]

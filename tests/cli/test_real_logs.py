@@ -11,7 +11,7 @@ from tauguard.cli import main
 from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_gains
 from tauguard.detectors.calibration.arm_file import load_arm
-from tauguard.detectors.calibration.recording import Load, cut
+from tauguard.detectors.calibration.recording import Load, Recording, cut
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 from tests.oracles.added_contact import Added, add_contact
 
@@ -334,22 +334,23 @@ def test_maps_that_are_no_maps(tmp_path, fields, message):
 def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
     plain = record(0, 1.0)
     own = [dataclasses.replace(plain, meta={"columns": name}) for name in ("ur5", "ur10e")]
-    assert preset_gains(None, own[:1]) == preset_gains("ur10e", own[:1]) == DRIVES["ur5"]
-    assert preset_gains("ur10e", [plain]) == DRIVES["ur10e"]
-    assert preset_gains("mine.json", [plain]) == preset_gains(None, [plain, plain]) == ()
+    assert preset_gains(own[:1]) == DRIVES["ur5"]
+    assert preset_gains([plain, plain]) == ()
     with pytest.raises(ValueError, match="logs of ur10e, ur5, whose drive gains differ"):
-        preset_gains(None, own)
+        preset_gains(own)
     with pytest.raises(ValueError, match="logs of no preset, ur5, whose drive gains differ"):
-        preset_gains(None, [own[0], plain])
+        preset_gains([own[0], plain])
 
 
 def test_where_the_scale_comes_from_is_said(folder):
     numbers = real_arms.robot_numbers(folder / "arm.xml")
     recordings = arm_logs.with_loads({"a": record(0, 12.0)}, ())
-    assert real_arms.initial_arm(numbers, recordings, None, tuple(GAIN), "auto")[1] == "gains"
-    assert real_arms.initial_arm(numbers, recordings, None, (), "auto")[1] == "masses"
+    assert real_arms.initial_arm(numbers, recordings, tuple(GAIN), "auto")[1] == "gains"
+    assert real_arms.initial_arm(numbers, recordings, (), "auto")[1] == "masses"
+    (one,) = recordings
+    ur10e = [Recording(dataclasses.replace(one.trace, meta={"columns": "ur10e"}))]
     with pytest.raises(ValueError, match="6 numbers for 3 joints"):
-        real_arms.initial_arm(numbers, recordings, "ur10e", (), "auto")
+        real_arms.initial_arm(numbers, ur10e, (), "auto")
     assert load_arm(folder / "arm.xml") is None
 
 

@@ -15,6 +15,7 @@ from tauguard.datasets.arm_logs import read_logs
 from tauguard.traces import Trace, write_mcap
 from tauguard.traces.mcap_container import walk
 from tauguard.traces.trace import UR_JOINTS
+from tests.detectors.synthetic_arm import XML
 
 JOINT_STATE = """\
 std_msgs/Header header
@@ -73,8 +74,9 @@ def test_labelled_contacts_are_no_free_motion(tmp_path):
     write(tmp_path, "\n".join(lines))
     columns = tmp_path / "columns.json"
     columns.write_text(json.dumps(dataclasses.asdict(TWO) | {"repair": []}))
+    (tmp_path / "arm.xml").write_text(XML)
     with pytest.raises(ValueError, match=r"log.csv: a column labels 1 contact \(0.1 to 0.3 s"):
-        read_logs([tmp_path / "log.csv"], str(columns), tmp_path / "no.urdf")
+        read_logs([tmp_path / "log.csv"], str(columns), tmp_path / "arm.xml")
 
 
 def test_indices_units_and_names(tmp_path):
@@ -208,6 +210,8 @@ def test_a_bag_of_joint_states(tmp_path):
     np.testing.assert_array_equal(log.trace.current[3], [5.5, 5.25])
     assert "effort is taken as current" in log.notes[0]
     assert read_log(tmp_path / "a.mcap").trace.joint_names == ("b", "a")
+    assert "columns" not in log.trace.meta
+    assert read_log(tmp_path / "a.mcap", "ur5").trace.meta["columns"] == "ur5"  # for its gains
     rosbag(tmp_path / "b.mcap", 3, stamped=False)
     np.testing.assert_allclose(read_log(tmp_path / "b.mcap").trace.t[0], 5.0)
 

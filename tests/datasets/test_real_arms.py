@@ -25,22 +25,22 @@ def test_the_file_of_another_ur_is_refused(tmp_path, name, text, preset, named):
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(ValueError, match="give the ur5's file") as error:
-        check_named(path, None, of(preset))
+        check_named(path, of(preset))
     assert named in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("name", "preset", "columns"),
+    ("name", "preset"),
     [
-        ("ur5.urdf", "ur5", None),
-        ("cell_ur5_left.urdf", None, "ur5"),
-        ("ur10e.urdf", "ur_rtde", None),
-        ("ur10e.urdf", None, "map.json"),
-        ("arm.urdf", "ur5", None),
-        ("blur5x.urdf", "ur3", None),
+        ("ur5.urdf", "ur5"),
+        ("cell_ur5_left.urdf", "ur5"),
+        ("ur10e.urdf", "ur_rtde"),
+        ("ur10e.urdf", None),
+        ("arm.urdf", "ur5"),
+        ("blur5x.urdf", "ur3"),
     ],
 )
-def test_other_names_say_nothing(tmp_path, name, preset, columns):
+def test_other_names_say_nothing(tmp_path, name, preset):
     path = tmp_path / name
     path.write_text("<robot>")
-    check_named(path, columns, of(preset))
+    check_named(path, of(preset))

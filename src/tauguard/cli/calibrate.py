@@ -86,7 +86,7 @@ def command(
     hold_to("error", accept, lambda: check_held_out(*logs_of, held))
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=names)
-    preset = str(recordings[0].trace.meta.get("columns") or columns)
+    preset = recordings[0].trace.meta.get("columns", "")
     result = summary(names, found, held, target) | {"scale": given.source}
     speeds = [(one.trace.t, np.abs(one.trace.qd)) for one in recordings]
     result["speed_rad_s"] = exceeded(speeds).tolist()

@@ -110,7 +110,7 @@ def command(
     else:
         seconds = QUIET if quiet is None else quiet
         refuse_touched(log, read, seconds)
-        trace, alarm = learned(log, read, robot, numbers, columns, seconds, gains, payload)
+        trace, alarm = learned(log, read, robot, numbers, seconds, gains, payload)
     found = detect_in_log(alarm, trace, payload is not None)
     causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
@@ -175,7 +175,6 @@ def learned(
     read: Log,
     robot: Path,
     numbers: RobotNumbers,
-    columns: str | None,
     quiet: float,
     gains: tuple[float, ...],
     payload: str | None,
@@ -203,7 +202,7 @@ def learned(
     load = Load() if payload is None else parse_load(payload)
     first = {log.name: Recording(cut(trace, slice(0, rows)), load)}
     try:
-        arm, source = free_arm(robot, numbers, first, columns, gains)
+        arm, source = free_arm(robot, numbers, first, gains)
         detector = free_detector(arm, first)
     except ValueError as error:
         raise ValueError(

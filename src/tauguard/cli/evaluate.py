@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from tauguard.detectors import CollisionAlarm, Matching
-    from tauguard.detectors.evaluation.diagnosis_metrics import JudgedRecording
     from tauguard.replay.events import EventFolder
     from tauguard.traces import Trace
 
@@ -123,37 +122,17 @@ def evaluated(
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Match alarms with the truth and compute all metrics; ``wrong`` records the errors."""
     from tauguard.detectors import detection_metrics, diagnosis_metrics
+    from tauguard.detectors.evaluation.diagnosis_metrics import judge_recording
 
     matchings, said = [], []
-    for name, one in _judged(alarm, recordings):
+    for number, trace in enumerate(recordings):
+        name = name_of(trace, number)
+        one = judge_recording(alarm, name, trace)
         matchings.append(one.matching)
         said += one.diagnoses(alarm)
         if wrong is not None:
-            wrong.add(name, one.matching, (one.trace, one.detection))
+            wrong.add(name, one.matching, (trace, one.detection))
     return matchings, {**detection_metrics(matchings), "diagnosis": diagnosis_metrics(said)}
-
-
-def _judged(
-    alarm: CollisionAlarm, recordings: Iterable[Trace]
-) -> Iterator[tuple[str, JudgedRecording]]:
-    """Judged recordings with their names; error messages contain the name."""
-    from tauguard.detectors.evaluation.diagnosis_metrics import judged_recordings
-
-    names: list[str] = []
-
-    def named() -> Iterator[Trace]:
-        for number, trace in enumerate(recordings):
-            names.append(name_of(trace, number))
-            yield trace
-
-    try:
-        for one in judged_recordings(alarm, named()):
-            yield names[-1], one
-    except ValueError as error:
-        counted = f"recording {len(names) - 1}"
-        if not names or not str(error).startswith(counted):
-            raise
-        raise ValueError(names[-1] + str(error).removeprefix(counted)) from None
 
 
 def name_of(trace: Trace, number: int) -> str:

@@ -54,10 +54,10 @@ def free_logs(
     traces, notes = moving(read.traces)
     print_notes(notes)
     if not gains:
-        check_named(robot, columns, list(traces.values()))
+        check_named(robot, list(traces.values()))
     recordings = {name: known[name] for name in traces}
     check_length(list(recordings.values()))
-    arm, source = initial_arm(read.numbers, list(recordings.values()), columns, gains, scale)
+    arm, source = initial_arm(read.numbers, list(recordings.values()), gains, scale)
     check_signs(arm, recordings)
     chosen = "gains" if source in ("preset", "torques") else source
     return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
@@ -71,7 +71,6 @@ def free_arm(
     robot: Path,
     numbers: RobotNumbers,
     recordings: Mapping[str, Recording],
-    columns: str | None,
     gains: tuple[float, ...],
 ) -> tuple[ArmModel, str]:
     """The initial arm model of a training on free logs, and the source of its gains, as text.
@@ -82,7 +81,7 @@ def free_arm(
     from tauguard.datasets.real_arms import known_arm
     from tauguard.detectors.calibration.checks import check_signs
 
-    arm, source = known_arm(robot, numbers, list(recordings.values()), columns, gains)
+    arm, source = known_arm(robot, numbers, list(recordings.values()), gains)
     check_signs(arm, recordings)
     return arm, source
 

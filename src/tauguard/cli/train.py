@@ -223,7 +223,7 @@ def free_motion(
     print_notes(read.notes)
     traces, recordings = read.traces, with_loads(read.traces, payload)
     own = dict(zip(traces, recordings, strict=True))
-    arm, _ = free_arm(robot, read.numbers, own, columns, gains)
+    arm, _ = free_arm(robot, read.numbers, own, gains)
     logs_kept = [name for name in accept if name not in ACCEPTABLE]
     own, sifted = sifted_logs(own, arm, logs_kept)
     traces = {name: recording.trace for name, recording in own.items()}
