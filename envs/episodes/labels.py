@@ -29,7 +29,12 @@ class Wrenches:
     @classmethod
     def from_contacts(cls, contact: Array) -> Wrenches:
         """Wrenches from sensors, whose columns are: found, force by the link, torque, point."""
-        return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
+        wrenches = cls.empty(*contact.shape[:2])
+        rows = np.flatnonzero(contact[:, :, 0].any(axis=1))
+        felt = contact[rows]
+        wrenches.force[rows], wrenches.torque[rows] = -felt[:, :, 1:4], -felt[:, :, 4:7]
+        wrenches.point[rows] = felt[:, :, 7:10]
+        return wrenches
 
     def at(self, rows: NDArray[np.intp]) -> Wrenches:
         """The wrenches of some samples."""
