@@ -43,10 +43,12 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
                 b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
   const Double4 error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
   const Cubics cubic{{b0, b1, b2, b3}};
-  g.odd = static_cast<std::uint8_t>(bits(~fair));
-  g.open = static_cast<std::uint8_t>(bits(~(fair & (abs(b0) > error) & (abs(b3) > error))));
-  g.no_root = static_cast<std::uint8_t>(bits(fair & one_sign(cubic, error)));
-  g.one_root = static_cast<std::uint8_t>(bits(fair & one_root(cubic, error)));
+  const auto flag = [](Mask4 where, std::int64_t value) { return where & (Mask4{} + value); };
+  const Mask4 flags = flag(~fair, Group::odd) |
+                      flag(~(fair & (abs(b0) > error) & (abs(b3) > error)), Group::open) |
+                      flag(fair & one_sign(cubic, error), Group::no_root) |
+                      flag(fair & one_root(cubic, error), Group::one_root);
+  std::memcpy(g.flags, &flags, sizeof flags);
   store4(g.value[Group::cubic], b0);
   store4(g.value[Group::cubic + 1], b1);
   store4(g.value[Group::cubic + 2], b2);

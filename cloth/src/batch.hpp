@@ -21,11 +21,13 @@ struct Group {
   // scale: a power of two that brings the largest difference into [1, 2); big: this scaled
   // difference. The cubic and its error are those of the scaled query.
   alignas(64) double value[fields][width];
-  // One bit per query:
-  std::uint8_t odd;       // the largest difference is too small, too large or not finite
-  std::uint8_t no_root;   // not odd, and the Bernstein coefficients certainly have one sign
-  std::uint8_t one_root;  // not odd, and the coefficients certainly change their sign once
-  std::uint8_t open;      // odd, or the cubic may be zero at an end of the step: no cut can decide
+  enum Flag : std::int64_t {
+    odd = 1,       // the largest difference is too small, too large or not finite
+    no_root = 2,   // not odd, and the Bernstein coefficients certainly have one sign
+    one_root = 4,  // not odd, and the coefficients certainly change their sign once
+    open = 8       // odd, or the cubic may be zero at an end of the step: no cut can decide
+  };
+  std::int64_t flags[width];
 };
 
 // A part [start, start + length] of the step in which the cubic of a query certainly has one root.

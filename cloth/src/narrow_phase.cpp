@@ -89,30 +89,26 @@ struct Batch {
 
 // Writes the pieces of all queries that may have contact, sorted by time within a query.
 void make_pieces(Batch& b, int n, Stats& stats) {
-  std::uint8_t rest[batch / width];
-  const int groups = (n + width - 1) / width;
-  for (int g = 0; g < groups; ++g) {
-    const Group& group = b.groups[g];
-    const unsigned present = (1u << std::min(width, n - g * width)) - 1;
-    rest[g] = static_cast<std::uint8_t>(present & ~group.no_root & ~group.one_root);
-    stats.cubic_sign += count_of(present & group.no_root);
-    for (unsigned lanes = present & group.one_root; lanes; lanes &= lanes - 1) {
-      const int lane = __builtin_ctz(lanes);
-      Piece& piece = b.pieces[b.count++];
-      piece.start = 0;
-      piece.length = 1;
-      for (int j = 0; j < 4; ++j) piece.cubic[j] = group.value[Group::cubic + j][lane];
-      piece.query = g * width + lane;
-    }
+  std::int32_t single[batch], several[batch];
+  int singles = 0, count = 0;
+  for (int i = 0; i < n; ++i) {  // no branches, which would be mispredicted
+    const std::int64_t flags = b.groups[i / width].flags[i % width];
+    const bool none = flags & Group::no_root, one = flags & Group::one_root,
+               open = flags & Group::open;
+    single[singles] = several[count] = b.open[b.left] = i;
+    singles += one;
+    count += !(none | one | open);
+    b.left += open & !(none | one);
+    stats.cubic_sign += none;
   }
-  std::int32_t several[batch];
-  int count = 0;
-  for (int g = 0; g < groups; ++g)
-    for (unsigned lanes = rest[g]; lanes; lanes &= lanes - 1) {
-      const int lane = __builtin_ctz(lanes);
-      const bool open = b.groups[g].open >> lane & 1;
-      (open ? b.open[b.left++] : several[count++]) = g * width + lane;
-    }
+  for (int i = 0; i < singles; ++i) {
+    const Group& group = b.groups[single[i] / width];
+    Piece& piece = b.pieces[b.count++];
+    piece.start = 0;
+    piece.length = 1;
+    for (int j = 0; j < 4; ++j) piece.cubic[j] = group.value[Group::cubic + j][single[i] % width];
+    piece.query = single[i];
+  }
   const Cut cut = batch_kernels().cut(b.groups, several, count, b.pieces + b.count);
   b.count += cut.pieces;
   stats.cubic_sign += cut.clear;
@@ -132,7 +128,7 @@ void make_pieces(Batch& b, int n, Stats& stats) {
 bool may_touch_at_start(const Batch& b, std::int32_t query) {
   const Group& group = b.groups[query / width];
   const int lane = query % width;
-  return (group.odd >> lane & 1) ||
+  return (group.flags[lane] & Group::odd) ||
          !(std::fabs(group.value[Group::cubic][lane]) > group.value[Group::error][lane]);
 }
 
