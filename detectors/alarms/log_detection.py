@@ -84,7 +84,8 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
         notes += _prior_knowledge(alarm.detector, trace)
         seconds, levels = alarm.detector.beyond(judged)
         if levels:
-            text = ", ".join(f"{names[j]} {level:.0f} N m" for j, level in levels.items())
+            unit = ["N" if linear else "N m" for linear in arm.robot.prismatic]
+            text = ", ".join(f"{names[j]} {level:.0f} {unit[j]}" for j, level in levels.items())
             notes.append(
                 f"for {seconds:.1f} s joints are faster, or accelerate more, than in the training "
                 f"logs: the bounds there reach {text} (90 % quantile), and lower torques may raise "

@@ -43,10 +43,16 @@ def text(card: ThresholdCard) -> str:
     from tauguard.report import table
 
     rows = [
-        {"found from [N m]": joint} | {name: _torque(card, name, j) for name in COLUMNS}
+        {"found from [N m]": _labelled(card, joint)}
+        | {name: _torque(card, name, j) for name in COLUMNS}
         for j, joint in enumerate(card.joints)
     ]
     return "\n".join([table(rows), *(line for part in _lines(card) for line in _wrapped(part))])
+
+
+def _labelled(card: ThresholdCard, joint: str) -> str:
+    """The joint's name, with the unit of a linear axis."""
+    return f"{joint} [N]" if joint in card.linear else joint
 
 
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
@@ -107,13 +113,18 @@ def _lines(card: ThresholdCard) -> list[str]:
         "motion, so a shorter contact has to be harder",
         _alarms(card),
     ]
-    speeds = zip(card.joints, card.fast, card.twice, strict=True)
-    if shown := [(f"{j} {v:.2g}", f"{m:.0f}") for j, v, m in speeds if 0 < v < ANYWHERE]:
-        limits, torques = (", ".join(part) for part in zip(*shown, strict=True))
+    limits, torques = [], []
+    for linear, per_second, unit in ((False, "rad/s", "N m"), (True, "m/s", "N")):
+        speeds = zip(card.joints, card.fast, card.twice, strict=True)
+        own = [s for s in speeds if (s[0] in card.linear) == linear and 0 < s[1] < ANYWHERE]
+        if own:
+            limits.append(", ".join(f"{j} {v:.2g}" for j, v, _ in own) + f" {per_second}")
+            torques.append(", ".join(f"{m:.0f}" for _, _, m in own) + f" {unit}")
+    if limits:
         lines.insert(
             -1,
-            f"moving: up to the speeds and accelerations of the logs ({limits} rad/s); at twice "
-            f"these from {torques} N m",
+            f"moving: up to the speeds and accelerations of the logs ({', '.join(limits)}); at "
+            f"twice these from {', '.join(torques)}",
         )
     if card.left_out:
         names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)
@@ -207,7 +218,8 @@ def draw(target: Path, card: ThresholdCard) -> None:
         bars.bar_label(drawn, said, fontsize=6, padding=1)
         for bar, one in zip(drawn, said, strict=True):
             bar.set_alpha(0.3 if one[0] == "(" else 1.0)  # not from these logs
-    bars.set_xticks(place, card.joints, rotation=20, ha="right")
+    names = [_labelled(card, joint) for joint in card.joints]
+    bars.set_xticks(place, names, rotation=20, ha="right")
     bars.set_ylabel("torque that is found [N m]")
     bars.spines[["top", "right"]].set_visible(False)
     bars.legend(frameon=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,7 +68,7 @@ class ThresholdCard:
     contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""
     fast: Array  #: speeds in the logs, up to which ``moving`` holds [rad/s], shape (n,)
     twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
-    slides: bool = False  #: some joint is prismatic, as in no arm of Franka or UR
+    linear: tuple[str, ...] = ()  #: prismatic joints: N and m/s instead of N m and rad/s
 
     @property
     def franka(self) -> dict[str, list[float]]:
@@ -77,7 +78,7 @@ class ThresholdCard:
         an arm with another number of joints or a prismatic one, or if a number is unknown.
         """
         numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
-        if self.slides or len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
+        if self.linear or len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
             return {}
         tool = np.repeat([self.tool["moving"][0], self.moment], 3)
         lower = {
@@ -98,7 +99,7 @@ class ThresholdCard:
         """
         limit = UPPER * self.tool["moving"][1]
         known = np.isfinite([limit, *self.moving]).all()
-        other = self.slides or len(self.joints) != UR_JOINTS
+        other = bool(self.linear) or len(self.joints) != UR_JOINTS
         return {"tool_force_limit_n": limit} if known and not other else {}
 
 
@@ -148,7 +149,7 @@ def threshold_card(
         replayed(detector, traces, usual, starting),
         np.where(bound.shown, bound.fast, np.nan),
         usual + TRACKED * faster,
-        bool(np.any(robot.prismatic)),
+        tuple(itertools.compress(robot.joint_names, robot.prismatic)),
     )
 
 

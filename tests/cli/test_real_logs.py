@@ -3,11 +3,13 @@
 import contextlib
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tauguard.cli import main
+from tauguard.cli.calibrate import report
 from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_gains
 from tauguard.detectors.calibration.arm_file import load_arm
@@ -352,6 +354,19 @@ def test_where_the_scale_comes_from_is_said(folder):
     with pytest.raises(ValueError, match="6 numbers for 3 joints"):
         real_arms.initial_arm(numbers, ur10e, (), "auto")
     assert load_arm(folder / "arm.xml") is None
+
+
+def test_a_linear_axis_has_its_own_units_in_the_table(capsys):
+    robot = SimpleNamespace(prismatic=[False, True])
+    kinds = ("drive_gain", "gain_relative_sd", "mass", "armature", "rms_nm", "speed_rad_s")
+    numbers = {kind: [1.0, 2.0] for kind in kinds} | {"moves": [True, True]}
+    held = {"held_out_rms_nm": {"a.csv": [1.0, 2.0]}, "loads_kg": {"a.csv": 0.0}}
+    result = {"joints": ["turn", "rail"], "scale": "gains", "robot": "r.xml"} | numbers | held
+    report(result, SimpleNamespace(arm=SimpleNamespace(robot=robot), notes=()), "")
+    out = capsys.readouterr().out
+    assert "rail (linear: N, m, kg)" in out
+    assert "turn [N m]" in out
+    assert "rail [N]" in out
 
 
 def tabled(folder, name, trace, effort, scale=1.0, velocities=True):

@@ -165,6 +165,7 @@ def report(result: dict[str, Any], found: Identified, preset: str) -> None:
     print(f"scale of the torques: from {source}")
     held = result["scale"] if result["scale"] in ("preset", "torques") else "given"
     rows = []
+    linear = found.arm.robot.prismatic
     for k, name in enumerate(result["joints"]):
         spread = result["gain_relative_sd"][k]
         moved = {
@@ -174,7 +175,7 @@ def report(result: dict[str, Any], found: Identified, preset: str) -> None:
         }
         rows.append(
             {
-                "joint": name,
+                "joint": f"{name} (linear: N, m, kg)" if linear[k] else name,
                 "gain N m/A": f"{result['drive_gain'][k]:.2f}",
                 "+-": f"{100 * spread:.0f} %" if spread else held,
                 "mass kg": f"{result['mass'][k]:.2f}",
@@ -186,7 +187,10 @@ def report(result: dict[str, Any], found: Identified, preset: str) -> None:
     for name, rms in result["held_out_rms_nm"].items():
         load = result["loads_kg"][name]
         carried = f"{load:.2f} kg" if abs(load) > 0.01 else ""
-        values = {f"{j} [N m]": f"{v:.2f}" for j, v in zip(result["joints"], rms, strict=True)}
+        units = [
+            f"{j} [{'N' if on else 'N m'}]" for j, on in zip(result["joints"], linear, strict=True)
+        ]
+        values = {j: f"{v:.2f}" for j, v in zip(units, rms, strict=True)}
         held_out.append({"held out, rms": name, "predicted without its load": carried} | values)
     if held_out:
         print(table(held_out))

@@ -406,11 +406,15 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     arms = {n: replace(card, joints=tuple("abcdefg"[:n]), moving=np.ones(n)) for n in (6, 7)}
     arms[7] = replace(arms[7], starting=np.ones(7))
     assert arms[6].ur["tool_force_limit_n"] > 0
-    assert not any(replace(arm, slides=True).franka for arm in arms.values())
-    assert not any(replace(arm, slides=True).ur for arm in arms.values())
+    arms = {n: replace(arm, linear=("b",)) for n, arm in arms.items()} | {70: arms[7]}
+    assert not arms[7].franka
+    assert not arms[6].ur
+    said = text(replace(card, linear=("c",), fast=fast, twice=np.array([7.4, 8.0, 9.6])))
+    assert [line.split("  ")[0] for line in said.splitlines()[2:5]] == ["a", "b", "c [N]"]
+    assert "(a 0.51 rad/s, c 2 m/s); at twice these from 7 N m, 10 N" in " ".join(said.split())
     once = text(replace(card, replay=(1, 0)))
     assert "raised 1 contact in these logs" in " ".join(once.split())
-    seven = arms[7].franka
+    seven = arms[70].franka
     assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
     assert {len(v) for k, v in seven.items() if "force" in k} == {6}
     assert card.false_alarms_per_hour["high"] > 0
