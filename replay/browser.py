@@ -10,6 +10,7 @@ import contextlib
 import http.client
 import http.server
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -176,7 +177,11 @@ def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
     quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}
     # `rerun` is a script that starts the program. In one process group both can be ended.
     viewer = subprocess.Popen(
-        [program, *options], env=quiet, stdout=subprocess.DEVNULL, start_new_session=True
+        [program, *options],
+        env=quiet,
+        stdin=subprocess.PIPE,  # both hold it
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
     )
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and viewer.poll() is None:
@@ -195,6 +200,14 @@ def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
 
 
 def _end(viewer: subprocess.Popen[bytes]) -> None:
+    """End the script and the program that it started, and wait until neither holds its input."""
+    assert viewer.stdin is not None
+    held = select.poll()
+    held.register(viewer.stdin, 0)  # reports an error when nobody holds the other end
     with contextlib.suppress(ProcessLookupError):
         os.killpg(viewer.pid, signal.SIGTERM)
+        viewer.wait()
+        if not held.poll(1000 * PATIENCE):
+            os.killpg(viewer.pid, signal.SIGKILL)
     viewer.wait()
+    viewer.stdin.close()

@@ -9,7 +9,6 @@ import zipfile
 
 import numpy as np
 import pytest
-import skops.io
 
 from tauguard.detectors import ArmModel, CollisionAlarm, load_model, registry, save_model
 from tauguard.detectors import model_file as files
@@ -62,6 +61,8 @@ def named(monkeypatch):
 
 
 def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(alarm, tmp_path):
+    import skops.io  # here: it looks through every loaded module for a second
+
     path = tmp_path / "model.skops"
     save_model(alarm, path)
     assert skops.io.get_untrusted_types(file=path) == []
@@ -76,6 +77,8 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
 
 
 def test_skops_reads_what_is_written_without_it(tmp_path):
+    import skops.io
+
     value = {"a": np.arange(6.0).reshape(2, 3), "b": [1, 2.5e-300, None, True, "x"], "c": {}}
     found = skops.io.loads(files._archive(value | {"d": np.array([True, False])}), trusted=[])
     np.testing.assert_array_equal(found.pop("a"), value.pop("a"))
@@ -142,6 +145,8 @@ def test_damaged_files_are_one_line(alarm, tmp_path):
     ],
 )
 def test_foreign_and_earlier_files_are_named(content, says, tmp_path):
+    import skops.io
+
     path = tmp_path / "model.skops"
     skops.io.dump(content, path)
     with pytest.raises(ValueError, match=says):
@@ -153,6 +158,8 @@ def test_foreign_and_earlier_files_are_named(content, says, tmp_path):
 
 def rewritten(path, change, checked=True):
     """The file with its content changed, under a fitting checksum or the old one."""
+    import skops.io
+
     container = skops.io.load(path)
     change(container["content"]["fields"])
     if checked:

@@ -1,5 +1,7 @@
 """People's arms and objects: they stop at them or go round; coal says how far apart they are."""
 
+from functools import cache
+
 import coal
 import gymnasium as gym
 import numpy as np
@@ -12,6 +14,8 @@ REACH = "tauguard:tauguard/Reach-v0"
 #: Out of the arm's reach: only people and objects matter here.
 SOMEONE = Person(position=(4.0, 0.0), motion="walk")
 ARMS = [k for k, s in enumerate(SEGMENTS) if s.region in ("upper_arm", "lower_arm", "hand")]
+
+REQUEST = coal.DistanceRequest()
 
 
 def walls(half, high, thick):
@@ -43,11 +47,18 @@ def make(*objects, person=SOMEONE):
     ).unwrapped
 
 
+@cache
 def solid(shape):
     """coal's."""
     if shape.kind == "sphere":
         return coal.Sphere(shape.size[0])
     return coal.Box(*(2 * s for s in shape.size))
+
+
+@cache
+def capsule(radius, half):
+    """coal's."""
+    return coal.Capsule(radius, 2 * half)
 
 
 def placed(position, quat_wxyz):
@@ -58,17 +69,17 @@ def placed(position, quat_wxyz):
 def distance(env, poses, thing):
     """Least signed distance [m] of the arms' capsules at poses (regions) from a thing's shapes."""
     least, where = np.inf, poses[-1]["position"] if len(poses) > len(SEGMENTS) else thing.position
+    there = [
+        (solid(shape), placed(np.add(where, shape.position), (1.0, 0.0, 0.0, 0.0)))
+        for shape in thing.shapes
+    ]
     for k in ARMS:
-        geom = env.model.geom(f"person_{SEGMENTS[k].name}")
-        capsule = coal.Capsule(geom.size[0], 2 * geom.size[1])
+        radius, half, _ = env.model.geom(f"person_{SEGMENTS[k].name}").size
         pose = placed(poses[k]["position"], poses[k]["quat_wxyz"])
-        for shape in thing.shapes:
-            there = placed(np.add(where, shape.position), (1.0, 0.0, 0.0, 0.0))
+        for shape, place in there:
             result = coal.DistanceResult()
-            least = min(
-                least,
-                coal.distance(capsule, pose, solid(shape), there, coal.DistanceRequest(), result),
-            )
+            found = coal.distance(capsule(radius, half), pose, shape, place, REQUEST, result)
+            least = min(least, found)
     return least
 
 

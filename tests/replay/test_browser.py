@@ -6,6 +6,7 @@ import io
 import os
 import socket
 import struct
+import subprocess
 import threading
 import time
 from html.parser import HTMLParser
@@ -19,7 +20,7 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import match_detection
-from tauguard.replay import write_rrd
+from tauguard.replay import browser, write_rrd
 from tauguard.replay.browser import BrowserReplay
 from tauguard.replay.events import EventFolder, events_of
 from tauguard.traces import Alarm
@@ -204,6 +205,23 @@ def test_nothing_is_left_when_it_is_closed(tmp_path):
     for address in (viewer, running.address[7:].split(":")):
         with socket.socket() as probe:
             assert probe.connect_ex((address[0], int(address[1]))) != 0
+
+
+def test_closing_waits_for_the_program_that_the_script_started(tmp_path):
+    """The script ends at once, the program half a second later."""
+    note = tmp_path / "note"
+    program = f"trap 'sleep 0.5; echo gone > {note}; exit' TERM; echo up > {note}; "
+    script = [
+        "sh",
+        "-c",
+        'exec 3<&0; (eval "$0") <&3 & wait',
+        program + "while :; do sleep 0.05; done",
+    ]
+    viewer = subprocess.Popen(script, stdin=subprocess.PIPE, start_new_session=True)
+    while not note.exists() or note.read_text() != "up\n":
+        time.sleep(0.01)
+    browser._end(viewer)
+    assert note.read_text() == "gone\n"
 
 
 def with_a_false_alarm():

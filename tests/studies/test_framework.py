@@ -9,6 +9,7 @@ import subprocess
 import sys
 from html import escape
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -80,9 +81,28 @@ STUDIES = {
 }
 
 
+#: Runs commands one after the other in a process, where libraries are loaded once.
+EACH = """
+import contextlib, io, json, runpy, sys
+found = []
+for command in json.loads(sys.argv[1]):
+    sys.argv[1:], out, err, code = command, io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            runpy.run_module("studies", run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+    found.append([code or 0, out.getvalue(), err.getvalue()])
+print(json.dumps(found))
+"""
+
+
 @pytest.fixture
 def checkout(tmp_path):
-    """A folder with the framework and the studies above; a function that runs it there."""
+    """A folder with the framework and the studies above; functions that run it there.
+
+    ``run(*command)`` starts a process of its own, ``run.each(command, ...)`` one for all commands.
+    """
     studies = tmp_path / "studies"
     studies.mkdir()
     shutil.copytree(FRAMEWORK, studies / "framework")
@@ -109,7 +129,23 @@ def checkout(tmp_path):
             text=True,
         )
 
-    run.folder = tmp_path
+    def each(*commands):
+        texts = json.dumps([[str(arg) for arg in command] for command in commands])
+        done = subprocess.run(
+            [sys.executable, "-c", EACH, texts],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        fields = ("returncode", "stdout", "stderr")
+        return [
+            SimpleNamespace(**dict(zip(fields, one, strict=True)))
+            for one in json.loads(done.stdout)
+        ]
+
+    run.folder, run.each = tmp_path, each
     return run
 
 
@@ -145,7 +181,8 @@ def rows(path):
 
 
 def test_a_part_is_measured_judged_printed_drawn_and_written(checkout):
-    done = checkout("bench", "first-good", "--seed", "3", "--json", "rows.json")
+    flags = ("bench", "first-good", "--seed", "3", "--json", "rows.json")
+    done, full = checkout.each(flags, (*flags, "--tables"))
     assert done.returncode == 0, done.stderr
     written = json.loads((checkout.folder / "rows.json").read_text())
     assert written["name"] == "first-good"
@@ -158,49 +195,56 @@ def test_a_part_is_measured_judged_printed_drawn_and_written(checkout):
         r"^a question\n\nmethod +microseconds +error\n.*\nours +40 +0.5\n", short, re.M
     )
     assert re.search(r"^how far +1 m +2 m +no\nevery table: --tables\n", short, re.M)
-    whole = checkout("bench", "first-good", "--tables").stdout
-    assert "a: What the columns mean." in whole
-    assert "every table" not in whole
+    assert "a: What the columns mean." in full.stdout
+    assert "every table" not in full.stdout
     assert re.search(r"^load: ", done.stdout, re.MULTILINE)
     assert (checkout.folder / "bench-first-good.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_study_runs_all_its_parts_and_each_has_a_name_of_its_own(checkout):
-    done = checkout("bench", "first", "--quick", "--json", "rows.json")
+    done, alias, listed = checkout.each(
+        ("bench", "first", "--quick", "--json", "rows.json"),
+        ("bench", "own_good", "--json", "one.json"),
+        ("bench", "list"),
+    )
     assert done.returncode == 0, done.stderr
     assert rows(checkout.folder / "rows-good.json")[0]["quick"] is True
     assert [row["us"] for row in rows(checkout.folder / "rows-jobs.json")] == [10.0, 6.0, 8.0]
-    assert checkout("bench", "own_good", "--json", "one.json").returncode == 0
+    assert alias.returncode == 0, alias.stderr
     assert rows(checkout.folder / "one.json")[0]["us"] == 40.0
-    listed = checkout("bench", "list").stdout
-    assert "first: a study" in listed
-    assert "jobs (own_jobs)  asks" in listed
+    assert "first: a study" in listed.stdout
+    assert "jobs (own_jobs)  asks" in listed.stdout
 
 
 def test_an_option_runs_the_parts_that_take_it(checkout):
-    done = checkout("bench", "first", "--robot", "ur5", "--json", "rows.json")
+    done, refused = checkout.each(
+        ("bench", "first", "--robot", "ur5", "--json", "rows.json"),
+        ("bench", "second", "--robot", "ur5"),
+    )
     assert done.returncode == 0, done.stderr
     assert rows(checkout.folder / "rows.json")[0]["robot"] == "ur5"
     assert not (checkout.folder / "done.txt").exists()
-    refused = checkout("bench", "second", "--robot", "ur5")
     assert "--robot goes with first-good, not with second" in refused.stderr
 
 
-@pytest.mark.parametrize(
-    ("args", "said"),
-    [
-        (["frist"], "no study 'frist': did you mean first?"),
-        (["nothing"], "no study 'nothing': there are first, second"),
-        (["first-bad"], "no study 'first-bad': there are first, second"),
-        (["second-refused"], "no detector of that name"),
-        (["own_good", "--json", "none/f.json"], "no folder none; make it first"),
-    ],
+#: Commands of bad input, and what is said to them.
+BAD = (
+    (("frist",), "no study 'frist': did you mean first?"),
+    (("nothing",), "no study 'nothing': there are first, second"),
+    (("first-bad",), "no study 'first-bad': there are first, second"),
+    (("second-refused",), "no detector of that name"),
+    (("own_good", "--json", "none/f.json"), "no folder none; make it first"),
+    (("own_jobs", "--keep", "file"), "--keep file: cannot be written"),
 )
-def test_bad_input_is_one_line_and_exit_code_2(checkout, args, said):
-    done = checkout("bench", *args)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
+
+
+def test_bad_input_is_one_line_and_exit_code_2(checkout):
+    (checkout.folder / "file").touch()
+    every = checkout.each(*(("bench", *args) for args, _ in BAD))
+    for (_, said), done in zip(BAD, every, strict=True):
+        assert done.returncode == 2, said
+        assert said in done.stderr
+        assert done.stderr.count("\n") == 1, said
 
 
 def test_an_error_of_a_library_is_a_defect_and_not_bad_input(checkout):
@@ -240,12 +284,6 @@ def test_jobs_that_the_cache_holds_are_not_run_again(checkout):
     assert "damaged, or of other code: delete it" in done.stderr
 
 
-def test_a_cache_that_cannot_be_made_is_one_line(checkout):
-    (checkout.folder / "file").touch()
-    done = checkout("bench", "own_jobs", "--keep", "file")
-    assert "--keep file: cannot be written" in done.stderr
-
-
 def test_the_report_runs_what_is_not_there_and_says_what_failed(checkout):
     case = {"case": "c", "library": "tauguard", "kind": "scene", "expected": "1", "answer": "2"}
     case |= {"right": False, "why": "a hard one", "origin": "here", "explained": "soft"}
@@ -269,11 +307,15 @@ def test_the_report_runs_what_is_not_there_and_says_what_failed(checkout):
     assert 'alt="a question" src="data:image/svg+xml' in text
     assert "zero-size array" in text
     assert "Study: second-broken" not in text
-    again = checkout("report", "--out", "page", "--quick", "--no-mistakes", "--study", "first")
+    again, nowhere, unknown = checkout.each(
+        ("report", "--out", "page", "--quick", "--no-mistakes", "--study", "first"),
+        ("report", "--out", "none", "--bound"),
+        ("report", "--out", "a", "--study", "x"),
+    )
     assert "first-good: there already" in again.stdout
     assert "second" not in again.stdout
-    assert checkout("report", "--out", "none", "--bound").returncode == 2
-    assert "there are first, second" in checkout("report", "--out", "a", "--study", "x").stderr
+    assert nowhere.returncode == 2
+    assert "there are first, second" in unknown.stderr
 
 
 def written(name, one_row, **changed):
@@ -304,12 +346,14 @@ def test_files_that_no_part_wrote_are_named_and_not_written_over(checkout, stran
     (folder / "mine.json").write_text("{}")
     for name, (text, _) in strange.items():
         (folder / f"{name}.json").write_text(text)
-    done = checkout("report", "--out", "page", "--bound", "--no-mistakes")
+    done, ran = checkout.each(
+        ("report", "--out", "page", "--bound", "--no-mistakes"),
+        ("bench", "all", "--out", "page", "--quick"),
+    )
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == len(strange)
     page = (folder / "index.html").read_text()
     assert "not read: mine.json" in page
-    ran = checkout("bench", "all", "--out", "page", "--quick")
     for name, (text, why) in strange.items():
         (line,) = [line for line in done.stderr.splitlines() if f" {name}: {name}.json" in line]
         assert why in line
@@ -343,40 +387,36 @@ def test_what_comes_from_outside_is_escaped_and_rows_of_another_form_are_named(c
     assert "incomplete: " in page
 
 
-def mistakes(checkout, *flags):
-    """The lines about mistakes that a report prints, and its page."""
-    done = checkout("report", "--out", "a & b", "--bound", *flags)
-    page = checkout.folder / "a & b" / "index.html"
-    return done, page.read_text()
-
-
 def test_mistakes_are_recorded_once_and_linked(checkout):
     folder = checkout.folder / "a & b"
     folder.mkdir()
-    done, page = mistakes(checkout)
+    command, index = ("report", "--out", "a & b", "--bound"), folder / "index.html"
+    done = checkout(*command)
+    page = index.read_text()
     assert done.stdout.count("training the detector") == 1
     for part in (escape("'a & b'"), "2 missed, 2 late", "no alarm starts in the collision"):
         assert part in page
     assert 'href="open/wrong/false%20alarm-1.rrd"' in page
     drawn = [base64.b64decode(one).decode() for one in re.findall('png;base64,([^"]+)', page)]
     assert drawn == ["missed-1", "late-1", "false alarm-1"]
-    again, same = mistakes(checkout)
-    assert "training" not in again.stdout
-    assert same == page
+    assert "training" not in checkout(*command).stdout
+    assert index.read_text() == page
     (folder / "wrong" / "late-2.rrd").unlink()
-    assert "some recordings are gone" in mistakes(checkout)[0].stdout
-    assert "another seed or build" in mistakes(checkout, "--seed", "1")[0].stdout
+    gone, seed = checkout.each(command, (*command, "--seed", "1"))
+    assert "some recordings are gone" in gone.stdout
+    assert "another seed or build" in seed.stdout
 
 
-@pytest.mark.parametrize("text", ["", '{"seed": 3, "rows": 1, "counts": ""}'])
-def test_a_list_of_mistakes_of_somebody_else_is_named_and_kept(checkout, text):
-    path = checkout.folder / "a & b" / "wrong.json"
-    path.parent.mkdir()
-    path.write_text(text)
-    done, _ = mistakes(checkout)
-    assert done.returncode == 1
-    assert "not a list of mistakes" in done.stderr
-    assert path.read_text() == text
+def test_a_list_of_mistakes_of_somebody_else_is_named_and_kept(checkout):
+    texts = {"a & b": "", "b": '{"seed": 3, "rows": 1, "counts": ""}'}
+    for folder, text in texts.items():
+        (checkout.folder / folder).mkdir()
+        (checkout.folder / folder / "wrong.json").write_text(text)
+    every = checkout.each(*(("report", "--out", folder, "--bound") for folder in texts))
+    for (folder, text), done in zip(texts.items(), every, strict=True):
+        assert done.returncode == 1
+        assert "not a list of mistakes" in done.stderr
+        assert (checkout.folder / folder / "wrong.json").read_text() == text
 
 
 def test_an_installation_without_studies_says_where_they_are(tmp_path):

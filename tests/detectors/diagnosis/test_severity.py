@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -22,9 +24,13 @@ from tauguard.report import two_digits
 
 XML = cura6.arm_xml()
 ROBOT = RobotNumbers.from_pin(pin_model(XML))
-SURFACE = link_surface(XML)
 HOME = np.array(cura6.HOME)
 TORQUE = np.array([20.0, 30.0, 10.0, 4.0, 1.0, 0.5])
+
+
+@cache
+def surface():
+    return link_surface(XML)
 
 
 def seen(torque, seconds, lag, dt=1e-3, after=0.3):
@@ -59,17 +65,17 @@ def test_the_impulse_at_the_joints_does_not_depend_on_the_lag(lag, seconds):
 
 def contact(link, row, force):
     """Torques of a force on a point of a link's surface."""
-    rows = np.flatnonzero(SURFACE.link == link)
+    rows = np.flatnonzero(surface().link == link)
     at = rows[row]
     poses = link_poses(ROBOT, HOME)
-    point = poses.origin[link] + poses.rotation[link] @ SURFACE.point[at]
-    inward = -poses.rotation[link] @ SURFACE.normal[at]
+    point = poses.origin[link] + poses.rotation[link] @ surface().point[at]
+    inward = -poses.rotation[link] @ surface().normal[at]
     jacobian = point_jacobians(ROBOT, poses, np.array([link]), point[None])[0]
     return jacobian.T @ (force * inward)
 
 
 def believed(residual, noise):
-    return contact_belief(ROBOT, SURFACE, HOME, residual, noise)
+    return contact_belief(ROBOT, surface(), HOME, residual, noise)
 
 
 @pytest.mark.parametrize("row", [3, 40, 90])
@@ -77,7 +83,7 @@ def test_draws_have_the_mean_of_the_closed_form(row):
     noise = np.full(6, 0.5)
     residual = contact(5, row, 60.0)
     belief = believed(residual, noise)
-    drawn = force_draws(ROBOT, SURFACE, HOME, residual, noise, belief.probability, 4000)
+    drawn = force_draws(ROBOT, surface(), HOME, residual, noise, belief.probability, 4000)
     mean = belief.probability @ belief.force
     np.testing.assert_allclose(drawn.mean(axis=0), mean, atol=0.06 * np.linalg.norm(mean) + 0.5)
 
@@ -86,7 +92,7 @@ def said(link, row, force, seconds=0.05):
     after = seen(contact(link, row, force), seconds, 0.005)
     contact_torque = ContactTorque.of(after)
     noise = Trust().noise(contact_torque.mean, after.deviation[0])
-    return severity(ROBOT, SURFACE, after, believed(contact_torque.mean, noise), 1, Trust())
+    return severity(ROBOT, surface(), after, believed(contact_torque.mean, noise), 1, Trust())
 
 
 def test_most_intervals_hold_what_happened():
