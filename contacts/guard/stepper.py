@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any
@@ -14,7 +15,7 @@ from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
-from tauguard.contacts.guard.engine import INTEGRATION, PHYSICS, REFUSED, addresses
+from tauguard.contacts.guard.engine import PHYSICS, REFUSED, addresses
 from tauguard.contacts.guard.followed_fields import (
     followed_fields,
     numbers,
@@ -247,31 +248,26 @@ class GuardedStepper:
         self.close()
 
     def _named(self, numbers: Sequence[int]) -> tuple[Pair, ...]:
-        return tuple(sorted(self._pairs[k] for k in numbers))
+        return tuple(sorted([self._pairs[k] for k in numbers])) if numbers else ()
 
     def _report(self) -> StepReport:
-        steps, contacts, cuts, restored, passed, zones, added, first = self._guard.report()
+        steps, contacts, cuts, restored, passed, zones, added, states = self._guard.report()
         return StepReport(
             steps,
             contacts,
-            tuple(Cut(time, self._pairs[pair], stiff) for time, pair, stiff in cuts),
+            tuple([Cut(time, self._pairs[pair], stiff) for time, pair, stiff in cuts]),
             self._named(restored),
             self._named(passed),
             self._named(zones),
             added,
-            None if first is None else self._balance(first),
+            None if states is None else functools.partial(self._balance, states),
         )
 
-    def _balance(self, first: Array) -> Callable[[], EnergyBalance]:
-        last = np.empty_like(first)
-        mujoco.mj_getState(self.model, self.data, last, INTEGRATION)
-
-        def balance() -> EnergyBalance:
-            if self._meter is None:
-                self._meter = EnergyMeter(self.model)
-            return self._meter.between(first, last)
-
-        return balance
+    def _balance(self, states: bytes) -> EnergyBalance:
+        if self._meter is None:
+            self._meter = EnergyMeter(self.model)
+        first, last = np.frombuffer(states).reshape(2, -1)
+        return self._meter.between(first, last)
 
     def _tunnelling_events(self, x_t1: Array) -> list[tuple[int, list[int], float]]:
         assert self._tunnelling is not None

@@ -233,10 +233,11 @@ class Guard {
     stepper_->archive(reader), reader.end();
   }
 
-  // The fields of StepReport; the last item is the state at the start if the step was rolled back.
+  // The fields of StepReport; if the step was rolled back, the last item has the states at its
+  // start and its end, one after the other.
   using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int, bool>>;
-  using State = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
-  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double, std::optional<State>>
+  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double,
+            std::optional<nb::bytes>>
   report() const {
     const Report& r = stepper_->report();
     const auto ids = [](const std::vector<int>& values) {
@@ -247,8 +248,7 @@ class Guard {
     nb::list cuts;
     for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair, cut.stiffened));
     return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.restored), ids(r.passed),
-                          ids(r.impact_zones), r.added,
-                          r.rolled_back ? array_of(stepper_->first()) : nb::none());
+                          ids(r.impact_zones), r.added, r.rolled_back ? states() : nb::none());
   }
 
   Integers stiffened() const { return listed(&Stepper::stiffened); }
@@ -263,6 +263,13 @@ class Guard {
   void reset() { refuse_within_step(), stepper_->reset(); }
 
  private:
+  nb::object states() const {
+    std::vector<double> both = stepper_->first();
+    both.resize(2 * both.size());
+    double* const last = both.data() + both.size() / 2;
+    engine_.get_state(engine_.model, engine_.data, last, engine_.signature.integration);
+    return nb::bytes(both.data(), both.size() * sizeof(double));
+  }
   // Marks that a step is in progress. The flag is read and written with the GIL held.
   struct Stepping {
     explicit Stepping(Guard* guard) : guard(guard) {

@@ -136,7 +136,7 @@ bool Stepper::step(const std::function<void()>& each) {
     e_.step(e_.model, e_.data);
     lost = watch.happened() || *e_.time != after || !finite();
   }
-  std::vector<PairHit> hits = judge();
+  std::vector<PairHit> hits = judge(Depth::none);
   std::fill(passed_.begin(), passed_.end(), 0);
   if (lost) note_reset();
   if (!hits.empty()) {
@@ -174,13 +174,13 @@ bool Stepper::stands() {
   return !report_.restored.empty();
 }
 
-std::vector<PairHit> Stepper::judge() {
+std::vector<PairHit> Stepper::judge(Depth depth) {
   e_.copy_state(e_.model, e_.data, e_.end, e_.signature.pose);
   e_.kinematics(e_.model, e_.end);
   if (e_.nflex) carry();
   std::vector<Hit> rows;
   const Poses poses{mocap_.xpos(), mocap_.xmat(), e_.end_xpos, e_.end_xmat, turns()};
-  verdict_.judge(poses, mocap_.flexvert(), x_t1_.data(), &rows);
+  verdict_.judge(poses, mocap_.flexvert(), x_t1_.data(), depth, &rows);
   std::vector<PairHit> hits;
   for (const Hit& row : rows) {
     const int last = last_level_[row.pair];

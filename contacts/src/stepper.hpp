@@ -91,7 +91,7 @@ class Stepper {
 
  private:
   bool stands();
-  std::vector<PairHit> judge();
+  std::vector<PairHit> judge(Depth depth = Depth::all);
   bool finite() const;
   void number_pairs();
   void roll_back(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each);

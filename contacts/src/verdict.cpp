@@ -46,9 +46,10 @@ enum : char { unknown, apart, sunk };
 // touch before shallower ones, so each sweep starts where the last one ended. A pair is judged at
 // the shallowest level at which it is apart at the start. There is no sweep if it certainly stays
 // apart at this level by earlier steps (`lasts(level)`) or by its gap (`stays(level, gap, n)`).
+// Whether the shapes of the next level meet is always found; which deeper ones do, as `depth` says.
 template <class MakeA, class MakeB, class Lasts, class Stays>
 bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts,
-            const Stays& stays, char* known, Hit* hit) {
+            const Stays& stays, Depth depth, char* known, Hit* hit) {
   double close = touching, gap = 0;
   Vec3 n{};
   const auto touch = [&](int level, double from) {
@@ -98,11 +99,13 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts
     level = 1;
   }
   const int trigger = level;
-  for (; level < levels; ++level) {
-    if (!meet(level, &from)) break;
-    hit->deepest = level;
+  bool met = false;
+  for (; level < levels && meet(level, &from); ++level) {
+    met = true, hit->deepest = level;
+    if (depth == Depth::none) break;
+    if (depth == Depth::last) level = std::max(level, levels - 2);
   }
-  if (level > trigger) return hit->level = trigger, true;
+  if (met) return hit->level = trigger, true;
   return hit->level == 0 && separate(0, 1);  // touched and parted again, or only came close
 }
 
@@ -262,7 +265,7 @@ bool Verdict::stays_apart(std::size_t number, int level, double gap, const Vec3&
   return true;
 }
 
-void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
+void Verdict::judge_rigid(std::size_t number, Depth depth, std::vector<Hit>* hits) {
   Reserve& reserve = reserves_[number];
   const double way = ways_[reserve.a].since + ways_[reserve.b].since;
   reserve.left = (reserve.left - way) * (1 - 4 * unit_roundoff);  // a margin for rounding
@@ -284,7 +287,7 @@ void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
           [&](int level) { return mover(pair.b[level], origin); }, static_cast<int>(pair.a.size()),
           lasts,
           [&](int level, double gap, const Vec3& n) { return stays_apart(number, level, gap, n); },
-          &pair.known, &hit))
+          depth == Depth::all ? Depth::last : depth, &pair.known, &hit))
     return;
   const Vec3 drift = plane ? Vec3{} : motion(a.body).linear;
   hit.way = travel(pair.b[0], drift);
@@ -292,7 +295,7 @@ void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
   hits->push_back(hit);
 }
 
-void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1,
+void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1, Depth depth,
                          std::vector<Hit>* hits) {
   constexpr std::size_t block = 32;  // simplices that share a box
   FlexPair& pair = flex_pairs_[number];
@@ -340,8 +343,8 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
                   [&](int level) {
                     return SupportShape(start, stop, pair.corners, pair.radii[level], origin);
                   },
-                  static_cast<int>(pair.a.size()), [](int) { return false; }, stays, &pair.known[e],
-                  &hit))
+                  static_cast<int>(pair.a.size()), [](int) { return false; }, stays, depth,
+                  &pair.known[e], &hit))
         continue;
       for (int i = 0; i < pair.corners; ++i) {
         const Vec3 moved = geometry::load(stop[i]) - geometry::load(start[i]) - drift;
@@ -382,11 +385,11 @@ void Verdict::forget() {
   for (FlexPair& pair : flex_pairs_) std::fill(pair.known.begin(), pair.known.end(), unknown);
 }
 
-void Verdict::judge(const Poses& poses, const double* x_t0, const double* x_t1,
+void Verdict::judge(const Poses& poses, const double* x_t0, const double* x_t1, Depth depth,
                     std::vector<Hit>* hits) {
   update(poses);
-  for (std::size_t i = 0; i < pairs_.size(); ++i) judge_rigid(i, hits);
-  for (std::size_t i = 0; i < flex_pairs_.size(); ++i) judge_flex(i, x_t0, x_t1, hits);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) judge_rigid(i, depth, hits);
+  for (std::size_t i = 0; i < flex_pairs_.size(); ++i) judge_flex(i, x_t0, x_t1, depth, hits);
 }
 
 }  // namespace tauguard::contacts

@@ -27,6 +27,10 @@ struct Hit {
   double way;            // upper bound of the approach of the pair's points in the step [m]
 };
 
+// What is found of a pair whose shapes meet: nothing more; whether those of the last level meet
+// too; the deepest level whose shapes meet.
+enum class Depth { none, last, all };
+
 class Verdict {
  public:
   // Adds a shape of some level to a body and returns the shape's number.
@@ -41,7 +45,9 @@ class Verdict {
 
   // Clears the memory of earlier steps.
   void forget();
-  void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
+  // `depth`: none or all; of pairs of geoms, `all` finds the last level only.
+  void judge(const Poses& poses, const double* x_t0, const double* x_t1, Depth depth,
+             std::vector<Hit>* hits);
 
   std::size_t rigid_pairs() const { return pairs_.size(); }
   // The vertices of some simplices of a pair with a flex, without repetition.
@@ -105,8 +111,9 @@ class Verdict {
   double turning(const Pair& pair) const;
   double gap_of_balls(const Pair& pair) const;
   bool stays_apart(std::size_t pair, int level, double gap, const Vec3& n);
-  void judge_rigid(std::size_t pair, std::vector<Hit>* hits);
-  void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
+  void judge_rigid(std::size_t pair, Depth depth, std::vector<Hit>* hits);
+  void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, Depth depth,
+                  std::vector<Hit>* hits);
 
   std::vector<Entry> entries_;
   std::vector<Pair> pairs_;
