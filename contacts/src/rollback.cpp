@@ -10,7 +10,8 @@ namespace {
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
 // If only an impact zone helps, short sub-steps are useless. So each impact zone multiplies the
-// length of the shortest sub-step by `longer`, up to the fraction `longest` of a step.
+// length of the shortest sub-step by `longer`, up to the fraction `longest` of a step. A step after
+// one with an impact zone begins with sub-steps of this length.
 constexpr double longer = 4, longest = 0.25;
 
 // Largest number of attempts to find all pairs of an impact zone.
@@ -32,9 +33,12 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
   }
-  least_ = !fresh && stops_ > 0 ? longer * s_.smallest : s_.smallest;
+  const bool stuck = !fresh && stops_ > 0;
+  least_ = stuck ? longest : s_.smallest;
   stops_ = 0;
   double length = shorter(hits, whole_);
+  if (stuck) length = std::min(length, longest * whole_);
+  for (Cut& cut : report_.cuts) cut.time = std::min(cut.time, *e_.time + length);
   for (rest_ = whole_; rest_ > 0;) {
     const int stops = stops_;
     length = sub_step(std::min(length, rest_), each);
