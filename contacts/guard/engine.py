@@ -15,29 +15,30 @@ from mujoco.introspect import ast_nodes
 
 from tauguard.models.mujoco_library import function_address, variable_address
 
-FUNCTIONS = (
-    "mj_step",
-    "mj_step1",
-    "mj_step2",
-    "mj_kinematics",
-    "mj_comPos",
-    "mj_comVel",
-    "mj_flex",
-    "mj_tendon",
-    "mj_makeM",
-    "mj_energyPos",
-    "mj_getState",
-    "mj_setState",
-    "mj_copyState",
-    "mj_mulM",
-    "mj_mulJacVec",
-    "mj_jacBodyCom",
-    "mj_jac",
-    "mj_solveM",
-    "mj_integratePos",
-    "_mjPRIVATE_setTlsLogHandler",  # as in the Python binding: errors become exceptions
-    "_mjPRIVATE_getGlobalLogHandler",
-)
+#: MuJoCo's functions, by their names in the native guard.
+FUNCTIONS = {
+    "step": "mj_step",
+    "step1": "mj_step1",
+    "step2": "mj_step2",
+    "kinematics": "mj_kinematics",
+    "com_pos": "mj_comPos",
+    "com_vel": "mj_comVel",
+    "flex": "mj_flex",
+    "tendon": "mj_tendon",
+    "make_m": "mj_makeM",
+    "energy_pos": "mj_energyPos",
+    "get_state": "mj_getState",
+    "set_state": "mj_setState",
+    "copy_state": "mj_copyState",
+    "mul_m": "mj_mulM",
+    "mul_jac": "mj_mulJacVec",
+    "jac_com": "mj_jacBodyCom",
+    "jac": "mj_jac",
+    "solve_m": "mj_solveM",
+    "integrate": "mj_integratePos",
+    "logging.set": "_mjPRIVATE_setTlsLogHandler",  # as in the Python binding: for exceptions
+    "logging.global": "_mjPRIVATE_getGlobalLogHandler",
+}
 #: Flags of features that are refused, because a step with them cannot be rolled back.
 REFUSED = {
     "ipc": mujoco.mjtEnableBit.mjENBL_IPC,
@@ -54,12 +55,16 @@ POSE = int(
 INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 _MODEL_ARRAYS = (
-    *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("margin", "solref")),
-    *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("solimp", "friction")),
-    *("geom_priority", "flex_priority", "pair_geom1", "pair_geom2"),
-    *("flex_vertbodyid", "flex_vert", "geom_bodyid", "body_rootid", "body_mocapid"),
-    *("body_dofnum", "body_weldid"),
+    *("pair_geom1", "pair_geom2", "flex_vertbodyid", "flex_vert"),
+    *("geom_bodyid", "body_rootid", "body_mocapid", "body_dofnum", "body_weldid"),
 )
+#: Arrays of contact parameters, by their number in the native guard.
+_PARAMETERS = {
+    f"{name}[{k}]": f"{kind}_{name}"
+    for k, kind in enumerate(("pair", "geom", "flex"))
+    for name in ("margin", "solref", "solimp", "friction", "priority")
+    if hasattr(mujoco.MjModel, f"{kind}_{name}")  # pairs have no priority
+}
 _DATA_ARRAYS = (
     *("qpos", "qvel", "energy", "qfrc_actuator", "qfrc_applied", "xfrc_applied"),
     *("xpos", "xmat", "xipos", "flexvert_xpos", "mocap_pos", "mocap_quat"),
@@ -80,11 +85,11 @@ PHYSICS = (
     *("o_margin", "o_solref", "o_solimp", "o_friction"),
 )
 #: Warnings after which MuJoCo has reset the data.
-_RESETS = {
-    "qpos": int(mujoco.mjtWarning.mjWARN_BADQPOS),
-    "qvel": int(mujoco.mjtWarning.mjWARN_BADQVEL),
-    "qacc": int(mujoco.mjtWarning.mjWARN_BADQACC),
-}
+_RESETS = (
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+)
 _NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "npair", "nflex", "nflexvert", "ntendon")
 #: mjLOG_ERROR of mjtLogLevel, which the Python binding does not show.
 _LOG_ERROR = 3
@@ -115,8 +120,9 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     Raises:
         RuntimeError: the structs of the installed MuJoCo differ from their declared layout.
     """
-    out = {name: function_address(name) for name in FUNCTIONS}
+    out = {own: function_address(name) for own, name in FUNCTIONS.items()}
     out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
+    out |= {own: _array(model, name) for own, name in _PARAMETERS.items()}
     out |= {name: _array(data, name) for name in _DATA_ARRAYS}
     out |= {f"end_{name}": _array(end, name) for name in _END_ARRAYS}
     out |= {f"other_{name}": _array(other, name) for name in _OTHER_ARRAYS}
@@ -125,9 +131,9 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     warning = _layout("mjWarningStat")
     base = data._address
     out |= {name: base + int(getattr(fields, name).offset) for name in (*_MOVING, "time")}
-    for name, kind in _RESETS.items():
+    for k, kind in enumerate(_RESETS):
         at = kind * ctypes.sizeof(warning) + int(warning.number.offset)
-        out[f"reset_{name}"] = base + int(fields.warning.offset) + at
+        out[f"resets[{k}]"] = base + int(fields.warning.offset) + at
     names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
@@ -144,19 +150,19 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
         "contact_size": ctypes.sizeof(contact),
         "interpolated": bool(model.nflex) and bool(model.flex_interp.any()),
         "state_size": mujoco.mj_stateSize(model, INTEGRATION),
-        "sig_integration": INTEGRATION,
-        "sig_pose": POSE,
+        "signature.integration": INTEGRATION,
+        "signature.pose": POSE,
         "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
         "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
         "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
         "runge_kutta": int(mujoco.mjtIntegrator.mjINT_RK4),
-        "override": int(mujoco.mjtEnableBit.mjENBL_OVERRIDE),
+        "override_flag": int(mujoco.mjtEnableBit.mjENBL_OVERRIDE),
         "refused": sum(int(bit) for bit in REFUSED.values()),
-        "mjcb_contactfilter": variable_address("mjcb_contactfilter"),
+        "contact_filter": variable_address("mjcb_contactfilter"),
         "at_pstack": int(fields.pstack.offset),
         "at_pbase": int(fields.pbase.offset),
-        "log_error": _LOG_ERROR,
-        "at_subject": int(_layout("mjLogMessage").subject.offset),
+        "logging.error": _LOG_ERROR,
+        "logging.at_subject": int(_layout("mjLogMessage").subject.offset),
         "newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
         "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
         "refsafe": int(mujoco.mjtDisableBit.mjDSBL_REFSAFE),
@@ -171,8 +177,7 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
         ctypes.c_double.from_address(found["time"]).value == data.time,
         ctypes.c_int.from_address(found["ncon"]).value == data.ncon,
         ctypes.c_int.from_address(found["nefc"]).value == data.nefc,
-        ctypes.c_int.from_address(found["reset_qacc"]).value
-        == data.warning[_RESETS["qacc"]].number,
+        ctypes.c_int.from_address(found["resets[2]"]).value == data.warning[_RESETS[2]].number,
         not model.nq or ctypes.c_size_t.from_address(qpos).value == found["qpos"],
     )
     if not all(same):

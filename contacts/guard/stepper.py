@@ -95,7 +95,7 @@ class GuardedStepper:
         model = self._model
         _refuse(model, self._data)
         end = mujoco.MjData(model)
-        settings = {**SETTINGS, "stiff": float(self._stiff), "most": float(self._most)}
+        settings = {**SETTINGS, "stiff": self._stiff, "most": self._most}
         other = mujoco.MjData(model) if model.nmocap else end
         held = (model, self._data, end, other)
         found = addresses(*held)

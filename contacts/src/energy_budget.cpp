@@ -25,13 +25,13 @@ EnergyChange EnergyBudget::change(const double* velocity, double length, const d
   e_.energy_pos(e_.model, e_.data);
   e_.energy_pos(e_.model, e_.end);
   const double place = mocap_.shifted() ? mocap_.potential() + stretch(mocap_.vertices())
-                                        : e_.energy[0] + stretch(e_.flexvert);
+                                        : e_.energy[0] + stretch(e_.flexvert_xpos);
   const double before = kinetic(e_.data, velocity) + place;
   double driven = 0;
   std::vector<double> mean(velocity, velocity + e_.nv);
   for (int i = 0; i < e_.nv; ++i) {
     mean[i] = 0.5 * (mean[i] + e_.qvel[i]);
-    driven += (e_.actuator[i] + e_.applied[i]) * mean[i];
+    driven += (e_.qfrc_actuator[i] + e_.qfrc_applied[i]) * mean[i];
   }
   driven = length * (driven + pushed(mean.data())) + mocap_.work(mean.data(), length);
   return {kinetic_end + e_.end_energy[0] + stretch(x_t1) - before - driven, kinetic_end};
@@ -55,7 +55,7 @@ double EnergyBudget::pushed(const double* velocity) {
   double power = 0;
   std::vector<double> jacobian;
   for (int b = 0; b < e_.nbody; ++b) {
-    const double* w = e_.wrench + 6 * b;
+    const double* w = e_.xfrc_applied + 6 * b;
     bool any = false;
     for (int k = 0; k < 6; ++k) any = any || w[k] != 0;
     if (!any) continue;

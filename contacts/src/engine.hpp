@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "caught.hpp"
+#include "tauguard/geometry/fields.hpp"
 
 namespace tauguard::contacts {
 
@@ -61,11 +62,11 @@ struct Engine {
 
   // Fields of `data`.
   double *time, *qpos, *qvel, *energy, *mocap_pos, *mocap_quat;
-  const double *actuator, *applied, *wrench;
-  const double *xpos, *xmat, *xipos, *flexvert;
+  const double *qfrc_actuator, *qfrc_applied, *xfrc_applied;
+  const double *xpos, *xmat, *xipos, *flexvert_xpos;
   const int *ncon, *nefc;
-  char* const* contacts;
-  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_row, at_pos, at_frame;
+  char* const* contact;
+  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_efc_address, at_pos, at_frame;
   double *const *efc_aref, *const *efc_margin;
   double *const *efc_vel, *const *efc_pos, *const *efc_force;
   int *const *efc_type, *const *efc_id;
@@ -74,24 +75,44 @@ struct Engine {
 
   // Fields of `end`.
   double *end_qvel, *end_energy;
-  const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
+  const double *end_xpos, *end_xmat, *end_flexvert_xpos, *end_cvel;
 
   // Fields of `other`.
   double *other_energy, *other_mocap_pos, *other_mocap_quat;
-  const double *other_xpos, *other_xmat, *other_flexvert;
+  const double *other_xpos, *other_xmat, *other_flexvert_xpos;
 
   // Values of MuJoCo's enumerations, and refused flags.
   int discrete, runge_kutta, pyramidal, elliptic, refsafe, newton, equality, override_flag, refused;
   void* const* contact_filter;      // MuJoCo's global callback
-  std::size_t at_stack, at_frames;  // offsets of mjData's pointers into its stack
+  std::size_t at_pstack, at_pbase;  // offsets of mjData's pointers into its stack
 
-  Contact contact(int k) const {
-    const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;
+  // The names in Python's dict of addresses and numbers.
+  TAUGUARD_FIELDS(model, data, end, other, logging.set, logging.global, logging.error,
+                  logging.at_subject, step, step1, step2, kinematics, com_pos, com_vel, flex,
+                  tendon, make_m, energy_pos, get_state, set_state, copy_state, mul_m, mul_jac,
+                  jac_com, jac, solve_m, integrate, nq, nv, nbody, nmocap, ngeom, npair, nflex,
+                  nflexvert, ntendon, signature.integration, signature.pose, state_size,
+                  interpolated, timestep, disableflags, enableflags, integrator, cone, solver,
+                  iterations, o_margin, o_solref, margin[0], margin[1], margin[2], solref[0],
+                  solref[1], solref[2], solimp[0], solimp[1], solimp[2], friction[0], friction[1],
+                  friction[2], priority[1], priority[2], pair_geom1, pair_geom2, flex_vertbodyid,
+                  geom_bodyid, body_rootid, body_mocapid, body_dofnum, body_weldid, flex_vert, time,
+                  qpos, qvel, energy, mocap_pos, mocap_quat, qfrc_actuator, qfrc_applied,
+                  xfrc_applied, xpos, xmat, xipos, flexvert_xpos, ncon, nefc, contact, contact_size,
+                  at_dist, at_dim, at_geom, at_flex, at_efc_address, at_pos, at_frame, efc_aref,
+                  efc_margin, efc_vel, efc_pos, efc_force, efc_type, efc_id, resets[0], resets[1],
+                  resets[2], end_qvel, end_energy, end_xpos, end_xmat, end_flexvert_xpos, end_cvel,
+                  other_energy, other_mocap_pos, other_mocap_quat, other_xpos, other_xmat,
+                  other_flexvert_xpos, discrete, runge_kutta, pyramidal, elliptic, refsafe, newton,
+                  equality, override_flag, refused, contact_filter, at_pstack, at_pbase)
+
+  Contact contact_at(int k) const {
+    const char* p = *contact + static_cast<std::size_t>(k) * contact_size;
     const int* geom_ids = reinterpret_cast<const int*>(p + at_geom);
     const int* flex_ids = reinterpret_cast<const int*>(p + at_flex);
     return {*reinterpret_cast<const double*>(p + at_dist),
             *reinterpret_cast<const int*>(p + at_dim),
-            *reinterpret_cast<const int*>(p + at_row),
+            *reinterpret_cast<const int*>(p + at_efc_address),
             {geom_ids[0], geom_ids[1]},
             {flex_ids[0], flex_ids[1]},
             reinterpret_cast<const double*>(p + at_pos),

@@ -84,7 +84,7 @@ bool ImpactZone::add(int pair, const Partners& partners,
     return true;
   }
   for (const std::int32_t v : vertices) {
-    const double *at = e_.flexvert + 3 * v, *first = e_.flexvert + 3 * vertices[0];
+    const double *at = e_.flexvert_xpos + 3 * v, *first = e_.flexvert_xpos + 3 * vertices[0];
     if (geom >= 0)
       add_rows(3, e_.flex_vertbodyid[v], at, geom, at);
     else if (v != vertices[0])

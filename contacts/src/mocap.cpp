@@ -175,7 +175,7 @@ double Mocap::work(const double* velocity, double length) {
   if (!e_.nmocap || !*e_.nefc) return 0;
   double sum = 0;
   for (int k = 0; moves_ && k < *e_.ncon; ++k) {
-    const Contact contact = e_.contact(k);
+    const Contact contact = e_.contact_at(k);
     if (contact.row < 0) continue;
     double force = 0;
     for (int row = contact.row; row < contact.row + e_.normal_rows(contact); ++row)

@@ -44,7 +44,7 @@ class Mocap {
   // end.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
   const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
-  const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }
+  const double* flexvert() const { return jumps() ? e_.other_flexvert_xpos : e_.flexvert_xpos; }
   // Adds, for each body (nbody, 3), the rotation of the mocap body that it is attached to [rad].
   void add_turns(double* turn) const;
 
@@ -52,7 +52,7 @@ class Mocap {
   // the start and the mocap poses of the end. False if no mocap body moves, or in a whole step.
   bool shifted();
   double potential() const { return e_.other_energy[0]; }
-  const double* vertices() const { return e_.other_flexvert; }
+  const double* vertices() const { return e_.other_flexvert_xpos; }
 
   // Whether some mocap body moves and one of the partners is a geom attached to a mocap body.
   bool carries(const Partners& pair) const;

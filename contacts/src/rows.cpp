@@ -78,7 +78,7 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
 void Rows::aim(double length, double push) {
   if (!*e_.nefc) return;
   for (int k = 0; k < *e_.ncon; ++k) {
-    const Contact contact = e_.contact(k);
+    const Contact contact = e_.contact_at(k);
     bool chosen = false;
     for (int i = 0; i < 2; ++i)
       chosen = chosen || (contact.geom[i] >= 0 && geoms_[contact.geom[i]]) ||

@@ -40,19 +40,17 @@ struct Back {
 
 }  // namespace
 
-Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
-                 std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
-                 std::vector<char> pulled, const Settings& settings, double allowed)
+Stepper::Stepper(const Engine& engine, Coverage covered, const Settings& settings)
     : e_(engine),
-      pairs_(std::move(pairs)),
-      last_level_(std::move(last_level)),
+      pairs_(std::move(covered.pairs)),
+      last_level_(std::move(covered.last_level)),
       s_(settings),
-      verdict_(std::move(verdict)),
-      mocap_(e_, std::move(pulled)),
-      budget_(e_, mocap_, std::move(sheets), allowed),
+      verdict_(std::move(covered.verdict)),
+      mocap_(e_, std::move(covered.pulled)),
+      budget_(e_, mocap_, std::move(covered.sheets), settings.allowed),
       stiffening_(e_, pairs_),
       rows_(e_, pairs_, mocap_),
-      spins_(std::move(spins)),
+      spins_(std::move(covered.spins)),
       first_(engine.state_size),
       saved_(engine.state_size),
       velocity_(engine.nv),
@@ -71,8 +69,7 @@ void Stepper::number_pairs() {
     number_[key(pairs_[i].first, pairs_[i].second)] = static_cast<int>(i);
 }
 
-void Stepper::follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
-                     std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled) {
+void Stepper::follow(Coverage covered) {
   struct Before {
     std::vector<char> known;
     bool guarded, stiff;
@@ -86,9 +83,10 @@ void Stepper::follow(Verdict verdict, std::vector<Partners> pairs, std::vector<i
   stiffening_.follow();
   close();
   const int watched = watched_;
-  verdict_ = std::move(verdict), pairs_ = std::move(pairs), last_level_ = std::move(last_level);
-  budget_.set_sheets(std::move(sheets)), mocap_.set_pulled(std::move(pulled));
-  spins_ = std::move(spins), watched_ = watched;
+  verdict_ = std::move(covered.verdict), pairs_ = std::move(covered.pairs);
+  last_level_ = std::move(covered.last_level), spins_ = std::move(covered.spins);
+  budget_.set_sheets(std::move(covered.sheets)), mocap_.set_pulled(std::move(covered.pulled));
+  watched_ = watched;
   stiffening_.resize(), number_pairs();
   for (std::vector<char>* marks : {&guarded_, &passed_, &in_zone_}) marks->assign(pairs_.size(), 0);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
@@ -220,7 +218,7 @@ const double* Stepper::turns() {
 void Stepper::carry() {
   if (e_.interpolated) {
     e_.com_pos(e_.model, e_.end), e_.flex(e_.model, e_.end);
-    std::copy_n(e_.end_flexvert, x_t1_.size(), x_t1_.begin());
+    std::copy_n(e_.end_flexvert_xpos, x_t1_.size(), x_t1_.begin());
     return;
   }
   for (int i = 0; i < e_.nflexvert; ++i) {
@@ -267,7 +265,7 @@ bool Stepper::within_budget() {
 std::vector<char> Stepper::listed() const {
   std::vector<char> seen(pairs_.size(), 0);
   for (int k = 0; k < *e_.ncon; ++k) {
-    const auto found = number_.find(key(e_.contact(k)));
+    const auto found = number_.find(key(e_.contact_at(k)));
     if (found != number_.end()) seen[found->second] = 1;
   }
   return seen;

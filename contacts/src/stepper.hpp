@@ -50,7 +50,19 @@ struct Settings {
   int most;
   double beyond, room, smallest, push;
   int watched, look;
-  double deeper_geom, deeper_flex, turned;
+  double deeper_geom, deeper_flex, turned, allowed;
+  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper_geom,
+                  deeper_flex, turned, allowed)
+};
+
+// What a guard covers.
+struct Coverage {
+  Verdict verdict;
+  std::vector<Partners> pairs;
+  std::vector<int> last_level;  // of every pair
+  std::vector<Sheet> sheets;
+  std::vector<int> spins;    // rotational degrees of freedom
+  std::vector<char> pulled;  // equalities, as in mocap.hpp
 };
 
 class Stepper {
@@ -58,9 +70,7 @@ class Stepper {
   // Appends the pairs of flexes that cross in a step.
   using TunnellingEvents = std::function<void(std::vector<PairHit>*)>;
 
-  Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
-          std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
-          std::vector<char> pulled, const Settings& settings, double allowed);
+  Stepper(const Engine& engine, Coverage covered, const Settings& settings);
 
   const Report& report() const { return report_; }
   const std::vector<double>& first() const { return first_; }
@@ -74,9 +84,8 @@ class Stepper {
   void close();
   // Clears the memory of earlier steps, after the user has set the state.
   void reset();
-  // Replaces the covered pairs, as in the constructor. The memory of pairs that remain is kept.
-  void follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
-              std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled);
+  // Replaces the covered pairs. The memory of pairs that remain is kept.
+  void follow(Coverage covered);
   // Whether the guard can step the model and the data.
   bool acceptable() const;
   // Restores the state at the start of the step, after an exception.
