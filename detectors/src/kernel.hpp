@@ -27,11 +27,12 @@ inline Four load_four(const double* p) {
   return v;
 }
 
-// sum_i coef_i / (1 + |x - z_i|^2 inv)^2. The z_i are stored as (blocks, d, lanes).
-double weighted_sum(const double* x, const double* vectors, const double* coef, std::size_t blocks,
-                    std::size_t d, double inv);
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 for each row x of d numbers. The z_i are stored as
+// (blocks, d, lanes).
+void weighted_sums(const double* x, std::size_t rows, const double* vectors, const double* coef,
+                   std::size_t blocks, std::size_t d, double inv, double* out);
 
-// A weighted sum of kernels: support vectors packed for weighted_sum, padded with zero
+// A weighted sum of kernels: support vectors packed for weighted_sums, padded with zero
 // coefficients.
 class KernelSum {
  public:
@@ -53,7 +54,14 @@ class KernelSum {
 
   std::size_t dimension() const { return d_; }
   double at(const double* x) const {
-    return weighted_sum(x, vectors_.data(), coef_.data(), blocks_, d_, inv_) + intercept_;
+    double value;
+    rows(x, 1, &value);
+    return value;
+  }
+  // The values at `count` rows.
+  void rows(const double* x, std::size_t count, double* out) const {
+    weighted_sums(x, count, vectors_.data(), coef_.data(), blocks_, d_, inv_, out);
+    for (std::size_t i = 0; i < count; ++i) out[i] += intercept_;
   }
 
  private:

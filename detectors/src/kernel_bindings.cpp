@@ -16,7 +16,7 @@ void rows(const KernelSum& kernel, In2 x, Out1 out, int threads) {
           "rows: arrays differ in shape");
   nb::gil_scoped_release release;
   ThreadPool::shared().parallel_for(x.shape(0), threads, 256, [&](auto begin, auto end, auto) {
-    for (auto t = begin; t < end; ++t) out.data()[t] = kernel.at(x.data() + t * kernel.dimension());
+    kernel.rows(x.data() + begin * kernel.dimension(), end - begin, out.data() + begin);
   });
 }
 
