@@ -156,7 +156,12 @@ class EventFolder:
         known, file = facts(row), self._folder / row["file"]
         write_rrd(file, part, found, whole=True, about=f"{event.text}; {known}")
         figure = plot(part, found)
-        figure.suptitle(f"{event.text}\n{known}", parse_math=False)  # names may have dollar signs
+        figure.set_layout_engine(None)  # the constrained layout takes longer than the drawing
+        height = figure.get_figheight()
+        inside = {"bottom": 0.5 / height, "top": 1 - 0.65 / height}
+        figure.subplots_adjust(left=0.09, right=0.985, hspace=0.1, **inside)
+        title = f"{event.text}\n{known}"
+        figure.suptitle(title, y=1 - 0.1 / height, parse_math=False)  # names may have dollar signs
         with atomic_file(file.with_suffix(".png")) as stream:
             figure.savefig(stream, dpi=80, format="png")
 
