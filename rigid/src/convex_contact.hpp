@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tauguard/geometry/scratch.hpp"
 #include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
@@ -15,17 +16,18 @@ namespace tauguard::rigid {
 class ContactFeature {
  public:
   using Point2 = std::array<double, 2>;
+  using Polygon = std::vector<Point2>;
 
-  // The vertices of `body` that are extreme along sign * normal, as a convex polygon in u, v.
-  ContactFeature(const Points<double>& body, const Vec3& normal, double sign, double tolerance,
-                 const Vec3& u, const Vec3& v) {
+  // Takes the vertices of `body` that are extreme along sign * normal, as a convex polygon in u, v.
+  void find(const Points<double>& body, const Vec3& normal, double sign, double tolerance,
+            const Vec3& u, const Vec3& v) {
     double top = sign * dot(normal, body[0]);
     for (const auto& p : body) top = std::max(top, sign * dot(normal, p));
-    std::vector<Point2> points;
+    polygon.clear();
     for (const auto& p : body)
-      if (sign * dot(normal, p) >= top - tolerance) points.push_back({dot(u, p), dot(v, p)});
+      if (sign * dot(normal, p) >= top - tolerance) polygon.push_back({dot(u, p), dot(v, p)});
     level = sign * top;
-    polygon = hull(points);
+    make_convex(&polygon);
   }
 
   // The mean of the intersection's corners. If rounding leaves no intersection, the middle between
@@ -34,17 +36,21 @@ class ContactFeature {
     if (a.polygon.size() == 1) return a.polygon[0];
     if (b.polygon.size() == 1) return b.polygon[0];
     const bool a_cuts = a.polygon.size() >= b.polygon.size();
-    const auto& cutter = a_cuts ? a.polygon : b.polygon;
-    std::vector<Point2> rest = a_cuts ? b.polygon : a.polygon;
-    for (std::size_t i = 0; i < cutter.size() && !rest.empty(); ++i)
-      rest = cut(rest, cutter[i], cutter[(i + 1) % cutter.size()], tolerance);
+    const Polygon& cutter = a_cuts ? a.polygon : b.polygon;
+    geometry::Scratch<std::array<Polygon, 2>> scratch;
+    Polygon &rest = (*scratch)[0], &before = (*scratch)[1];
+    rest = a_cuts ? b.polygon : a.polygon;
+    for (std::size_t i = 0; i < cutter.size() && !rest.empty(); ++i) {
+      std::swap(rest, before);
+      cut(before, cutter[i], cutter[(i + 1) % cutter.size()], tolerance, &rest);
+    }
     if (!rest.empty()) return mean(rest);
     const Point2 x = mean(a.polygon), y = mean(b.polygon);
     return {0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1])};
   }
 
   double level = 0.0;
-  std::vector<Point2> polygon;
+  Polygon polygon;
 
  private:
   static double turn(const Point2& o, const Point2& p, const Point2& q) {
@@ -52,11 +58,15 @@ class ContactFeature {
   }
 
   // Counter-clockwise convex hull (Andrew's monotone chain).
-  static std::vector<Point2> hull(std::vector<Point2> p) {
+  static void make_convex(Polygon* points) {
+    Polygon& p = *points;
+    if (p.size() == 1) return;
     std::sort(p.begin(), p.end());
     p.erase(std::unique(p.begin(), p.end()), p.end());
-    if (p.size() < 3) return p;
-    std::vector<Point2> out;
+    if (p.size() < 3) return;
+    geometry::Scratch<Polygon> scratch;
+    Polygon& out = *scratch;
+    out.clear();
     for (int side = 0; side < 2; ++side) {
       const std::size_t start = out.size();
       for (const auto& x : p) {
@@ -67,28 +77,27 @@ class ContactFeature {
       out.pop_back();
       std::reverse(p.begin(), p.end());
     }
-    return out;
+    std::swap(p, out);
   }
 
-  // The part of the polygon that is left of the line o -> e or within `tolerance` of it.
-  static std::vector<Point2> cut(const std::vector<Point2>& p, const Point2& o, const Point2& e,
-                                 double tolerance) {
+  // Writes the part of the polygon that is left of the line o -> e or within `tolerance` of it.
+  static void cut(const Polygon& p, const Point2& o, const Point2& e, double tolerance,
+                  Polygon* out) {
     const double length = std::hypot(e[0] - o[0], e[1] - o[1]);
     const auto inside = [&](const Point2& x) { return turn(o, e, x) + tolerance * length; };
-    std::vector<Point2> out;
+    out->clear();
     for (std::size_t i = 0; i < p.size(); ++i) {
       const Point2 &x = p[i], &y = p[(i + 1) % p.size()];
       const double fx = inside(x), fy = inside(y);
-      if (fx >= 0) out.push_back(x);
+      if (fx >= 0) out->push_back(x);
       if ((fx > 0 && fy < 0) || (fx < 0 && fy > 0)) {
         const double s = fx / (fx - fy);
-        out.push_back({x[0] + s * (y[0] - x[0]), x[1] + s * (y[1] - x[1])});
+        out->push_back({x[0] + s * (y[0] - x[0]), x[1] + s * (y[1] - x[1])});
       }
     }
-    return out;
   }
 
-  static Point2 mean(const std::vector<Point2>& p) {
+  static Point2 mean(const Polygon& p) {
     Point2 sum{};
     for (const auto& x : p) sum = {sum[0] + x[0], sum[1] + x[1]};
     const auto n = static_cast<double>(p.size());
@@ -105,7 +114,9 @@ inline Vec3 contact_point(const Points<double>& a, const Points<double>& b, cons
   const double length = norm(u);
   for (double& x : u) x /= length;
   const Vec3 v = cross(normal, u);
-  const ContactFeature fa(a, normal, 1.0, tolerance, u, v), fb(b, normal, -1.0, tolerance, u, v);
+  geometry::Scratch<std::array<ContactFeature, 2>> scratch;
+  ContactFeature &fa = (*scratch)[0], &fb = (*scratch)[1];
+  fa.find(a, normal, 1.0, tolerance, u, v), fb.find(b, normal, -1.0, tolerance, u, v);
   const auto at = ContactFeature::meet(fa, fb, tolerance);
   return at[0] * u + at[1] * v + 0.5 * (fa.level + fb.level) * normal;
 }

@@ -27,7 +27,8 @@ struct Corner {
 template <class Source>
 class Simplex {
  public:
-  explicit Simplex(const Corner<Source>& first) : c_{first}, m_(1), nearest_(first.w) {}
+  explicit Simplex(const Corner<Source>& first)
+      : c_{first, first, first, first}, m_(1), nearest_(first.w) {}
 
   int size() const { return m_; }
   const Corner<Source>& corner(int i) const { return c_[i]; }
@@ -41,8 +42,8 @@ class Simplex {
   TAUGUARD_INLINE bool add(const Corner<Source>& next) {
     c_[m_] = next;
     // Bit i of a number of a face: the face has the old corner i.
-    double square[8] = {};
-    Faces edges{}, triangles{};
+    double square[8];
+    Faces edges, triangles;
     square[0] = dot(next.w, next.w);
     weigh(&edges, &triangles);
     square[1] = edges.square[0], square[2] = edges.square[1], square[4] = edges.square[2];
@@ -50,7 +51,7 @@ class Simplex {
     square[6] = triangles.square[2];
     double l[4] = {1, 0, 0, 0};
     Vec3 p = next.w;
-    if (m_ == 3) square[7] = inside(l, &p);
+    square[7] = m_ == 3 ? inside(l, &p) : INFINITY;
     double best = dot(nearest_, nearest_);
     int kept = -1;
     for (int face = 0; face < 1 << m_; ++face)
@@ -93,7 +94,6 @@ class Simplex {
     const Vec3x4 e = Vec3x4{splat(n.x), splat(n.y), splat(n.z)} - w;
     const Double4 ee = dot(e, e), x = -dot(e, w), l = x / ee;
     edges->set(w + l * e, l, Double4{}, ee > 0);
-    if (m_ == 1) return;
     const Vec3x4 v = first(w), a = {second(w.x) - v.x, second(w.y) - v.y, second(w.z) - v.z};
     const Vec3x4 b = first(e);
     const Double4 aa = dot(a, a), ab = dot(a, b), bb = first(ee), xa = -dot(a, v), xb = first(x);

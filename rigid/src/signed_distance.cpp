@@ -27,23 +27,21 @@ constexpr double near = 1e-10;
 bool in_range(double size) { return size > 1e-40 && size < 1e40; }
 
 // Vertices relative to `origin`. Each subtraction is rounded once: a relative error of u.
-Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec3& origin) {
+void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Points<double>* out) {
   const double* p = bodies.row(row);
+  out->resize(bodies.vertex_count(row));
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
     const Zonotope z = zonotope_of(bodies.kind, p);
-    Points<double> out(8);
     for (int corner = 0; corner < 8; ++corner)
       for (int k = 0; k < 3; ++k) {
         double x = (z.origin[k] - origin[k]) + z.shift[k];
         for (int axis = 0; axis < 3; ++axis)
           x += (corner >> axis & 1) ? z.g[axis][k] : -z.g[axis][k];
-        out[corner][k] = x;
+        (*out)[corner][k] = x;
       }
-    return out;
+    return;
   }
-  Points<double> out = vertices_of<double>(bodies, row);
-  for (auto& v : out) v = v - origin;
-  return out;
+  for (std::size_t i = 0; i < out->size(); ++i) (*out)[i] = geometry::load(p + 3 * i) - origin;
 }
 
 double size_of(const Points<double>& a, const Points<double>& b) {
@@ -53,6 +51,18 @@ double size_of(const Points<double>& a, const Points<double>& b) {
       for (const double x : p) size = std::max(size, std::isfinite(x) ? std::fabs(x) : HUGE_VAL);
   return size;
 }
+
+// The vertices of a pair relative to a point of its first body, and their size.
+struct LocalPair {
+  Points<double> a, b;
+  Vec3 origin;
+  double size;
+  void set(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
+    origin = geometry::load(bodies_a.row(row));
+    local_points(bodies_a, row, origin, &a), local_points(bodies_b, row, origin, &b);
+    size = size_of(a, b);
+  }
+};
 
 double top(const Points<double>& points, const Vec3& n) {
   double m = -INFINITY;
@@ -70,9 +80,10 @@ SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
 // The result for overlapping bodies, which touch after b is moved by `depth` along n.
 SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
                         double depth, double size) {
-  Points<double> moved = b;
-  for (auto& p : moved) p = p + depth * n;
-  const Vec3 point = contact_point(a, moved, n, 1e-11 * size);
+  geometry::Scratch<Points<double>> moved;
+  moved->clear();
+  for (const Vec3& p : b) moved->push_back(p + depth * n);
+  const Vec3 point = contact_point(a, *moved, n, 1e-11 * size);
   return {-depth, point, point - depth * n, n};
 }
 
@@ -238,10 +249,10 @@ SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sig
 
 SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                                double radius_a, double radius_b) {
-  const double* p = bodies_a.row(row);
-  const Vec3 origin = {p[0], p[1], p[2]};
-  const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
-  const double size = size_of(a, b), radii = radius_a + radius_b;
+  geometry::Scratch<LocalPair> pair;
+  pair->set(bodies_a, bodies_b, row);
+  const Points<double>&a = pair->a, &b = pair->b;
+  const double size = pair->size, radii = radius_a + radius_b;
   SignedDistance g;
   bool known = false;
   int sign = 0;
@@ -260,16 +271,16 @@ SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, s
     sign = exact.sign, known = true;
   }
   g = grown(g, radius_a, radius_b, sign, known);
-  g.point_a = g.point_a + origin, g.point_b = g.point_b + origin;
+  g.point_a = g.point_a + pair->origin, g.point_b = g.point_b + pair->origin;
   return g;
 }
 
 bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
           double radius_b) {
-  const double* p = bodies_a.row(row);
-  const Vec3 origin = {p[0], p[1], p[2]};
-  const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
-  const double size = size_of(a, b), radii = radius_a + radius_b;
+  geometry::Scratch<LocalPair> pair;
+  pair->set(bodies_a, bodies_b, row);
+  const Points<double>&a = pair->a, &b = pair->b;
+  const double size = pair->size, radii = radius_a + radius_b;
   if (in_range(size)) {
     const Nearest ends = nearest(a, b);
     const Vec3 way = ends.b - ends.a;
