@@ -106,40 +106,38 @@ void Projection::scale_to(const Ends& x, std::size_t n, VolumeKind kind, double 
 }
 
 void Projection::set(const Ends& x, std::size_t n, bool in_short, int threads) {
-  const int axes = kind_.axes(), slots = kind_.slots();
-  const auto* axis = axes_of(kind_.k);
+  const int slots = kind_.slots();
+  const auto* axes = axes_of(kind_.k);
+  double axis[3][most_slots] = {};  // divided by 2^(m - 1)
+  for (int a = 0; a < kind_.axes(); ++a) {
+    const int terms = std::abs(axes[a][0]) + std::abs(axes[a][1]) + std::abs(axes[a][2]);
+    for (int k = 0; k < 3; ++k) axis[k][a] = axes[a][k] / double(1 << (terms - 1));
+  }
   if (std::exchange(in_short_, in_short) != in_short) {  // frees the other values
     values_ = {};
     shorts_ = {};
   }
   values_.resize(in_short ? 0 : 2 * slots * n);
   shorts_.resize(in_short ? 4 * slots * n : 0);
-  const double first = first_, second = second_;
   ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) {
-      float own[2 * most_slots];
-      float* out = in_short ? own : values_.data() + 2 * slots * i;
-      for (const bool end : {false, true}) {
-        const double* p = x.at(end, static_cast<std::int32_t>(i));
-        double z[3];
-        for (int k = 0; k < 3; ++k) z[k] = (p[k] * first - centre_[k]) * second;
-        for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(z[a]);
-        for (int a = 3; a < axes; ++a) {
-          const auto& s = axis[a];
-          const double sum = s[0] * z[0] + s[1] * z[1] + s[2] * z[2];
-          *out++ = static_cast<float>(sum * (s[0] != 0 && s[1] != 0 && s[2] != 0 ? 0.25 : 0.5));
+    const double first = first_, second = second_, *centre = centre_;
+    for (auto i = begin; i < end; ++i)
+      for (int r = 0; r < 2 * slots; r += 4) {
+        const double* p = x.at(r >= slots, static_cast<std::int32_t>(i));
+        geometry::Double4 sum{};
+        for (int k = 0; k < 3; ++k)
+          sum += (p[k] * first - centre[k]) * second * geometry::load4(axis[k] + r % slots);
+        const auto at = __builtin_convertvector(sum, geometry::Float4);
+        if (!in_short) {
+          std::memcpy(values_.data() + 2 * slots * i + r, &at, sizeof at);
+          continue;
         }
-        for (int a = axes; a < slots; ++a) *out++ = 0;
-      }
-      std::int16_t *low = shorts_.data() + 4 * slots * i, *high = low + 2 * slots;
-      for (int r = 0; in_short && r < 2 * slots; r += 4) {
-        geometry::Float4 at, pad;
-        std::memcpy(&at, own + r, sizeof at);
+        geometry::Float4 pad;
         std::memcpy(&pad, pad_ + r % slots, sizeof pad);
-        convert(at - pad, low + r);
-        convert(at + pad, high + r);
+        std::int16_t* low = shorts_.data() + 4 * slots * i + r;
+        convert(at - pad, low);
+        convert(at + pad, low + 2 * slots);
       }
-    }
   });
 }
 
