@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.contacts.checker import Checker, Contacts, State, asked, checker
+from tauguard.contacts.checker import Checker, Contacts, State, checker, reported
 from tauguard.traces import CheckedContacts
 
 
@@ -32,7 +32,7 @@ def check_states(
     for state in states:
         if before is not None and state is not None:
             for k, own in enumerate(made):
-                contacts = asked(own, before, state)
+                contacts = reported(own, before, state)
                 times[k].append(before.time + contacts.time * (state.time - before.time))
                 found[k].append(contacts)
         before = state

@@ -229,7 +229,7 @@ Factory = Callable[..., Checker]
 _FACTORIES: dict[str, Factory] = {}
 
 
-def asked(one: Checker, before: State, after: State) -> Contacts:
+def reported(one: Checker, before: State, after: State) -> Contacts:
     """The contacts that the checker ``one`` reports for the step.
 
     Raises:

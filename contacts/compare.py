@@ -12,10 +12,10 @@ from tauguard.contacts.checker import (
     Checker,
     Contacts,
     State,
-    asked,
     checker,
     geom_kinds,
     pair_kind,
+    reported,
 )
 from tauguard.contacts.ground_truth import GroundTruth
 from tauguard.contacts.mujoco_checker import MujocoChecker
@@ -143,7 +143,7 @@ def _simulate(
         run.step_seconds.append(stepped - clock)
         for name, one in checkers.items():
             clock = time.process_time()
-            found = asked(one, before, after)
+            found = reported(one, before, after)
             run.seconds[name].append(time.process_time() - clock)
             run.contacts[name].append(_fitting(name, model, found))
         if truth is not None:

@@ -48,7 +48,7 @@ class Score:
         recalled: Number of events reported during the event or within a step of it.
         reports: Number of reports; a report is a step and a pair that touches in it.
         correct: Number of reports that are true, or no deeper than the tolerance.
-        steps: Number of touches: in one step, one pair gets deeper than the tolerance.
+        steps: Number of touches: a step and a pair that gets deeper than the tolerance in it.
         steps_found: Number of these touches that were reported in the same step.
         delay_ms: Median time from the onset of an event to its first report [ms].
         first: Time of the first report of any pair [s].

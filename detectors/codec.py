@@ -65,7 +65,7 @@ def decode(
         given = content.get(_FIELDS, {})
         if set(given) != expected:
             different = ", ".join(sorted(set(given) ^ expected))
-            raise ValueError(f"{kind.__name__} with a part missing or added: {different}")
+            raise ValueError(f"{kind.__name__} with missing or additional fields: {different}")
         return kind(**{name: decode(own, known, depth + 1) for name, own in given.items()})
     if isinstance(content, np.ndarray):
         if content.dtype.kind not in "fiub" or not (np.abs(content) <= LARGEST).all():

@@ -126,8 +126,8 @@ def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
 def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     """Write ``value``, encoded by :func:`tauguard.detectors.codec.encode`.
 
-    After an error, ``path`` is unchanged. The file is signed if the user has a key (see
-    :mod:`tauguard.detectors.model_file`).
+    After an error, ``path`` is unchanged. The file is signed if the user has a key, see
+    :func:`key_of_user`.
 
     Raises:
         ValueError: the value cannot be encoded, or the folder cannot be written.

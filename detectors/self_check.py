@@ -55,7 +55,7 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 def check_alarms(alarm: CollisionAlarm) -> None:
     """Refuse a detector that alarms at no impact, or all the time while the arm is at rest.
 
-    A learned score and the plain thresholds of its detector are checked separately.
+        A learned score and the thresholds on the residual are checked separately.
 
     Raises:
         ValueError: says which of the two, or that a score is not a number.
@@ -70,7 +70,7 @@ def check_alarms(alarm: CollisionAlarm) -> None:
         raise ValueError(f"it raises no alarm at any impact up to {IMPACTS[-1]:g} N m")
     standing = up[(trace.t > alarm.settle + PAUSE / 2) & (np.arange(len(up)) < first)]
     if len(standing) and standing.all() and up[first:].all():
-        raise ValueError("it calls an arm that stands still in collision, all the time")
+        raise ValueError("it raises an alarm all the time while the arm stands still")
 
 
 def standing_then_hit(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:

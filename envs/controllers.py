@@ -9,8 +9,7 @@ from tauguard.models import Friction
 
 __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "friction_torque"]
 
-#: Scale of the speed over which the Coulomb friction changes its sign [rad/s]; as of the native
-#: servo.
+#: Speed over which the Coulomb friction changes its sign [rad/s], as in the native servo.
 SMOOTHING = 0.02
 #: A direction is nearly singular if its mobility (an eigenvalue of J M^-1 J^T) is below this
 #: fraction of the largest one. The tool's force is reduced in such directions only, so that torques
@@ -115,9 +114,9 @@ class ComputedTorque:
 class OperationalSpace:
     """tau = J^T L (K e + D (v_des - v) + I sum e) + h + N^T (Kn (q_rest - q) - Dn qd).
 
-    L = (J M^-1 J^T)^-1. The tool's error e decays as if every direction had the same unit mass
-    (Khatib 1987). In the null space, which does not move the tool, the arm is held near a rest
-    pose. The integral overcomes static friction.
+    L = (J M^-1 J^T)^-1, and h is the torque of gravity and velocity. The tool's error e decays as
+    if every direction had the same unit mass (Khatib 1987). In the null space (N^T), which does not
+    move the tool, the arm is held near a rest pose. The integral overcomes static friction.
     """
 
     def __init__(

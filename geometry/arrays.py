@@ -37,7 +37,7 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
 
 def all_finite(name: str, array: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ``array``, or raise the error of :func:`finite` if an entry is not finite."""
-    known = np.isfinite(array)  # once: another thread may write the array meanwhile
+    known = np.isfinite(array)  # only once: another thread may change the array meanwhile
     if not known.all():
         bad = np.argwhere(~known)[0]
         where = f"row {bad[0]}" if array.ndim > 1 else f"index {bad[0]}"

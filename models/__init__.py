@@ -6,7 +6,7 @@ from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.drive_text import drive_of, drive_text
-from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
+from tauguard.models.impact import impact_velocity, reflected_mass, standard_mass
 from tauguard.models.known_robots import ROBOTS
 from tauguard.models.left_over import LeftOver
 from tauguard.models.link_surface import LinkSurface, arm_surface, link_surface
@@ -23,7 +23,7 @@ __all__ = [
     "BODY_REGIONS", "ROBOTS", "STATURES", "Arm", "BodyProxy", "BodyRegion", "Clamp", "Cloth",
     "Drive", "Facts", "Friction", "LeftOver", "LinkSurface", "Mismatch", "Person", "Ripple",
     "Robot", "RobotDrive", "Scene", "SceneObject", "SceneSpec", "Sensors", "Shape", "Striker",
-    "Table", "arm_surface", "blow_velocity", "body_region", "compiled", "compose", "cura6",
-    "cura6_drive", "drive_of", "drive_text", "link_surface", "load_arm", "load_objects",
+    "Table", "arm_surface", "body_region", "compiled", "compose", "cura6", "cura6_drive",
+    "drive_of", "drive_text", "impact_velocity", "link_surface", "load_arm", "load_objects",
     "pin_model", "reflected_mass", "set_payload", "standard_mass", "without_losses",
 ]  # fmt: skip

@@ -226,7 +226,7 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
     """The arm, with derived values for all numbers that the file does not state."""
     spec, joints, n = file.spec, file.joints, len(file.joints)
     model = file.model
-    said = _Said(robot, sources, n)
+    said = _SourceNotes(robot, sources, n)
     limit = said.row("torque_limit", file.torque_limit, "the file's limits")
     if not np.isfinite(limit).all():
         limit = derive.torque_limit(model, joints, limit)
@@ -275,7 +275,7 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
     return Arm(spec, file.links, facts)
 
 
-class _Said:
+class _SourceNotes:
     """Reads the user's description and records the source of each number."""
 
     def __init__(self, robot: Robot, sources: dict[str, str], joints: int) -> None:
@@ -297,7 +297,7 @@ class _Said:
         if file.mended:
             names = ", ".join(file.mended[:4]) + (", ..." if len(file.mended) > 4 else "")
             self.sources["inertia"] = (
-                f"no body can have the file's of {names}: made the nearest possible"
+                f"the file's is impossible for {names}: replaced by the nearest possible one"
             )
         if file.replaced:
             self.sources["shapes"] = "; ".join(
@@ -314,7 +314,7 @@ def _rotor(
     joints: tuple[str, ...],
     limit: Array,
     drive: Drive,
-    said: _Said,
+    said: _SourceNotes,
 ) -> Array:
     own = stated.row("rotor_inertia", said.joints)
     if own is not None:
@@ -332,7 +332,7 @@ def _rotor(
 
 
 def _home(
-    said: _Said, file: ArmFile, model: mujoco.MjModel, joints: tuple[str, ...], tip: int
+    said: _SourceNotes, file: ArmFile, model: mujoco.MjModel, joints: tuple[str, ...], tip: int
 ) -> Array:
     low, high = derive.ranges(model, joints)
     if said.robot.home is not None:
@@ -351,7 +351,7 @@ def _home(
     return derive.home_pose(model, joints, tip)
 
 
-def _tool(robot: Robot, spec: mujoco.MjSpec, file: ArmFile, said: _Said) -> str | None:
+def _tool(robot: Robot, spec: mujoco.MjSpec, file: ArmFile, said: _SourceNotes) -> str | None:
     sites = [site.name for site in spec.sites if site.name]
     if robot.tool is not None:
         if robot.tool in sites:

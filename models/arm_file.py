@@ -18,10 +18,12 @@ ARM_BITS, OBSTACLE_BITS = 1, 2
 #: Largest radius [m] of the capsule that a link without any shape gets, and that radius as a
 #: fraction of the arm's length.
 STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
-#: Colour of that capsule; group of collision shapes if the file has visual shapes, too.
-STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
-#: Branches at the end of a chain are a gripper if the chain has at least the first number of joints
-#: and each branch at most the second, but no more than the chain.
+#: Colour of that capsule.
+STICK_COLOUR = (0.85, 0.6, 0.25, 1.0)
+#: Group of collision shapes if the file has visual shapes, too.
+HIDDEN = 3
+#: Branches at the end of a chain are a gripper if the chain has GRIPPER_FROM joints or more, and
+#: each branch at most GRIPPER_JOINTS and no more than the chain.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
 #: After a chain of GRIPPER_FROM joints or more, a joint whose name matches is a gripper, with all
 #: joints below it.
@@ -89,10 +91,10 @@ def read_arm(
     for element in (*spec.actuators, *spec.sensors, *spec.keys):
         spec.delete(element)
     inline_meshes(spec, model)
-    _weigh(spec, model)
+    _state_inertia(spec, model)
     gripper: tuple[str, ...] = ()
     if wanted is not None:
-        kept = _known(spec, wanted, names)
+        kept = _requested_joints(spec, wanted, names)
         _weld(spec, [name for name in names if name not in kept])
     else:
         gripper = _find_gripper(spec)
@@ -119,7 +121,7 @@ def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
             body.add_site(name=body.name)
 
 
-def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> set[str]:
+def _requested_joints(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> set[str]:
     """The requested joints, given by name or as a range ``FIRST..LAST``."""
     kept = set()
     for entry in wanted:
@@ -165,7 +167,7 @@ def _joints_below(body: mujoco.MjsBody) -> Iterator[mujoco.MjsJoint]:
 
 
 def _find_gripper(spec: mujoco.MjSpec) -> tuple[str, ...]:
-    """Joints of small branches at the chain's end, or from the first with a gripper's name on."""
+    """Joints of small branches at the chain's end, or all from the first one named as a gripper."""
     chain: list[str] = []
     level = list(spec.worldbody.bodies)
     while level:
@@ -208,7 +210,7 @@ def _is_motor(model: mujoco.MjModel, i: int) -> bool:
     return bool(plain and model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_NONE)
 
 
-def _weigh(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+def _state_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     """State every body's inertia explicitly, so that it does not depend on geoms."""
     for body in spec.bodies:
         if body.name == "world" or body.explicitinertial:

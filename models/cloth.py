@@ -31,7 +31,7 @@ class Cloth:
     radius: float = 1e-3  #: half the thickness in contacts [m]
     position: Vector = (0.7, 0.0, 0.8)  #: position of the centre [m]
     quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
-    """Orientation; by default the cloth is vertical and normal to the world's x axis, its y up."""
+    """Orientation; by default the sheet is vertical, its normal along the world's x, its y up."""
     pinned: str = "edge"  #: one of :data:`PINS`
     damping: float = 0.01  #: damping of the edges [1/s]; not used for an elastic sheet
     young: float | None = None

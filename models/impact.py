@@ -37,7 +37,7 @@ def reflected_mass(
     return 1.0 / mobility
 
 
-def blow_velocity(
+def impact_velocity(
     scene: Scene,
     q: ArrayLike,
     body: int,

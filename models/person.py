@@ -115,7 +115,7 @@ class Person:
 
     @property
     def seated(self) -> bool:
-        """Whether they sit."""
+        """Whether the person sits."""
         return self.posture == "seated"
 
     def length(self, name: str) -> float:

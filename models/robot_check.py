@@ -119,7 +119,7 @@ class Trial:
                     if status := process.stdout.readline().strip():
                         return self._failure(int(status))
                 self._end()
-        return "the process that compiles it first ends"
+        return "the process that tries to compile it ends unexpectedly"
 
     def _failure(self, status: int) -> str | None:
         if status == 0:

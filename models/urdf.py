@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.models.robot_check import checked_text
 
-#: Largest file [bytes]; above this number of triangles a mesh collides as its convex hull.
-MOST_BYTES, MOST_FACES = 1 << 27, 50_000
+MOST_BYTES = 1 << 27  # largest size of a mesh file
+MOST_FACES = 50_000  # number of triangles above which a mesh collides as its convex hull
 #: A visual mesh is simplified on the finest of these grids (cells along its longest side) that
 #: leaves at most this many triangles.
 SHOWN_CELLS, SHOWN_FACES = (64, 45, 32, 24), 5000

@@ -72,7 +72,7 @@ class Covered:
             number = self._explicit.get((own[0][1], own[1][1]))
             carrier = own[0] if number is None else ("pair", number)
             rows.append(_row(own, carrier, len(LEVELS) - 1))
-        self._tell(rows)
+        self._add_rows(rows)
 
     def _add_flexes(self, wanted: bool) -> None:
         model, pairs, rows = self._model, geom_flex_pairs(self._model), []
@@ -92,7 +92,7 @@ class Covered:
             self._guard.flex_pair(levels, np.array(radii), simplices, hangs)
             self.pairs.append(own)
             rows.append(_row(own, own[0], len(LEVELS)))
-        self._tell(rows)
+        self._add_rows(rows)
 
     def _add_sheets(self, wanted: bool) -> list[tuple[int, int]]:
         model, pairs, rows = self._model, flex_pairs(self._model), []
@@ -105,10 +105,10 @@ class Covered:
             self.pairs.append(own)
             chosen.append((a, b))
             rows.append(_row(own, own[0], len(LEVELS)))
-        self._tell(rows)
+        self._add_rows(rows)
         return chosen
 
-    def _tell(self, rows: list[NDArray[np.int32]]) -> None:
+    def _add_rows(self, rows: list[NDArray[np.int32]]) -> None:
         if rows:
             self._guard.partners(np.array(rows, dtype=np.int32))
 

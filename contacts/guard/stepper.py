@@ -37,7 +37,7 @@ SETTINGS = {
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
     "look": 16,  # largest number of steps between two tests whether held pairs have separated
     "allowed": 0.01,  # energy that contacts may add, as a fraction of the initial kinetic energy
-    "deeper_geom": 1 / 8,  # in longer sub-steps (fraction of the step) no held pair may get deeper
+    "deeper_geom": 1 / 8,  # longest sub-step in which a held pair may get deeper [step]
     "deeper_flex": 1 / 2,  # the same for pairs with a flex
     "turned": 1.0,  # rotation in a step above which full turns are counted [rad]
 }
@@ -104,7 +104,7 @@ class GuardedStepper:
             (found[name], np.array(getattr(model.opt, name)).nbytes) for name in PHYSICS
         ]
         self._guard = Guard(found, settings, held)
-        self._quiet: dict[int, StepReport] = {}  # by the number of contacts
+        self._plain_reports: dict[int, StepReport] = {}  # of steps without rollback, by contacts
         self._built = structure(model)
         self._cover()
 
@@ -218,9 +218,9 @@ class GuardedStepper:
         contacts = self._guard.step(self, each)
         if contacts < 0:
             return self._report()
-        if contacts not in self._quiet:
-            self._quiet[contacts] = StepReport(1, contacts)
-        return self._quiet[contacts]
+        if contacts not in self._plain_reports:
+            self._plain_reports[contacts] = StepReport(1, contacts)
+        return self._plain_reports[contacts]
 
     def reset(self) -> None:
         """Start again at the present state, with mocap bodies at their present poses.

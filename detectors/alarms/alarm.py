@@ -31,7 +31,7 @@ from tauguard.detectors.thresholds.free_scores import (
 from tauguard.traces.trace import Detection, Trace
 
 #: Message when an extreme sample has made the detector's state infinite or NaN.
-LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"
+LOST = "the score is not a number, because a sample was beyond any arm's range; leave it out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class CollisionAlarm(Frozen):
     normalisation: SpeedNormalisation | None = None  #: None: the score is not normalised
     inputs: UsualInput | None = None  #: limits of usual samples; None: unknown, no fault checks
     floor: SpeedNormalisation | None = None
-    """Normalisation of the score of ``detector.floor``, the plain thresholds that a learned
-    detector has as well. The larger of the two normalised scores is used. None: only the learned
-    score is used."""
+    """Normalisation of the score of ``detector.floor``: thresholds on the residual, used in
+    addition to a learned score. The larger of the two normalised scores is used. None: only the
+    learned score is used."""
 
     def __post_init__(self) -> None:
         """Check the fields: ``ValueError``."""
@@ -67,7 +67,7 @@ class CollisionAlarm(Frozen):
 
     @property
     def samples(self) -> int:
-        """Successive samples above the threshold that make an alarm."""
+        """Number of successive samples above the threshold that raises an alarm."""
         return confirmation_samples(self.confirmation, self.detector.dt)
 
     def normalised(self, score: Array, trace: Trace) -> Array:
@@ -147,7 +147,7 @@ class CollisionAlarm(Frozen):
 
 
 def floor_of(alarm: CollisionAlarm) -> FittedThresholds | None:
-    """The plain thresholds that a learned detector has as well; None if it has none."""
+    """The thresholds on the residual that a learned detector uses in addition; None: none."""
     plain = getattr(alarm.detector, "floor", None)  # any type in a user's own detector
     return plain if isinstance(plain, FittedThresholds) else None
 
@@ -223,7 +223,7 @@ def _levels(speed: SpeedNormalisation | None) -> _observer.Levels:
 
 
 def native_scores(detector: FittedDetector) -> _observer.Scores:
-    """A new native stream of the detector; it wraps the detector's stream if that is in Python."""
+    """A native stream of the detector's scores. A stream written in Python is wrapped."""
     stream = detector.stream()
     if isinstance(stream, NativeStream):
         return stream.native

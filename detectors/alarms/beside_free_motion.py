@@ -1,4 +1,4 @@
-"""A free-motion detector and a learned alarm of one arm: an alarm of either is an alarm."""
+"""A free-motion detector and a learned alarm of one arm: either of them raises the alarm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class BesideFreeMotion(Frozen):
     """The larger of the free-motion score and the learned score divided by its threshold.
 
     The threshold is 1. The learned score counts only while the learned alarm is on. So every
-    collision that free motion finds is found, and the false alarms of both occur.
+    collision that the free-motion detector finds is found, and the false alarms of both occur.
     """
 
     free: FittedFreeMotion
@@ -50,7 +50,7 @@ class BesideFreeMotion(Frozen):
 
     @property
     def settle(self) -> float:
-        """Settling time of free motion [s]; the learned alarm waits for its own."""
+        """Settling time of the free-motion detector [s]."""
         return self.free.settle
 
     def carrying(self, load: Load) -> BesideFreeMotion:
@@ -74,7 +74,7 @@ class BesideFreeMotion(Frozen):
 
 
 class BothStreams:
-    """Free motion and the learned alarm, sample by sample."""
+    """The free-motion detector and the learned alarm, sample by sample."""
 
     def __init__(self, detector: BesideFreeMotion) -> None:
         """Start before the first sample."""

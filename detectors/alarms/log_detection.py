@@ -36,9 +36,9 @@ class LogDetection:
     faults: tuple[Span, ...] = ()  #: faults of the samples; no alarm starts during a fault
     fault_seconds: float = 0.0  #: duration of the faults [s]; collisions may be missed in them
     unwatched_seconds: float = 0.0
+    """Time outside of faults in which the detector does not judge all joints [s]."""
 
     __repr__ = in_a_line
-    """Time outside of faults in which the detector does not judge all joints [s]."""
 
 
 def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False) -> LogDetection:
@@ -47,7 +47,7 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     Args:
         alarm: trained.
         trace: of the detector's arm.
-        load_known: the alarm is that of the carried load; no note asks for it.
+        load_known: the detector accounts for the carried load, so no note asks for the load.
 
     Raises:
         ValueError: number of joints or sample rate differs from the training's, the log ends
@@ -158,7 +158,7 @@ def _near(detection: Detection) -> Bools:
     return near
 
 
-def loudest_joint(found: LogDetection, start: float, end: float) -> int:
+def most_changed_joint(found: LogDetection, start: float, end: float) -> int:
     """Index of the joint whose residual changes most in an alarm, relative to its noise."""
     detection = found.detection
     rows = (detection.t >= start - BEFORE) & (detection.t <= end)

@@ -171,7 +171,7 @@ class Spans:
             self._open.clear()
         self._last = t if np.isfinite(t) else self._last
         if answer.state == FAULT:
-            self._take_back(t)
+            self._discard_collision_before(t)
         self.mark(COLLISION, answer.alarm, t, "")
         if answer.alarm and (span := self._open.get(COLLISION)) is not None:
             span.score = max(span.score, answer.score)
@@ -199,7 +199,7 @@ class Spans:
         elif span is not None:
             del self._open[state]
 
-    def _take_back(self, t: float) -> None:
+    def _discard_collision_before(self, t: float) -> None:
         """Forget a collision that began just before a fault."""
         span = self._open.get(COLLISION)
         if span is not None and not t - span.start > SPAN:

@@ -42,10 +42,10 @@ HELD_OUT = 0.34
 #: Number of folds of the cross-validation.
 FOLDS = 3
 
-#: Accepted probability that a new log's highest score exceeds the least threshold that is used
-#: beside free motion. A new log has the highest score of N + 1 logs with probability 1 / (N + 1). A
-#: score k times the highest of N logs is assumed to be k times less probable (k was up to 3.1 on
-#: real arms). So the least threshold is 1 / (UNLIKE (N + 1)) times the highest score of N logs.
+#: A learned score beside free motion has at least the threshold 1 / (UNLIKE (N + 1)) times the
+#: highest score of N logs. So UNLIKE is the accepted probability that a new log exceeds it: a new
+#: log has the highest score of N + 1 logs with probability 1 / (N + 1), and a score k times the
+#: highest of N logs is assumed to be k times less probable (k was up to 3.1 on real arms).
 UNLIKE = 0.05
 
 
@@ -55,8 +55,8 @@ def held_out(
     """Traces to train on, and collision-free ones for the threshold.
 
     Returns:
-        The two lists; with fewer than two collision-free traces each holds all traces, and the
-        threshold then comes from motion that the detector was trained on.
+        The two lists. With fewer than two collision-free traces each list has all traces. Then the
+        threshold comes from motion that the detector was trained on.
     """
     free = [i for i, t in enumerate(traces) if not _collisions(t)]
     count = min(len(free) - 1, max(1, round(fraction * len(free)))) if len(free) > 1 else 0
@@ -135,11 +135,11 @@ def train_beside(
     arm: ArmModel,
     per_hour: float,
 ) -> tuple[CollisionAlarm, list[FreeScores], tuple[str, ...]]:
-    """A learned alarm to run beside free motion, which already has plain thresholds.
+    """Train a learned alarm that runs together with a free-motion detector.
 
-    The threshold comes from the logs alone, as simulated noise differs. Each log, or each half of a
-    single one, is scored by a detector and an arm model that were made without it. With few logs
-    the tail of the scores is hardly known, so the threshold exceeds all these scores, by a larger
+    The threshold comes from the logs alone, because simulated noise differs. Each log, or each half
+    of a single one, is scored by a detector and an arm model that were made without it. Few logs
+    hardly show the tail of the scores. So the threshold exceeds all these scores, by a larger
     factor for fewer logs (:data:`UNLIKE`).
 
     Args:

@@ -24,10 +24,10 @@ from tauguard.detectors.estimation.observer import intervals, lagged, low_pass
 from tauguard.detectors.events import find_alarms
 from tauguard.traces.trace import Trace
 
-#: If more than the first fraction of a joint's torque is unexplained, a log is refused; more than
-#: the second gives a note. Correct logs have 5 % on a UR10e, 17 % on a UR5, and 23 to 31 % at a
-#: wrist joint of a UR3 whose friction warms up. Two exchanged joints or currents give 14 to 25 %
-#: on the UR10e, so no single limit separates the two cases.
+#: A log is refused if more than the fraction UNEXPLAINED of a joint's torque is unexplained, and
+#: gets a note if it is more than DOUBTFUL. Correct logs have 5 % on a UR10e, 17 % on a UR5, and 23
+#: to 31 % at a wrist joint of a UR3 whose friction warms up. Two exchanged joints or currents give
+#: 14 to 25 % on the UR10e, so no single limit separates the two cases.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
 #: ``UNEXPLAINED`` for logs with a load, whose centre may be unknown. A warm UR5 with a known load
 #: has 36 %; exchanged joints give 46 to 130 % on three arms.
@@ -35,23 +35,23 @@ UNEXPLAINED_LADEN = 0.5
 #: Least denominator of these fractions, relative to the largest torque of the arm. A joint with a
 #: vertical axis needs little torque, but the error of its torque sensor is not smaller.
 FAINT = 0.05
-#: If the residual of a held-out log is the first multiple of the median of all others, the arm may
-#: have carried a load. If much torque is unexplained as well, the second multiple is enough. On a
-#: UR10e the multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of
-#: eight, 1.2 without a load, and 4.5 if only single joints move in all other logs.
+#: The arm may have carried a load if the residual of a held-out log is OUTLYING times the median of
+#: all others, or OUTLYING_IN_DOUBT times if much torque is unexplained as well. On a UR10e the
+#: ratio is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of eight, 1.2
+#: without a load, and 4.5 if only single joints move in all other logs.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
 #: A given load is refused if the load that the torques show differs by more than this [kg] and by
 #: more than this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
 WRONG_LOAD = (0.8, 0.3)
-#: Limit of the burst measure of a joint: unexplained fraction of its torque, times 99 % quantile of
-#: the unexplained torque, divided by its median. The measure is at most 1.8 in 20 free logs of five
-#: arms, and 4 to 9 in three logs of arms that were pushed.
+#: Limit of the burst measure of a joint. The measure is the unexplained fraction of its torque,
+#: times the ratio of the 99 % quantile of the unexplained torque to the median. It is at most 1.8
+#: in 20 free logs of five arms, and 4 to 9 in three logs of arms that were pushed.
 BURSTS = 2.5
 #: A residual above its median is reduced by ``SWING`` times the largest torque of accelerations at
 #: most ``SWINGS`` [s] away. For a KUKA with jerky commands the measure falls from 4.2 to 0.9.
 SWING, SWINGS = 0.5, 0.1
-#: Least motion of a joint for the check of bursts [s], and number of times that a message lists.
-ENOUGH, SAID = 3.0, 6
+ENOUGH = 3.0  # least motion of a joint for the check of bursts [s]
+SAID = 6  # number of times that a message lists
 #: Least speed of a checked joint [rad/s]; below it static friction hides the torque.
 FAST_ENOUGH = 0.05
 
@@ -82,7 +82,7 @@ class Unexplained:
     moves: Bools  #: where a joint is fast enough to be judged, shape (T, n)
     swing: Array  #: largest torque of accelerations within :data:`SWINGS` [N m], shape (T, n)
 
-    def beside_swings(self) -> Array:
+    def without_accelerations(self) -> Array:
         """``|left|``, reduced where accelerations can explain it [N m], shape (T, n)."""
         size = np.abs(self.left)
         least = np.zeros(size.shape[1])
@@ -128,7 +128,7 @@ def _swing(arm: ArmModel, trace: Trace) -> Array:
     return largest
 
 
-def _size(values: Array, rows: Bools) -> Array:
+def _norms(values: Array, rows: Bools) -> Array:
     """Root of the sum of squares of each column over the rows where ``rows`` is True, (n,)."""
     return np.asarray(np.sqrt((np.where(rows, values, 0.0) ** 2).sum(axis=0)))
 
@@ -147,10 +147,10 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
     """
     found = []
     for name, log in logs.items():
-        t, left, rows = log.trace.t, log.beside_swings(), log.moves
-        whole = _size(log.torque, rows)
+        t, left, rows = log.trace.t, log.without_accelerations(), log.moves
+        whole = _norms(log.torque, rows)
         whole = np.maximum(whole, FAINT * whole.max() + 1e-12)
-        fraction = _size(left, rows) / whole
+        fraction = _norms(left, rows) / whole
         judged = rows.sum(axis=0) * log.trace.dt > ENOUGH
         burst, level = np.zeros(len(joints)), np.full(len(joints), np.inf)
         for j in np.flatnonzero(judged):
@@ -162,7 +162,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
             starts = [f"{alarm.start - t[0]:.1f}" for alarm in find_alarms(t, peaks)]
             said = ", ".join(starts[:SAID]) + (", ..." if len(starts) > SAID else "")
             found.append(
-                f"{name}: {100 * (_size(log.left, rows) / whole)[worst]:.0f} % of the torque of "
+                f"{name}: {100 * (_norms(log.left, rows) / whole)[worst]:.0f} % of the torque of "
                 f"{joints[worst]} in motion is not explained, and it comes in bursts, as contacts "
                 f"do, at {said} s after the beginning"
             )
@@ -188,8 +188,8 @@ def explained(
     """
     left, torque, rows = np.zeros(len(joints)), np.full(len(joints), 1e-12), np.zeros(len(joints))
     for log in logs:
-        left += _size(log.left, log.moves) ** 2
-        torque += _size(log.torque, log.moves) ** 2
+        left += _norms(log.left, log.moves) ** 2
+        torque += _norms(log.torque, log.moves) ** 2
         rows += log.moves.sum(axis=0)
     fraction = np.sqrt(left / np.maximum(torque, FAINT**2 * torque.max()))
     worst = int(np.argmax(fraction))

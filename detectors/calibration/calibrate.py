@@ -1,11 +1,11 @@
-"""Calibration of an arm model from collision-free motion, by one regularised least squares.
+"""Calibration of an arm model from collision-free motion, by regularised least squares.
 
 The residual of the nominal observer is linear in the errors of the inertial numbers, in the weights
 of the friction columns, in the relative errors of the drive gains and in the unknown payloads (four
-numbers per trace). All of them pass through the causal filter of the observer, so no acceleration
-is needed. Priors determine the numbers that the motion does not excite, and the scale of the
-torques: without priors, the gains converge to zero. The priors weigh as much as thousands of
-samples.
+numbers per trace). The columns of this regression pass through the causal filter of the observer,
+so no acceleration is needed. Priors determine the numbers that the motion does not excite. They
+also determine the scale of the torques: without priors, the gains converge to zero. The priors
+weigh as much as thousands of samples.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import LOG_GAIN, intervals, lagged, low_pass
 from tauguard.traces.trace import Trace
 
-#: Least speed of a checked joint, and speed over which the sign of friction changes [rad/s].
-FAST, REVERSAL = 0.05, 0.05
+FAST = 0.05  # least speed of a checked joint [rad/s]
+REVERSAL = 0.05  # speed over which the sign of friction changes [rad/s]
 
 #: A joint's current has the wrong sign if :func:`drag` is below this. Its result is at least 0.6 in
 #: every log of three real arms and 2 to 8 in most of them. A wrong sign negates the result.
@@ -79,10 +79,11 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     return found
 
 
-#: An error is reported if exchanging two joints' currents, or all their columns, lowers the
-#: logarithm of the unexplained variance by the second number; the first is the least motion of both
-#: joints [s]. In correct logs of 13 arms, currents lower it by 0.05 at most, columns by 0.83. Truly
-#: exchanged currents mostly give 2.9 or more, columns of a wrist's joints less than the limit.
+#: Least motion of both joints [s], and limit. Two joints are reported as exchanged if exchanging
+#: their currents, or all their columns, lowers the logarithm of the unexplained variance by more
+#: than the limit. In correct logs of 13 arms, this lowers it by at most 0.05 (currents) and 0.83
+#: (columns). With exchanged currents it is mostly 2.9 or more. With exchanged columns of wrist
+#: joints it is less than the limit, so they are not found.
 EXCHANGED = {"currents": (6.0, 1.0), "columns": (20.0, 1.25)}
 #: Least motion [s] for exchanged columns if the arm is calibrated. The logarithm is then lowered by
 #: at most 0.11 in correct logs, and by 2.4 or more in nearly all logs with exchanged columns.
@@ -135,7 +136,7 @@ def misread(arm: ArmModel, logs: Mapping[str, Recording]) -> str:
 
 
 def _misreadings(arm: ArmModel, traces: Sequence[Trace]) -> Iterator[tuple[float, int, int, str]]:
-    """Change of the logarithm of the unexplained variance / limit, two joints, kind of column.
+    """Change of the logarithm of the unexplained variance over the limit, joints, kind of column.
 
     The columns of two different joints are exchanged; for equal joints they are negated.
     """
@@ -245,8 +246,8 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
     )
 
 
-#: A log is refused if the unexplained fraction of the torque is above the first number; above the
-#: second it gets a note. For a UR10e the fraction is 0.1 to 0.2 with published gains and friction,
+#: A log is refused if the unexplained fraction of the torque is above REFUSED, and gets a note if
+#: it is above DOUBTED. For a UR10e the fraction is 0.1 to 0.2 with published gains and friction,
 #: at most 0.53 with gains alone, 0.5 to 1.4 with two joints exchanged, 1 to 1.9 with a wrong sign,
 #: and 1 in milliamperes.
 REFUSED, DOUBTED = 0.7, 0.4

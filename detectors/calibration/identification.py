@@ -60,21 +60,21 @@ class Beliefs:
     inertia: float = 0.1  #: relative to the link's largest entry
     armature: float = 1.0
     """Relative to the largest value of the joint's diagonal entry of the mass matrix, or to a
-    twentieth of the arm's largest if that is more, because the reflected rotor inertia of a wrist
-    joint exceeds the inertia of the links that it moves."""
+    twentieth of the arm's largest such value if that is more. The reflected rotor inertia of a
+    wrist joint exceeds the inertia of the links that it moves."""
     gain: float = 0.5  #: relative, if gains are identified
     friction: float = 0.3
-    """Of most friction weights, relative to the joint's largest median torque of any log, over the
-    log or over the joint's own motion in it. With this prior, columns that are similar at the
-    logged speeds get similar weights. Without it, weights could be large with opposite signs, and
-    wrong at other speeds."""
+    """Of most friction weights, relative to the joint's usual torque: its largest median torque of
+    any log, of the whole motion or of the joint's own. With this prior, columns that are similar at
+    the logged speeds get similar weights. Without it, weights could be large with opposite signs,
+    and wrong at other speeds."""
     loaded: float = 0.3  #: of load-dependent friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
     payload: float = 5.0  #: mass of an unknown load [kg]
     moment: float = 0.5  #: first moment of an unknown load [kg m]
     spread: float = 0.2  #: inertia of a load about the last link's origin [kg m^2]
     softness: float = 5.0  #: a sample has the weight 1/softness^2, as model errors are not white
-    evenness: float = 0.15  #: least error level of a joint, as a fraction of the largest
+    evenness: float = 0.15  #: least error level of a joint, as a fraction of the largest joint's
     rest: float = 0.5  #: samples of a joint that has been at rest for longer are not used [s]
 
 
@@ -230,8 +230,8 @@ def _identify_scale(
     arm: ArmModel, recordings: Sequence[Recording], scale: str, friction: FrictionModel
 ) -> Identified:
     """Identify the drive gains as well, see :func:`identify`."""
-    # A torque per ampere that depends on the current would explain a load, so it is left out
-    # while the scale is identified.
+    # A torque per ampere that depends on the current could explain the torque of a load, so it is
+    # left out while the scale is identified.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
     sought, error = _fit(arm, recordings, scale, constant, None, 6)
     unsure = error > 0.5 * BELIEFS.gain
@@ -263,7 +263,7 @@ def _fit(
     level: Array = np.ones(robot.joints)
     known = [known_load(recording.load) for recording in recordings]
     loads = np.array(known)
-    # Gains scale only the currents if friction depends on the model's load.
+    # If friction depends on the model's load, a gain scales only the current.
     rescaled = friction.modelled and not friction.saturation
     first: Sequence[Filtered] = ()
     for turn in range(rounds):

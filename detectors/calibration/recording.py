@@ -105,13 +105,13 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
     if (seconds := motion_length(recordings)) < least:
         still = "" if seconds else "no joint moves: "
         raise ValueError(
-            f"{still}{int(10 * seconds) / 10:g} s of motion, from each log's first to its last, in "
-            f"all: {least:g} s are the least, two minutes are good"
+            f"{still}{int(10 * seconds) / 10:g} s of motion in all, in each log from the first to "
+            f"the last: {least:g} s are the least, two minutes are good"
         )
 
 
 def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:
-    """Whether :data:`LEAST` of motion is left without any one of several recordings."""
+    """Whether :data:`LEAST` of motion remains whichever of several recordings is left out."""
     rests = ([*recordings[:k], *recordings[k + 1 :]] for k in range(len(recordings)))
     return len(recordings) > 1 and all(motion_length(rest) >= LEAST for rest in rests)
 

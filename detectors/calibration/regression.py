@@ -23,7 +23,7 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """The quantities of one recording in the regression, after the observer's filter.
+    """The quantities of one recording in the regression, after the observer's filter: R rows.
 
     The normal equations of each joint are cached. Rounds of least squares and calibrations without
     one of the recordings change only the weights of the joints.
@@ -188,7 +188,8 @@ def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
 
 
 class System:
-    """Normal equations over errors of inertia and armature, friction, gains and payloads.
+    """Normal equations over errors of inertial numbers (dphi), armatures (da) and gains (s,
+    relative), friction weights (w) and the torques of payloads (load).
 
     ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``. The joint's new
     gain is the gain of this round divided by 1 + s. With ``measured``, the equation is
@@ -212,7 +213,7 @@ class System:
         self.matrix = np.zeros((self.size, self.size))
         self.vector = np.zeros(self.size)
 
-    def places(self, joint: int, recording: int) -> NDArray[np.intp]:
+    def indices(self, joint: int, recording: int) -> NDArray[np.intp]:
         """Indices of the unknowns in one joint's rows of one recording."""
         own = np.arange(self.friction + joint * self.c, self.friction + (joint + 1) * self.c)
         load = self.load + INERTIAL * recording + np.arange(INERTIAL)
@@ -222,7 +223,7 @@ class System:
     def add(self, data: Filtered, recording: int, weight: Array, known: Array) -> None:
         """Add a recording; ``weight`` is one over each joint's error [1/(N m)], shape (n,)."""
         for joint in range(self.n):
-            at = self.places(joint, recording)
+            at = self.indices(joint, recording)
             matrix, vector = data.normal(joint, known, self.measured)
             self.matrix[np.ix_(at, at)] += weight[joint] ** 2 * matrix
             self.vector[at] += weight[joint] ** 2 * vector
@@ -239,5 +240,5 @@ class System:
         out = np.empty_like(data.current)
         for joint in range(self.n):
             x = data.design(joint, known, self.measured)
-            out[:, joint] = data.target(joint) - x @ solution[self.places(joint, recording)]
+            out[:, joint] = data.target(joint) - x @ solution[self.indices(joint, recording)]
         return out

@@ -36,8 +36,8 @@ LOAD, LOAD_WIDTH = 0.9, 0.01
 REACH, HEAVIEST = 0.5, 7.0
 #: Length of the end of the window that decides whether an event lasts [s].
 END = 0.03
-#: The fraction that a payload explains is computed from samples later than both times after the
-#: alarm, a time [s] and a number of lags of the observer. Before, the arm still moves.
+#: The fraction that a payload explains is computed from samples later than SETTLING [s], and later
+#: than SETTLING_LAGS time constants of the observer, after the alarm. Before, the arm still moves.
 SETTLING, SETTLING_LAGS = 0.025, 3.0
 #: Log odds that an event that lasts is an intended push: constant, change per decade of the rise
 #: [N/s], change per unit of the cosine. Fitted by logistic regression to simulated clampings and

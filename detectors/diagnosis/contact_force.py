@@ -208,12 +208,11 @@ def _explain(torque: Array, y: Array, inward: Array) -> tuple[Array, Array]:
     return highest + np.log(whole), (mean * weight).sum(axis=1) / whole
 
 
-#: A torque is significant in the usual rule if it exceeds this number of standard deviations and
-#: this fraction of the largest torque. Both were best on simulated arms that no study uses.
+#: In :func:`last_joint`, a torque is significant if it exceeds SIGNIFICANT standard deviations and
+#: NOTICED times the largest torque. Both were best on simulated arms that no study uses.
 SIGNIFICANT, NOTICED = 6.0, 0.05
-#: Number of samples that are used besides the sample with the strongest residual, and the least
-#: level of such a sample, as a fraction of the strongest.
-MOMENTS, FRACTION = 3, 0.4
+MOMENTS = 3  # number of samples that are used besides the one with the strongest residual
+FRACTION = 0.4  # least level of such a sample, as a fraction of the strongest
 
 
 @dataclass(frozen=True)
@@ -276,14 +275,14 @@ def isolate(
 
 
 def moments(level: Array) -> NDArray[np.int64]:
-    """Choose samples with a level (M,) near the highest; that of the highest level is last."""
+    """Samples whose level (M,) is near the highest; the one with the highest level is last."""
     strong = np.flatnonzero(level >= FRACTION * level.max())
     spread = strong[np.unique(np.linspace(0, len(strong) - 1, MOMENTS).round().astype(np.int64))]
     return np.append(spread, int(level.argmax()))
 
 
 def last_joint(residual: Array, deviation: Array) -> int:
-    """The usual rule: the link of the last joint with a significant residual, 1-based; 0 if none.
+    """The link of the last joint with a significant residual, 1-based; 0 if none.
 
     A contact on a link causes no torque at the joints beyond the link (De Luca et al. 2006).
 

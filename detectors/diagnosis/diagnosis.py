@@ -42,7 +42,7 @@ class Diagnosis:
     alarm: Alarm
     link: int  #: the most likely link, 1-based: link i moves with joint i
     links: Array  #: probability of each link, shape (n,)
-    last_joint: int  #: last joint with a significant residual, the usual rule for the link
+    last_joint: int  #: last joint with a significant residual, a common rule for the link
     time: float  #: time of the peak force within the observed window [s]
     force: Array  #: force on the arm at that time, world frame [N], shape (3,)
     point: Array  #: contact point at that time, world frame [m], shape (3,)

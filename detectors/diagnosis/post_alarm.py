@@ -47,7 +47,7 @@ class PostAlarmWindow:
     t: Array  #: time since the alarm [s], shape (M,)
     q: Array  #: [rad], shape (M, n)
     qd: Array  #: [rad/s], shape (M, n)
-    residual: Array  #: part that came with the alarm [N m], shape (M, n)
+    residual: Array  #: minus payload, offsets and friction errors before the alarm [N m], (M, n)
     deviation: Array  #: standard deviation of the residual in free motion [N m], shape (M, n)
     payload: Array  #: residual per unit of payload mass [kg] and moment [kg m], shape (M, n, 4)
     lag: float = 1 / DETECTION_GAIN  #: time constant of the observer [s]
@@ -84,12 +84,12 @@ class PostAlarmWindows:
             alarm: an alarm of the trace.
             since: earliest beginning of the contact [s].
         """
-        before = alarm.start - max(self._begun(alarm.start), since) + BEFORE
+        before = alarm.start - max(self._onset(alarm.start), since) + BEFORE
         lasts = min(alarm.end - alarm.start, LONGEST)
         return self.at(alarm.start, max(AFTER, lasts), max(before, BEFORE))
 
-    def _begun(self, start: float) -> float:
-        """Time at which the residual began the rise that caused the alarm [s]."""
+    def _onset(self, start: float) -> float:
+        """Time at which the rise of the residual that caused the alarm began [s]."""
         t = self.trace.t
         assert self.arm.noise is not None
         rows = slice(*np.searchsorted(t, (start - BEGUN, start + 0.5 * self.trace.dt)))

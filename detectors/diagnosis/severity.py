@@ -110,7 +110,8 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
 #: Probability that an interval contains the true value.
 COVERAGE = 0.9
 
-#: The peak is that of the torque averaged over this number of lags before and after each sample.
+#: The torque is averaged over this number of time constants of the observer before and after each
+#: sample.
 SMOOTHED = 0.3
 
 #: For long contacts at the tool, the average is over this fraction of the contact's duration,
@@ -124,10 +125,10 @@ CONTACT_FRACTION = 0.15
 #: of gains. Chosen on simulated arms and seeds that no study uses.
 SPREAD = 0.2
 
-#: If the ends of an interval differ by more than this factor, the size is not identifiable.
+#: An estimate is not identifiable if the ends of its interval differ by more than this factor.
 IDENTIFIABLE = 6.0
 
-#: Largest fraction of a contact's time that the samples may fail to resolve.
+#: Largest value of ``ContactTorque.hidden``, the fraction that the samples do not resolve.
 UNRESOLVED = 0.9
 
 
@@ -147,11 +148,11 @@ class Interval90:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the size is identifiable."""
+        """Whether the estimate is identifiable, see :data:`IDENTIFIABLE`."""
         return self.high <= IDENTIFIABLE * self.low
 
     def text(self, unit: str) -> str:
-        """``120 N [90, 180]``, or ``at least 7 N`` if the size is not identifiable."""
+        """``120 N [90, 180]``, or ``at least 7 N`` if the estimate is not identifiable."""
         if not self.identifiable:
             return f"at least {two_digits(self.low)} {unit}"
         return f"{two_digits(self.value)} {unit} [{two_digits(self.low)}, {two_digits(self.high)}]"

@@ -1,10 +1,11 @@
 """The force of a contact at the tool, where most contacts of handling and pushing are.
 
 The torques of six joints determine the three components of a force at a known point. The
-uncertainty is in the torques. Friction of a joint at rest takes up part of a push or, if the servo
-drives the joint back against the push, adds to it. The displacement since the contact began shows
-which of the two, because positions are measured to 1e-5 rad and friction reverses within 1e-4 rad.
-Friction before the contact is unknown. The prior of the force is a mixture of Gaussians of several
+The torques of six joints determine the three components of a force at a known point. The
+uncertainty is in the torques. Friction of a joint at rest takes up part of a push. If the servo
+drives the joint back against the push, friction adds to it. The displacement since the contact
+began shows which of the two happens, because positions are measured to 1e-5 rad and friction
+reverses within 1e-4 rad.
 sizes, weighted by their likelihood.
 """
 
@@ -68,7 +69,7 @@ def tool_severity(
     rest = (np.abs(after.qd[: row + 1]) < AT_REST).all(axis=0)
     friction = rest * (0.0 if arm.friction is None else arm.friction.coulomb())
     turned = friction * _turned(after.q)
-    turned = turned - rest * after.residual[0]  # of joints at rest before the contact
+    turned = turned - rest * after.residual[0]  # friction of joints at rest before the contact
     peak = torque.peak + turned[row]
     mean = torque.mean + turned[torque.first : torque.last + 1].mean(axis=0)
     deviation = np.sqrt(LEAST**2 + (OWN * np.abs(torque.peak)) ** 2 + (HIDDEN * friction) ** 2)

@@ -33,9 +33,9 @@ class FrictionModel:
     loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
     saturation: bool = False  #: the torque per ampere changes with the current
     modelled: bool = False
-    """The load is the model's torque of gravity and inertia instead of the drive torque. Load from
-    a drive torque that is mostly friction would predict friction from itself, and would count the
-    torque of a contact as friction."""
+    """The load is the model's torque of gravity and inertia instead of the drive torque. If the
+    drive torque is mostly friction, a load from it would predict friction from friction, and would
+    count the torque of a contact as friction."""
     cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
     play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
@@ -75,7 +75,7 @@ class FrictionModel:
         return slice(before, before + 1 + len(self.loaded))
 
     def basis(self, joints: int) -> _observer.FrictionBasis:
-        """The native form."""
+        """The native form of the columns."""
         if self.cycles.size and len(self.cycles) != joints:
             raise ValueError(f"FrictionModel.cycles: {len(self.cycles)} rows for {joints} joints")
         return _observer.FrictionBasis(

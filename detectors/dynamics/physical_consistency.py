@@ -110,9 +110,10 @@ def solve_physically_consistent(
 ) -> Array:
     """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
 
-    The log det is that of each pseudo-inertia, which is a sum of coordinates. It keeps bodies from
-    becoming flat if the data allow other shapes. The unknowns x are errors (assumed value minus
-    true value) of all inertial numbers, then of the armatures, then of unconstrained quantities.
+    The log det is that of each body's pseudo-inertia; it is linear in the log-Cholesky coordinates.
+    It keeps bodies from becoming flat if the data allow other shapes. The unknowns x are errors
+    (assumed value minus true value) of all inertial numbers, then of the armatures, then of
+    quantities without constraints.
 
     Args:
         matrix: positive definite, priors included, shape (N, N), N >= 11 n.

@@ -269,7 +269,7 @@ def holding(robot: RobotNumbers, held: Collection[str]) -> RobotNumbers:
     inertial: list[Array] = []
     parent: list[int] = []
     placed: list[Array] = []
-    frames: list[tuple[int, Array]] = []  # of each joint: the one that carries it, and where
+    frames: list[tuple[int, Array]] = []  # of each joint: its carrier among kept joints, pose
     for i, name in enumerate(robot.joint_names):
         above = int(robot.parent[i])
         carrier, pose = frames[above] if above >= 0 else (-1, np.eye(4))

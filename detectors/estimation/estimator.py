@@ -44,16 +44,16 @@ class Unknowns:
     slow: float = 60.0  #: time constant of payload and friction errors [s]
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0
-    """Innovations of z standard deviations are replaced by c^2/z if z exceeds this c. The standard
+    """Innovations of z > c standard deviations are replaced by c^2/z; this is c. The standard
     deviation is that of noise and unknowns, without ``noise_inflation``."""
     every: float = 0.01  #: time between two corrections [s]
     noise_inflation: float = 1.0
     """Factor of the noise variance of a correction: the number of successive corrections with the
-    same model error. It is reduced for sample intervals above ``every``. 1 treats successive
-    corrections as independent."""
+    same model error, for sample intervals up to ``every``. 1 treats successive corrections as
+    independent."""
     started: float = 0.0
     """Time that a joint has to move before its first correction [s], because static friction can
-    hold an unknown torque. 0: joints at rest are used, too."""
+    hold an unknown torque. 0: corrections also use joints at rest."""
     transition: float = 0.0
     """Relative error of friction that has just changed. With c_j the difference between friction
     and friction filtered at 30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
@@ -70,12 +70,12 @@ class Unknowns:
 
     @classmethod
     def for_detection(cls) -> Unknowns:
-        """Settings for detectors: errors last 0.2 s and are a tenth of a change of friction."""
+        """Settings for detectors: model errors last 0.2 s and are a tenth of a friction change."""
         return cls(noise_inflation=20.0, transition=0.1, weighted=True)
 
     @classmethod
     def for_logs(cls, mass: float, moment: float) -> Unknowns:
-        """Settings for real arms, whose ``noise`` is 0.3 times the friction level for about 0.6 s.
+        """Settings for real arms, whose model errors are 0.3 friction levels and last about 0.6 s.
 
         Args:
             mass: standard deviation of the load [kg].
@@ -155,7 +155,7 @@ class Estimate:
     * largest recent change of the joint's friction [N m], which decays in 0.3 s;
     * with ``sampled``, half the change of the joint's torque since the last sample [N m], else 0.
     """
-    plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
+    plain: Array  #: residual of a second observer without unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
     __repr__ = in_a_line
@@ -179,8 +179,8 @@ class Estimator:
             gain: rate of the observer [1/s], a number or one per joint.
             dt: sample interval [s]; intervals of single samples may differ.
             unknowns: priors (default: payload, offsets and friction errors are estimated).
-            sampled: for low sample rates. Torque and friction between two samples are the mean of
-                both. If False, they are those of the earlier sample.
+            sampled: for low sample rates: between two samples, torque and friction are the mean of
+                the two samples' values. If False, they are the values of the earlier sample.
         """
         self.arm = arm
         self.dt = float(intervals(dt, 2)[0])
@@ -233,7 +233,7 @@ class Estimator:
         return Estimate(*out, tracked if keep else None)
 
     def reset(self) -> None:
-        """Return to the initial state: the next sample is the first."""
+        """Return to the initial state."""
         self.native.reset()
 
     def step(
@@ -244,7 +244,7 @@ class Estimator:
         out: Array,
         dt: float | None = None,
     ) -> None:
-        """One sample into ``out``, shape (6, n): residual, unexplained and four rows of motion.
+        """Process one sample. ``out``, shape (6, n): residual, unexplained, four rows of motion.
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite; the state is as before.

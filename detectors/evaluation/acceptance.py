@@ -15,8 +15,8 @@ from tauguard.detectors.features.free_bound import friction_levels
 from tauguard.report import poisson_rate
 
 #: Largest accepted RMS error of a calibration in a held-out log, in friction levels of the joint.
-#: On three real arms the error is at most 1.3, for a wrist that moves in only one log. A detector's
-#: estimator then reduces it.
+#: On three real arms the error is at most 1.3, for a wrist that moves in only one log. The
+#: estimator of a detector then reduces this error.
 HELD_OUT = 2.0
 #: Accepted false alarms per hour of logs without a contact.
 ASKED = 10.0

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
-#: Least length of logs for which an alarm rate is printed, and length below which the text says
-#: that longer logs would determine it better [s].
-SHORTEST, SHORT = 300.0, 1800.0
+SHORTEST = 300.0  # least length of logs for which an alarm rate is printed [s]
+SHORT = 1800.0  # length of logs below which the text asks for longer ones [s]
 #: If the first time stamp is above this, time stamps are those of a clock [s].
 CLOCK = 1e6
 #: Largest number of alarms of a log whose times are listed.
@@ -58,7 +57,7 @@ def _labelled(card: ThresholdCard, joint: str) -> str:
 def _torque(card: ThresholdCard, name: str, j: int) -> str:
     """A joint's torque as text: "-" if unknown, in brackets if it comes from other arms.
 
-    It comes from other arms if the regime, or the joint's motion while others move, is in no log.
+    It comes from other arms if no log shows the regime, or the joint in motion while others move.
     """
     level, regime = COLUMNS[name]
     value, moving = getattr(card, level)[j], card.moving

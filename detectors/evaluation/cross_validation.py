@@ -42,11 +42,11 @@ from tauguard.detectors.scores.free_motion import (
 )
 from tauguard.traces.trace import Alarm
 
-#: Largest number of calibrations; more logs than this are held out in groups.
+#: Largest number of calibrations. More logs than this are held out in groups.
 TURNS = 12
 
-#: A log stands out if the probability of its number of alarms at the rate of all other logs,
-#: corrected for the number of logs, is below this. On three real arms the probability is at least
+#: A log stands out if its number of alarms has a probability below this at the rate of all other
+#: logs. The probability is corrected for the number of logs. On three real arms it is at least
 #: 0.14 for a free log, and at most 1e-5 for a log with pushes.
 CHANCE = 0.01
 
@@ -161,7 +161,7 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Cross
 
 def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, ...], float]]:
     """Alarms and level of each part, with calibration and bounds from parts of other folds."""
-    if not any(moves(part.trace) for part in parts):  # one bound, from the calmest pieces of all
+    if not any(moves(part.trace) for part in parts):  # one bound, from the calmest pieces of logs
         still = standing_detector(arm, parts)
         return [_alarms_and_level(with_load_of(part, still).judge(part.trace)) for part in parts]
     numbers = [k for k, part in enumerate(parts) if moves(part.trace)]
@@ -184,7 +184,7 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
     first = [with_load_of(r, one).judge(r.trace) for r, one in zip(parts, judges, strict=True)]
     found = []
     for k, (part, judge) in enumerate(zip(parts, judges, strict=True)):
-        left = turn.get(k, -1)  # a standing log is left out alone
+        left = turn.get(k, -1)  # -1: a log without motion has a fold of its own
         others = [one for i, one in enumerate(first) if turn.get(i, -2) != left and i != k]
         fresh = with_load_of(part, replace(judge, bound=learned(judge.bound, others)))
         found.append(_alarms_and_level(fresh.judge(part.trace)))

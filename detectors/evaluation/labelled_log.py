@@ -10,14 +10,14 @@ from tauguard.traces import Alarm
 LATE = 0.5
 
 
-def beside_labels(
+def compare_with_labels(
     alarms: Sequence[Alarm], touched: Sequence[tuple[float, float]], begin: float, end: float
 ) -> dict[str, Any]:
     """Compare alarms with labelled contacts.
 
-    A contact is found by an alarm that begins before the next contact, and during the contact or
-    within 0.5 s of its onset. If an earlier alarm is still on at the onset instead, the contact
-    counts as ``still_up``. Any other alarm is false.
+    A contact is found if an alarm begins during it, or within 0.5 s of its onset, and before the
+    next contact. If an earlier alarm is still on at the onset instead, the contact counts as
+    ``still_up``. Any other alarm is false.
 
     Args:
         alarms: in order of time.
@@ -61,7 +61,7 @@ def beside_labels(
 
 
 def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
-    """The results of :func:`beside_labels` as text; times are counted from ``since`` [s]."""
+    """The results of :func:`compare_with_labels` as text; times are counted from ``since`` [s]."""
     delays = found["delays"]
     when = (
         f" ({1e3 * median(delays):.0f} ms after the onset in the median, at most "

@@ -22,18 +22,20 @@ from tauguard.detectors.scores.free_motion import SETTLE, FittedFreeMotion, Judg
 from tauguard.report import poisson_rate
 from tauguard.traces.trace import Trace
 
-#: Fraction of a torque on a standing joint that exceeds the baseline for long enough, if the torque
-#: rises within 0.1 s, and if it rises within 1 s. The observer (30/s) follows the torque, and the
-#: baseline of the residual (0.15 s) follows the observer.
+#: Largest fraction of an applied torque that exceeds the baseline for long enough on a joint at
+#: rest: COUNTS if the torque rises within 0.1 s, COUNTS_SLOWLY if within 1 s. The observer (30/s)
+#: follows the torque, and the baseline of the residual (0.15 s) follows the observer.
 COUNTS, COUNTS_SLOWLY = 0.6, 0.15
-#: Constants of :func:`found_in_motion`: length of the pulses [s], least number of times, fraction
-#: of the times at which the torque suffices, and time above the bound until an alarm [s].
-PULSE, PLACES, SHARE, LASTS = 0.3, 40, 0.9, 0.04
+# Constants of :func:`found_in_motion`.
+PULSE = 0.3  # length of the pulses [s]
+PLACES = 40  # least number of pulses
+SHARE = 0.9  # fraction of the pulses that exceed the bound at the resulting torque
+LASTS = 0.04  # time above the bound until an alarm [s]
 #: Factor on the torque in motion, because the estimator explains part of a pulse by load and
 #: friction. With it 97 % of the pulses added to held-out logs were found on a UR10e, 90 % on a UR5
 #: and 92 % on a UR3. Without it 75 % were found, and 40 % of pulses as large as the median bound.
 TRACKED = 1.25
-#: Ratio of the torque in motion to the least bound, for logs with too few times.
+#: Ratio of the torque in motion to the least bound, for logs with too few pulses.
 LITTLE = 1.5
 #: Ratio of the upper threshold, at which a robot stops, to the lower one, which reports a contact.
 UPPER = 1.5
@@ -104,14 +106,14 @@ class ThresholdCard:
 
 
 def threshold_card(
-    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: CrossValidation
+    detector: FittedFreeMotion, traces: Sequence[Trace], validation: CrossValidation
 ) -> ThresholdCard:
     """The card of a fitted detector.
 
     Args:
         detector: fitted.
         traces: training logs of the detector, for poses, regimes and bounds in motion.
-        sifted: the cross-validation of these logs.
+        validation: the cross-validation of these logs.
     """
     bound, robot = detector.bound, detector.arm.robot
     judged = [detector.judge(trace) for trace in traces]
@@ -131,7 +133,7 @@ def threshold_card(
         "stopped": (bound.rest + bound.stop) / COUNTS,
         "moving": usual,
     }
-    alarms = sum(len(log.alarms) for log in sifted.kept)
+    alarms = sum(len(log.alarms) for log in validation.kept)
     return ThresholdCard(
         robot.joint_names,
         levels["standing"],
@@ -143,8 +145,8 @@ def threshold_card(
         detector.seconds,
         alarms,
         poisson_rate(alarms, detector.seconds / 3600),
-        sifted.kept,
-        sifted.left_out,
+        validation.kept,
+        validation.left_out,
         dict(detector.unseen),
         replayed(detector, traces, usual, starting),
         np.where(bound.shown, bound.fast, np.nan),

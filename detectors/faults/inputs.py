@@ -23,8 +23,9 @@ RATE = 20.0
 #: Least noise of a joint, as a fraction of the largest of all joints. Without it a load, which can
 #: reverse the small torque of a wrist joint, would be a fault.
 LEAST_NOISE = 0.5
-#: A fast ratio below the first works against the motion; slow ones outside of the other two say
-#: another size. With loads and contacts in training, what those show beyond, and the margin.
+#: A joint's torques are a fault if the ratio of drive torque to the model's torque is below OPPOSED
+#: over 0.5 s (against the motion), or outside of LEAST to MOST over 4 s. Ratios of training with
+#: loads and contacts widen these limits to RATIO_MARGIN beyond them.
 OPPOSED, LEAST, MOST, RATIO_MARGIN = -0.4, 0.4, 1.7, 0.4
 #: By the number that the native check answers.
 TEXTS = {
@@ -43,8 +44,8 @@ def torque_fault(names: Sequence[str], number: int, joint: int, value: float) ->
 class TorqueCheck:
     """Compares each joint's drive torque with the torque that the model needs, over 0.5 and 4 s.
 
-    A contact changes their ratio while it lasts. A contact that pushes a joint against its drive
-    torque for half a second looks the same as a wrong sign.
+    A contact changes the ratio of the two torques while it lasts. A contact that pushes a joint
+    against its drive torque for half a second cannot be distinguished from a wrong sign.
     """
 
     def __init__(self, arm: ArmModel, dt: float, ratios: Array | None = None) -> None:
@@ -119,8 +120,8 @@ Counts = NDArray[np.int64]
 FASTEST = 20.0
 #: Time over which summed velocities are compared with the change of position [s].
 SPAN = 20e-3
-#: Allowed difference of summed velocity and change of position over SPAN, as a fraction of the
-#: former, because filters lag and time stamps jitter.
+#: Allowed difference between the summed velocity and the change of position over SPAN, relative to
+#: the summed velocity, because filters lag and time stamps jitter.
 FRACTION = 0.2
 #: Allowed fraction over one sample, because a time stamp may be half an interval late.
 STEP_FRACTION = 0.5
@@ -129,7 +130,7 @@ MARGIN = 3.0
 #: Least allowed difference [rad]: an encoder's resolution, which training at rest may not show.
 RESOLUTION = 2e-4
 
-#: Allowed differences [rad] where velocities are derivatives of the positions: no limit.
+#: Allowed difference [rad] if velocities are derivatives of the positions: no limit.
 UNLIMITED = 1e6
 #: Largest number of successive missing samples, which are interpolated; more of them are a gap.
 LATE = 2
@@ -207,7 +208,7 @@ class UsualInput:
         return usual.without_velocities() if any(map(lacks_velocities, traces)) else usual
 
     def without_velocities(self) -> UsualInput:
-        """Limits for velocities that are derivatives of the positions: the two always agree."""
+        """Limits for velocities that are derivatives of the positions: positions always agree."""
         unlimited = np.full(len(self.joint_names), UNLIMITED)
         return replace(self, step=unlimited, drift=unlimited)
 

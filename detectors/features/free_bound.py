@@ -28,9 +28,9 @@ def upper_quantile(
     Args:
         x: at least 0, shape (R, k).
         y: shape (R,).
-        quantile: between 0 and 1.
+        quantile: probability, between 0 and 1.
         prior: shape (k,).
-        weight: weight of the distance from the prior, as a number of rows of x = 1, shape (k,).
+        weight: of ``|c - prior|``, as a number of rows of x = 1, shape (k,).
         rows: number of rows that are used; the loss is scaled to that of all rows.
 
     Returns:
@@ -65,8 +65,8 @@ def upper_quantile(
 #: The bound at rest is the larger of NOISE standard deviations and REST friction levels.
 NOISE, REST = 6.5, 0.12
 
-#: Additions to a bound, in friction levels: to the bound at rest by motion of any joint; to the
-#: bound of a joint that a contact turned; to the bound in motion by a start.
+#: Additions to a bound, in friction levels. STOP: to the bound at rest by motion of any joint.
+#: TURNED: to the bound of a joint that a contact turned. START: to the bound in motion by a start.
 STOP, TURNED, START = 1.2, 0.6, 1.0
 
 #: The bound in motion is MARGIN times the 99 % quantile of left-out residuals, at least LEAST
@@ -80,15 +80,15 @@ PRIOR = np.array([0.3, 0.02, 0.05, 0.03, 0.3])
 #: A friction level from logs of T seconds is multiplied by hypot(1, WIDENING_SECONDS / T).
 WIDENING_SECONDS = 40.0
 
-#: Motion of a joint [s] above a speed [rad/s] at which its own friction counts half.
-KNOWN_SECONDS, FULL_SPEED = 4.0, 0.05
+KNOWN_SECONDS = 4.0  # motion of a joint after which its own friction has half of the weight [s]
+FULL_SPEED = 0.05  # speed above which this motion counts [rad/s]
 
-#: Least motion of a joint whose motion counts as known [s]. Another joint may stand only where it
-#: stood in the logs, within this distance [rad].
-SHOWN_SECONDS, BEYOND, ANYWHERE = 1.0, 0.1, 1e6
+SHOWN_SECONDS = 1.0  # least motion of a joint in the logs for its motion to count as known [s]
+BEYOND = 0.1  # distance within which any other joint has to stay at its positions in the logs [rad]
+ANYWHERE = 1e6  # value of an unlimited position, speed or acceleration
 _ENDS = ("min", "max")
 
-#: Quantile of a joint's gravity torques in the logs for which the friction level is computed.
+#: Quantile of the gravity torques of a joint in the logs at which its friction is computed.
 LOADED = 0.9
 
 

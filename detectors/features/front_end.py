@@ -2,8 +2,8 @@
 
 The SVR needs scaled residuals: residuals in N m have a median distance near 100, at which the
 matrix of a kernel of length sigma = 3 is almost diagonal. Each joint's residual is divided by its
-standard deviation, compressed by asinh, so that hard impacts stay within the region of the training
-data, and multiplied by a factor.
+standard deviation, compressed by asinh and multiplied by a factor. The asinh keeps hard impacts
+within the region of the training data.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ class FrontEndSettings:
             )
         if self.calibrate:
             arm = calibrate(arm, traces, friction=arm.friction).arm
-        bare = self.bare(joints, arm, dt)
+        bare = self.without_noise_model(joints, arm, dt)
         estimates = [bare.estimator().run(t.t, t.q, t.qd, t.current) for t in traces]
         tables = (
             [e.unexplained for e in estimates],
@@ -166,7 +166,7 @@ class FrontEndSettings:
             _remember(trace, found, estimate)
         return found
 
-    def bare(self, joints: tuple[int, ...], arm: ArmModel, dt: float) -> FrontEnd:
+    def without_noise_model(self, joints: tuple[int, ...], arm: ArmModel, dt: float) -> FrontEnd:
         """The front end of a calibrated arm before its noise model is known."""
         return FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
 
@@ -224,7 +224,7 @@ _ESTIMATES: dict[int, tuple[FrontEnd, Estimate]] = {}
 
 
 def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
-    """Cache the estimate as long as the trace exists, or until another front end's replaces it."""
+    """Cache the estimate until the trace is deleted or another front end estimates it."""
     if id(trace) not in _ESTIMATES:
         weakref.finalize(trace, _ESTIMATES.pop, id(trace), None)
     _ESTIMATES[id(trace)] = front, estimate

@@ -10,7 +10,7 @@ from tauguard.arrays import Array, Bools
 from tauguard.detectors.features.free_bound import SLOW
 from tauguard.traces.trace import Trace
 
-#: Least total time of a regime in the logs for which it counts as seen [s].
+#: Least total time of a regime in the logs [s]; below it the regime counts as unseen.
 SEEN = 3.0
 #: A speed or acceleration counts as shown if the logs exceed it for this time in total [s].
 SHORTLY = 0.5
@@ -77,7 +77,7 @@ def unseen_text(lacking: Unseen, joints: int) -> str:
 
 
 def _lasting(on: Bools, dt: float) -> Array:
-    """Time since each column became True [s], 0 where it is False; shape of ``on``."""
+    """Time since each column became True [s], 0 where it is False; same shape as ``on``."""
     rows = np.arange(1, len(on) + 1)[:, None]
     off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
     return np.asarray(np.where(on, (rows - off) * dt, 0.0))

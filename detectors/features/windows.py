@@ -67,8 +67,8 @@ class Prepared:
     collision: Bools  #: rows with a collision whose target is above FELT, shape (T,)
 
 
-#: Torques of joints 1, 2, ... with equal weight in the training target. The last value is used for
-#: all further joints. Only ratios of these numbers have an effect.
+#: Largest torques of joints 1, 2, ... that have equal weight in the training target. The last value
+#: is used for all further joints. Only ratios of these numbers have an effect.
 ALIKE = (20.0, 20.0, 15.0, 6.0)
 
 #: The scaled sum of torques of the median training collision.
@@ -76,7 +76,7 @@ MEDIAN_SEVERITY = 2.5
 
 #: Least target of a collision in training.
 FELT = 0.05
-#: Larger targets are set to this, whose severity is 49.
+#: Larger targets x / (1 + x) are set to this, which is x = 49.
 HIGHEST = 0.98
 
 

@@ -62,11 +62,12 @@ from tauguard.traces.trace import Trace
 CONFIRMATION = 0.0
 #: The quantile of the residual in motion that is learned.
 QUANTILE = 0.99
-#: Weight of the prior: 20 s of motion whose inputs of the quantile, ordered as PRIOR, are USUAL.
+#: Weight of the prior: that of 20 s of motion in which the inputs of the quantile are USUAL, in the
+#: order of PRIOR.
 WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
 #: Least value of ``Bound.fast`` and ``Bound.hard`` [rad/s, rad/s^2].
 LEAST_SHOWN = 0.05
-#: Motion is beyond the logs if its speed and acceleration add this to the bound [friction levels].
+#: Motion is beyond the logs if its excess speed and acceleration, relative to the logs', add more.
 FURTHER = 0.25
 #: Largest number of calibrations with held-out logs.
 FOLDS = 5
@@ -75,8 +76,8 @@ FOLDS = 5
 SCALE_MARGIN, SCALE_LEAST, SCALE_MOST = (1.5, 1.5, 1.3), (1.0, 1.0, 0.4), 3.0
 #: Weight of the factor 1 in ``Bound.scale``, in seconds of logs.
 SCALE_WORTH = (30.0, 20.0, 60.0)
-#: For an arm that moves in no log: least noise of a joint relative to the noisiest joint, and the
-#: torque that static friction may hold, in standard deviations of the noise.
+#: For an arm that moves in no log. QUIETEST: least noise of a joint relative to the noisiest joint.
+#: KEEPS: torque that static friction may hold, in standard deviations of the noise.
 QUIETEST, KEEPS = 0.2, 10.0
 #: The noise of a standing arm is at most CALM times the standard deviation in the calmest tenth of
 #: pieces of PIECE [s], because some pieces have no contact. In free logs of two arms, the ratio of
@@ -179,15 +180,13 @@ class FreeMotion:
     name: str = "free-motion"
 
     def fit(self, traces: Sequence[Trace | Recording], arm: ArmModel) -> FittedFreeMotion:
-        """Calibrate, then let left-out logs move the prior bounds.
+        """Calibrate the arm and fit the prior bounds to held-out logs.
 
         Args:
             traces: 10 s of collision-free motion or more in all. Plain traces count as without a
-                load; of labelled ones the load is unknown, and those with collisions are left out.
+                load. The load of labelled ones is unknown, and those with collisions are left out.
                 Long ones are cut, so that each part can be left out once.
-            arm: nominal numbers and drive gains, whose scale holds.
-
-        Raises:
+            arm: nominal numbers and drive gains; the gains are not identified.
             ValueError: no or too little motion, or other joints.
         """
         recordings = [
@@ -269,7 +268,7 @@ def _recording(trace: Trace | Recording) -> Recording:
 
 
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
-    """For each part, the calibration from the parts of all other folds; and that from all."""
+    """For each part, the calibration from the parts of all other folds; then that of all parts."""
     calibrated, everything = Subsets(arm, parts), range(len(parts))
     whole = calibrated(everything, 0.0)  # the uncut logs have enough
     models = [whole] * len(parts)

@@ -117,7 +117,7 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
 
 #: Least squared distance, in the kernel's norm, of a picked vector from the span of the vectors
-#: picked before. Nearer ones add only rounding errors, as every vector has the norm 1.
+#: picked before it. A nearer vector adds only rounding errors, as every vector has the norm 1.
 DEPENDENT = 1e-8
 
 

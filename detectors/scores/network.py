@@ -58,7 +58,7 @@ class Network(Frozen):
         )
         target = (outputs - mean) / spread
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # of reaching the last epoch
+            warnings.simplefilter("ignore", ConvergenceWarning)  # raised after the last epoch
             model.fit((x - centre) / scale, target[:, 0] if target.shape[1] == 1 else target)
         weights = [np.ascontiguousarray(w) for w in model.coefs_]
         biases = [np.ascontiguousarray(b) for b in model.intercepts_]

@@ -53,8 +53,8 @@ class SrqSvr:
     Training windows are drawn from collisions and from collision-free motion. Then, in two rounds,
     the collision-free windows with the highest scores are added as negatives. The windows are
     scaled so that the median distance between windows of collisions and of collision-free motion is
-    ``distance``, which the kernel resolves. The thresholds of ``moving-thresholds`` raise alarms,
-    too, because they detect residuals unlike all training windows.
+    ``distance``, which the kernel resolves. The thresholds of ``moving-thresholds`` raise alarms
+    in addition, because they detect residuals unlike all training windows.
     """
 
     windows: int = 3000  #: number of training windows, a fifth of them from collisions
@@ -69,7 +69,7 @@ class SrqSvr:
     distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
     vectors: int = 400  #: largest number of support vectors; 0 keeps all
     name: ClassVar[str] = "srq-svr"
-    floored: ClassVar[bool] = True  #: whether plain thresholds can raise alarms, besides the score
+    floored: ClassVar[bool] = True  #: whether thresholds on the residual can raise alarms, too
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedWindowed:
         """Calibrate, draw windows, and train, with two rounds of added negatives.
@@ -112,7 +112,7 @@ class SrqSvr:
         shape: WindowShape,
     ) -> Scaling:
         """The scaling with which the median distance of windows is ``distance``."""
-        bare = self.bare(traces, front)
+        bare = self.initial_scaling(traces, front)
         if self.distance <= 0:
             return bare
         rng = np.random.default_rng(self.seed)
@@ -121,7 +121,7 @@ class SrqSvr:
         spread = median_distance(windows[target > 0], windows[target == 0], rng)
         return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
 
-    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+    def initial_scaling(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The residual divided by ``units`` standard deviations, or by more if its peaks are high.
 
         With dry friction, the residual of free motion is small except at starts and reversals, with
@@ -199,7 +199,7 @@ class FittedWindowed(OnFrontEnd):
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual: these or the score can raise an alarm."""
+        """Thresholds on the same residual: they or the score can raise an alarm."""
         if self.limits is None:
             return None
         return FittedThresholds(
@@ -251,6 +251,6 @@ class PlainSrqSvr(SrqSvr):
     name: ClassVar[str] = "srq-svr-plain"
     floored: ClassVar[bool] = False
 
-    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+    def initial_scaling(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""
         return Scaling(front.joints)

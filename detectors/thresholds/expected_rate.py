@@ -29,8 +29,7 @@ from tauguard.detectors.thresholds.tail_model import (
 )
 from tauguard.report import poisson_rate, two_digits
 
-#: Bounds of the tail's shape if the peaks do not show an end of the tail, and the lowest shape if
-#: they do.
+#: Bounds of the tail's shape unless the peaks show an end of the tail; then the lowest is LOWEST.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
 #: Number of bootstrap draws.
 DRAWS = 200

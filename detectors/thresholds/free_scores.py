@@ -14,8 +14,8 @@ from tauguard.traces.trace import Trace
 
 #: Time for which the recent speed includes a motion [s], because stiction acts after a stop.
 MEMORY = 0.5
-#: Largest number of speeds with their own base and unit, and least number of blocks for each.
-BINS, FEWEST = 10, 40
+BINS = 10  # largest number of speeds with their own base and unit
+FEWEST = 40  # least number of blocks for each of these speeds
 #: Fraction of the blocks at a speed whose peaks exceed the base.
 TAIL = 0.1
 
@@ -54,7 +54,7 @@ class SpeedNormalisation:
     The residual of collision-free motion increases with the speed. A threshold of the score that
     suits the fastest motion would be far too high for slow motion. A normalised score is 0 at the
     base, which the peaks of collision-free motion at this speed seldom exceed. Its unit is the mean
-    excess of peaks over the base. Both are linear between the given speeds, constant beyond.
+    excess of peaks over the base. Both are interpolated linearly between the given speeds.
     """
 
     speed: Array  #: ascending [rad/s], shape (K,)
@@ -136,7 +136,7 @@ class FreeScores:
     peaks: Array  #: highest sustained score of each piece, shape (P,)
     speeds: Array  #: recent speed at this score [rad/s], shape (P,)
     seconds: float  #: length of the collision-free motion [s]
-    floor: FreeScores | None = None  #: scores of the detector's plain thresholds, if it has any
+    floor: FreeScores | None = None  #: scores of the thresholds on the residual, if used as well
     interval: float = 0.0  #: sample interval [s]
 
     @classmethod

@@ -23,8 +23,8 @@ import numpy as np
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
 
-#: The alarms per episode are counted at the threshold that COUNTED episodes exceed, or FRACTION of
-#: all episodes if that is fewer.
+#: Alarms per episode are counted at a threshold that COUNTED episodes exceed, or FRACTION of all
+#: episodes if that number is smaller.
 COUNTED, FRACTION = 30, 0.25
 
 

@@ -98,7 +98,7 @@ def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SH
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
-        allowed: above 0. If it is ``count`` or more, the result is the peak that so many exceed.
+        allowed: above 0. From ``count`` on, the result is the peak that ``allowed`` peaks exceed.
         count: number of peaks in the tail; at most N - 1 are used.
         usual: shape of the tail unless the peaks show another one.
 
@@ -150,16 +150,16 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     return tail_level(peaks, per_hour * hours, count, usual)
 
 
-#: At the threshold at which the plain thresholds alone have PLAIN alarms per hour, the learned
-#: score alone has LEARNED. Both together then have about PLAIN by the tail model, because most
-#: alarms of the two coincide. Chosen on three arms.
+#: At the threshold at which a detector's thresholds on the residual alone have PLAIN alarms per
+#: hour, its learned score alone has LEARNED. Together they then have about PLAIN by the tail model,
+#: because most alarms of the two coincide. Chosen on three arms.
 PLAIN, LEARNED = 1.0, 0.3
 
 
 def normalisations(
     scores: Sequence[FreeScores],
 ) -> tuple[SpeedNormalisation, SpeedNormalisation | None]:
-    """The normalisation of a learned score, and that of its floor, the plain thresholds.
+    """The normalisation of a learned score, and that of the floor (thresholds on the residual).
 
     The threshold for the larger of both normalised scores is the threshold of the floor alone. So
     every collision that the floor detects is detected, with the same delay or a shorter one. The

@@ -34,7 +34,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
       :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
       By default the drives decelerate at the arm's limit, more gently than the brakes. So the
-      peak force, within 50 ms of the contact, is higher than with ``stop0``.
+      peak force, which occurs within 50 ms of the contact, is higher than with ``stop0``.
       ``stop2`` and ``retract`` begin with the same stop and have the same peak.
     * ``stop2``: category 2: the drives stop the arm and hold it.
     * ``retract``: the arm stops as with ``stop2``, goes back along its path past the place where
@@ -107,7 +107,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         """Begin an episode."""
         self._forget()
         observation, info = self.env.reset(seed=seed, options=options)
-        self._look(info)
+        self._observe(info)
         return observation, info | {"reacting": self._since is not None}
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
@@ -117,11 +117,11 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             self._arm.batch.plants[0].override(kind, speed)
             self._since += self._period
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._look(info)
+        self._observe(info)
         info["reacting"] = self._since is not None
         return observation, reward, terminated, truncated, info
 
-    def _look(self, info: dict[str, Any]) -> None:
+    def _observe(self, info: dict[str, Any]) -> None:
         """Store the arm's state, and decide whether the reaction begins."""
         n = len(self._deceleration)
         observation = self._arm.batch.observation[0]
@@ -151,7 +151,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         if self.reaction == "stop1" and stopped:
             return Override.BRAKE, self._speed
         if self.reaction == "retract" and stopped:
-            return Override.VELOCITY, self._back()
+            return Override.VELOCITY, self._backward_velocity()
         return Override.VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
@@ -171,7 +171,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._speed = self._speed * (1 - self._period / fastest)
         return False
 
-    def _back(self) -> Array:
+    def _backward_velocity(self) -> Array:
         """Velocity backwards along the stored path; zero after the end of the retraction."""
         if self._returning is None:
             rows, each = np.array(self._past), round(1 / RETRACT_SPEED)

@@ -13,8 +13,8 @@ from tauguard.arrays import Array, in_a_line
 #: Peak velocity and peak acceleration of 10 s^3 - 15 s^4 + 6 s^5 for s from 0 to 1.
 _PEAK_VELOCITY = 1.875
 _PEAK_ACCELERATION = 5.7735026918962575
-#: Fraction of the random segments that move only one joint; shortest and longest pause [s].
-SINGLE_JOINT, DWELL = 0.2, (0.1, 0.8)
+SINGLE_JOINT = 0.2  # fraction of the random segments that move only one joint
+DWELL = (0.1, 0.8)  # shortest and longest pause [s]
 
 
 @dataclass(frozen=True)

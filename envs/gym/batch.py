@@ -20,7 +20,7 @@ from tauguard.envs.gym.native import controls, surroundings
 from tauguard.envs.gym.people import REACHES, WALKS, draw_script
 from tauguard.envs.gym.placing import check_clear
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
-from tauguard.envs.gym.sensing import Sensing, listening
+from tauguard.envs.gym.sensing import Sensing, listener_factory
 from tauguard.envs.gym.step_checks import StepChecks
 from tauguard.envs.plant import make_plant
 from tauguard.models import Person
@@ -163,7 +163,7 @@ class Batch:
 
     def attach(self, detector: object) -> None:
         """Put a detector into every copy's loop; ``None`` removes it."""
-        make = listening(self.compiled, detector)
+        make = listener_factory(self.compiled, detector)
         needed = make is not None or self.compiled.settings.noise
         self.sensing = [Sensing(self.compiled, make) for _ in range(self.rows)] if needed else None
         self.residual[:], self.alarm[:] = 0.0, False
@@ -182,9 +182,9 @@ class Batch:
         """Draw the quantities of ``randomize`` for the next episode of copy ``i``."""
         known = self.compiled.settings.randomize
         if known:
-            self._become(i, draw(known, self.compiled, rng, stated))
+            self._apply_drawn(i, draw(known, self.compiled, rng, stated))
 
-    def _become(self, i: int, drawn: dict[str, Array]) -> None:
+    def _apply_drawn(self, i: int, drawn: dict[str, Array]) -> None:
         """Apply the drawn values to copy ``i``, which gets its own model and native plant."""
         if not drawn:
             return
@@ -255,7 +255,7 @@ class Batch:
         own = listener.get_state() if listener else None
         if (state["detector"] is None) != (own is None):
             raise ValueError("state: of an environment with another detector")
-        self._become(i, {name: values.copy() for name, values in state["drawn"].items()})
+        self._apply_drawn(i, {name: values.copy() for name, values in state["drawn"].items()})
         data, model = self.datas[i], self.model(i)
         if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):
             raise ValueError("state: of another scene")

@@ -34,7 +34,7 @@ from tauguard.models import (
 
 #: Least height of a target and its least distance from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
-#: Both as fractions of the arm's reach; for a short arm these are smaller and replace the lengths.
+#: The same two as fractions of the arm's reach; the smaller of length and fraction applies.
 SHORT = (0.25, 0.4)
 #: Least reach of an arm [m].
 LEAST_REACH = 0.02
@@ -161,7 +161,7 @@ def compile_scene(
         scene.model.opt.tolerance = CLOTH_TOLERANCE
     # A diverged state must stay visible; MuJoCo would restart it at the origin.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return _known(settings, scene, bare, layout, arms)
+    return _with_nominal_numbers(settings, scene, bare, layout, arms)
 
 
 def _people(
@@ -181,7 +181,7 @@ def _people(
     return tuple(proxies), tuple(people)
 
 
-def _known(
+def _with_nominal_numbers(
     settings: Settings, scene: Scene, bare: Scene, layout: Layout, arms: int
 ) -> CompiledScene:
     model = scene.model

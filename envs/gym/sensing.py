@@ -216,7 +216,7 @@ class PerArm:
             part.set_state(own)
 
 
-def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
+def listener_factory(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
     """A function that makes the detector of a copy; None without a detector.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.contacts import Checker, State, checker, registered
-from tauguard.contacts.checker import asked
+from tauguard.contacts.checker import reported
 from tauguard.envs.gym.compiled import CompiledScene
 
 
@@ -52,7 +52,7 @@ class StepChecks:
         assert self._before is not None
         after = State.of(self._model, data, self._scratch)
         for one, found in zip(self._checkers, self._pairs, strict=True):
-            contacts = asked(one, self._before, after)
+            contacts = reported(one, self._before, after)
             if not len(contacts):
                 continue
             rows = np.concatenate([contacts.geom, contacts.flex], axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 from oracles import two_mass_impact as impacts
 from oracles.two_mass_impact import CONTACTS, SPEED
 from studies.framework import answer, table_rows
-from tauguard.models import BODY_REGIONS, SceneSpec, blow_velocity, reflected_mass, standard_mass
+from tauguard.models import BODY_REGIONS, SceneSpec, impact_velocity, reflected_mass, standard_mass
 from tauguard.report import Row
 
 TIMESTEPS = (2.5e-4, 5e-4, 1e-3, 2e-3)
@@ -87,7 +87,7 @@ def arm(regions: tuple[str, ...], links: tuple[int, ...] = (4, 5, 6)) -> list[Ro
         hit, limits = impacts.aimed(region, link), BODY_REGIONS[region]
         at = (hit.scene, hit.q, hit.body, hit.point, hit.normal)
         heavy, simple = reflected_mass(*at), standard_mass(hit.scene)
-        qd = blow_velocity(*at, SPEED)
+        qd = impact_velocity(*at, SPEED)
         limp, predicted = impacts.limp_impact(hit, qd), limits.peak_force(SPEED, heavy)
         rows.append(
             {

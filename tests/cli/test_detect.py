@@ -130,7 +130,10 @@ def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):
         (("--gains", "8", "0"), "every number must be finite and not 0"),
         (("--gains", "8", "5", "--quiet", "50"), "and below the log's 20.0 s"),
         (("--gains", "8", "5", "--quiet", "0"), "--quiet 0: expected above 0"),
-        (("--gains", "8", "5", "--quiet", "2"), "first 2 s (--quiet): 2 s of motion, from"),
+        (
+            ("--gains", "8", "5", "--quiet", "2"),
+            "first 2 s (--quiet): 2 s of motion in all",
+        ),
         (("--gains", "8", "5", "--columns", "ur10e"), "line 1: 7 columns, expected 31"),
         (("--gains", "8", "5", "--robot", "no.urdf"), "no.urdf: no such robot file"),
         (("--gains", "8000", "5000"), "milliamperes?"),

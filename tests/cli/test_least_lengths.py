@@ -47,7 +47,8 @@ def test_less_motion_is_refused_by_every_command_in_the_same_words(folder, capsy
     for arguments in asked(folder, log, longer).values():
         said = fails(capsys, *arguments)
         assert (
-            "9.8 s of motion, from each log's first to its last, in all: 10 s are the least" in said
+            "9.8 s of motion in all, in each log from the first to the last: 10 s are the least"
+            in said
         )
 
 

@@ -172,7 +172,7 @@ def rewritten(path, change, checked=True):
     [
         (lambda c: c.update(threshold=float("nan")), "unexpected nan"),
         (lambda c: c.update(confirmation=-1.0), "confirmation -1"),
-        (lambda c: c.pop("normalisation"), "part missing or added: normalisation"),
+        (lambda c: c.pop("normalisation"), "missing or additional fields: normalisation"),
         (lambda c: c["detector"].update(type="os:system"), "holds a os:system"),
         (lambda c: c["detector"]["fields"]["front"]["fields"].update(dt=0.0), "dt 0.0"),
         (lambda c: c["detector"]["fields"]["regressor"]["fields"].update(sigma=0.0), "sigma: 0.0"),

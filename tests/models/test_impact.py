@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.models import SceneSpec, compose, pin_model
-from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
+from tauguard.models.impact import impact_velocity, reflected_mass, standard_mass
 
 from .arms import SLED
 
@@ -31,7 +31,7 @@ def test_as_pinocchio_has_it(seed, link):
     expected = 1 / (n @ moved @ np.linalg.solve(mass, moved.T @ n))
     body = int(SCENE.link_bodies[link - 1])
     assert reflected_mass(SCENE, q, body, point, n) == pytest.approx(expected, rel=1e-9)
-    qd = blow_velocity(SCENE, q, body, point, 3 * n, 0.4)
+    qd = impact_velocity(SCENE, q, body, point, 3 * n, 0.4)
     assert n @ moved @ qd == pytest.approx(0.4)
     energy = qd @ mass @ qd / 2
     assert energy == pytest.approx(expected * 0.4**2 / 2, rel=1e-9)

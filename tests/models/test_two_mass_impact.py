@@ -3,13 +3,13 @@
 import pytest
 
 from oracles import two_mass_impact as impacts
-from tauguard.models import BODY_REGIONS, blow_velocity, reflected_mass
+from tauguard.models import BODY_REGIONS, impact_velocity, reflected_mass
 
 
 def test_an_arm_without_drives_follows_its_reflected_mass():
     hit = impacts.aimed("chest", 5)
     at = (hit.scene, hit.q, hit.body, hit.point, hit.normal)
-    qd = blow_velocity(*at, impacts.SPEED)
+    qd = impact_velocity(*at, impacts.SPEED)
     limp = impacts.limp_impact(hit, qd).force
     predicted = BODY_REGIONS["chest"].peak_force(impacts.SPEED, reflected_mass(*at))
     assert limp == pytest.approx(predicted, rel=0.02)

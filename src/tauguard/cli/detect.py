@@ -90,7 +90,7 @@ def command(
     from tauguard.datasets.arm_logs import read_one
     from tauguard.datasets.real_arms import robot_numbers
     from tauguard.detectors.alarms.log_detection import detect_in_log
-    from tauguard.detectors.evaluation.labelled_log import beside_labels
+    from tauguard.detectors.evaluation.labelled_log import compare_with_labels
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
     from tauguard.untrusted_input import check_no_device
@@ -117,7 +117,7 @@ def command(
     result = summary(log, trace, found, causes)
     if read.touched is not None:
         begin, end = found.begin, float(trace.t[-1])
-        result["labels"] = beside_labels(found.detection.alarms, read.touched, begin, end)
+        result["labels"] = compare_with_labels(found.detection.alarms, read.touched, begin, end)
     report(result)
     if json is not None:
         write_json(json, result)
@@ -289,14 +289,14 @@ def summary(
     """The results of a run, as JSON values."""
 
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.alarms.log_detection import loudest_joint
+    from tauguard.detectors.alarms.log_detection import most_changed_joint
 
     whole = float(trace.t[-1] - found.begin)
     watched = max(whole - found.fault_seconds - found.unwatched_seconds, 0.0)
     hours = max(watched, trace.dt) / 3600
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
-        joint = loudest_joint(found, alarm.start, alarm.end)
+        joint = most_changed_joint(found, alarm.start, alarm.end)
         name = trace.joint_names[joint]
         events.append({"start": alarm.start, "end": alarm.end, "joint": name})
     if causes:

@@ -225,17 +225,17 @@ def free_motion(
     own = dict(zip(traces, recordings, strict=True))
     arm, _ = free_arm(robot, read.numbers, own, gains)
     logs_kept = [name for name in accept if name not in ACCEPTABLE]
-    own, sifted = sifted_logs(own, arm, logs_kept)
+    own, validation = sifted_logs(own, arm, logs_kept)
     traces = {name: recording.trace for name, recording in own.items()}
     detector = free_detector(arm, own, accept)
     print_notes(not_shown(list(traces.values())))
-    held = [log for log in sifted.kept if log not in sifted.accepted]
+    held = [log for log in validation.kept if log not in validation.accepted]
     hold_to("error", accept, lambda: check_own_error(held))
     hold_to("alarms", accept, lambda: check_own_alarms(held, per_hour))
     save_model(free_alarm(detector, list(traces.values())), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
-    show_card(detector, list(traces.values()), sifted, card)
+    show_card(detector, list(traces.values()), validation, card)
 
 
 def sifted_logs(
@@ -257,18 +257,18 @@ def sifted_logs(
 
     names = list(recordings)
     accepted = [log_named(name, f"--accept {name}", names) for name in accept]
-    sifted = cross_validate(recordings, arm, accepted)
-    print_notes(odd_notes(sifted))
-    out = {log.name for log in sifted.left_out}
-    return {name: recordings[name] for name in names if name not in out}, sifted
+    validation = cross_validate(recordings, arm, accepted)
+    print_notes(odd_notes(validation))
+    out = {log.name for log in validation.left_out}
+    return {name: recordings[name] for name in names if name not in out}, validation
 
 
-def odd_notes(sifted: CrossValidation) -> list[str]:
+def odd_notes(validation: CrossValidation) -> list[str]:
     """A line on each log with far more alarms than the others, or with other torques throughout."""
     from tauguard.detectors.evaluation.card_page import times
 
     notes = []
-    for log in sifted.left_out:
+    for log in validation.left_out:
         cause = (
             f"a load (then give --payload {log.name}=KG or =unknown), another temperature"
             if log.throughout
@@ -276,19 +276,19 @@ def odd_notes(sifted: CrossValidation) -> list[str]:
         )
         notes.append(
             f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {_others(sifted.kept)}. Possible causes: {cause}, or a motion that they do not "
-            "show. The log is left out of the training; if nothing touched the arm, keep it with "
-            f"--accept {log.name}"
+            f"have {_others(validation.kept)}. Possible causes: {cause}, or a motion that they do "
+            "not show. The log is left out of the training; if nothing touched the arm, keep it "
+            f"with --accept {log.name}"
         )
     notes += [
         f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "
         "contact, the thresholds rise, and similar contacts are missed"
-        for log in sifted.accepted
+        for log in validation.accepted
     ]
     notes += [
         f"{log.name}: its torques differ throughout from those of the other logs: did the arm "
         f"carry something (then give --payload {log.name}=KG or =unknown)?"
-        for log in sifted.kept
+        for log in validation.kept
         if log.throughout
     ]
     return notes
@@ -300,13 +300,16 @@ def _others(logs: Sequence[CrossValidatedLog]) -> str:
 
 
 def show_card(
-    detector: FittedFreeMotion, traces: list[Trace], sifted: CrossValidation, target: Path | None
+    detector: FittedFreeMotion,
+    traces: list[Trace],
+    validation: CrossValidation,
+    target: Path | None,
 ) -> None:
     """Print the threshold card of the detector, and draw it if ``target`` is given."""
     from tauguard.detectors.evaluation.card_page import draw, text
     from tauguard.detectors.evaluation.threshold_card import threshold_card
 
-    found = threshold_card(detector, traces, sifted)
+    found = threshold_card(detector, traces, validation)
     print(text(found))
     if target is not None:
         draw(target, found)

@@ -150,7 +150,7 @@ def test_the_part_that_bursts_leave_unexplained_is_all_of_it(found):
     rows = log.moves[:, 2]
     left, torque = (np.linalg.norm(x[rows, 2]) for x in (log.left, log.torque))
     assert f"log: {100 * left / torque:.0f} % of the torque of" in str(caught.value)
-    assert np.linalg.norm(log.beside_swings()[rows, 2]) < 0.9 * left
+    assert np.linalg.norm(log.without_accelerations()[rows, 2]) < 0.9 * left
 
 
 def test_the_swing_is_the_largest_torque_of_accelerations_nearby(found):

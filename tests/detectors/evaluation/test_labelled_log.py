@@ -2,7 +2,7 @@
 
 import pytest
 
-from tauguard.detectors.evaluation.labelled_log import beside_labels, labels_text
+from tauguard.detectors.evaluation.labelled_log import compare_with_labels, labels_text
 from tauguard.traces import Alarm
 
 
@@ -13,7 +13,7 @@ def test_each_contact_is_found_held_or_missed() -> None:
         Alarm(6.0, 6.1),  # false
         Alarm(7.4, 7.5),  # of the last: 0.4 s after its onset, after its end
     ]
-    found = beside_labels(alarms, touched, 1.0, 10.0)
+    found = compare_with_labels(alarms, touched, 1.0, 10.0)
     assert (found["contacts"], found["found"], found["still_up"]) == (4, 2, 1)
     assert found["missed"] == [2.0]
     assert found["delays"] == pytest.approx([0.05, 0.4])
@@ -27,7 +27,7 @@ def test_each_contact_is_found_held_or_missed() -> None:
 
 
 def test_a_log_without_contacts_has_false_alarms_only() -> None:
-    found = beside_labels([Alarm(1.0, 1.1), Alarm(2.0, 2.1)], [], 0.0, 4.0)
+    found = compare_with_labels([Alarm(1.0, 1.1), Alarm(2.0, 2.1)], [], 0.0, 4.0)
     assert labels_text(found) == (
         "labels: 0 contacts, 0 found, 0 missed; 2 false alarms in the 4.0 s without contact"
     )
