@@ -41,7 +41,7 @@ TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
 
 
 class Priced(VecEnvWrapper):
-    """Rewards less lambda times the cost over the budget; keeps the costs of whole episodes."""
+    """Subtracts lambda * min(1, cost / budget) from rewards; keeps the costs of whole episodes."""
 
     def __init__(self, envs, budget):
         super().__init__(envs)

@@ -2,7 +2,7 @@
 
     python examples/moving_picture.py [PICTURE.gif]
 
-Eight times slower than real time around the strike. Needs an OpenGL that MuJoCo finds.
+It runs eight times slower than real time. It needs an OpenGL that MuJoCo finds.
 """
 
 import sys

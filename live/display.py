@@ -1,4 +1,4 @@
-"""Display in a separate thread: a slow viewer misses answers, but never delays the detector."""
+"""Display in a separate thread: a slow viewer misses results, but never delays the detector."""
 
 import threading
 from collections import deque
@@ -8,7 +8,7 @@ from typing import Self
 from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live.stream import Sample
 
-#: Largest number of queued answers; further ones are dropped. For changes of state it is doubled.
+#: Largest number of queued answers; further ones are dropped. Changes of state may use twice this.
 WAITING = 1000
 #: At the end, wait this long for answers that have not been shown [s].
 PATIENCE = 1.0

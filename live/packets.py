@@ -92,7 +92,7 @@ def _set(name: str, values: Callable[[Array, Rows], Array]) -> Change:
 
 
 def _held(*names: str) -> Change:
-    """A fault in which signals keep their last value before it."""
+    """A fault in which signals keep the value that they had before it."""
 
     def change(packets: Packets, rows: Rows) -> Packets:
         for name in names:
@@ -112,7 +112,7 @@ def _sent(chosen: Callable[[Rows, Rows], Rows]) -> Change:
 
 
 def _stuck(q: Array, rows: Rows) -> Array:
-    """Positions whose joint that moves most stays where it was."""
+    """Positions in which the joint that moves most keeps its last value."""
     held = q[rows]
     joint = int(np.argmax(np.ptp(held, axis=0)))
     held[:, joint] = _last(q, rows)[joint]

@@ -67,12 +67,12 @@ class RosStream(Closing):
         self._context = rclpy.Context()
         self._context.init()
         self._node = rclpy.create_node("tauguard_listen", context=self._context)
-        self._node.create_subscription(kind, topic, self._heard, qos.qos_profile_sensor_data)
+        self._node.create_subscription(kind, topic, self._on_message, qos.qos_profile_sensor_data)
         self._executor = executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         threading.Thread(target=self._executor.spin, daemon=True).start()
 
-    def _heard(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         """Queue the sample of a message; the executor calls this in its own thread."""
         try:
             found: Sample | ValueError = sample_of(message, self.joint_names, time.monotonic_ns())

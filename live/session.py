@@ -182,7 +182,7 @@ class _SilenceClock:
             self._session.add(sample, answer, latency, said)
             self._report(sample, said)
 
-    def _look(self) -> float:
+    def _check_silence(self) -> float:
         """Record and report a silence, if there is one. Returns the seconds to the next check."""
         with self._lock:
             since = time.monotonic() - self._last
@@ -202,7 +202,7 @@ class _SilenceClock:
             raise self._failed
 
     def _run(self) -> None:
-        while not self._over.wait(self._look()):
+        while not self._over.wait(self._check_silence()):
             pass
 
     def __enter__(self) -> Self:
@@ -212,7 +212,7 @@ class _SilenceClock:
     def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join()
-        self._look()  # a silence lasts until the end of the session
+        self._check_silence()  # a silence lasts until the end of the session
 
 
 def _no_report(sample: Sample, answer: Answer) -> None:

@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-#: The only address of both servers; the longest wait for the viewer [s].
-HOST, PATIENCE = "127.0.0.1", 20.0
+HOST = "127.0.0.1"  # the only address of both servers
+PATIENCE = 20.0  # longest wait for the viewer [s]
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
 #: Content security policy: pages run no script, which could send data to another host, and load
@@ -132,7 +132,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     def _own_file(self) -> bool:
         """Whether the path is a regular file inside the folder, not behind a symbolic link."""
         file, folder = Path(self.translate_path(self.path)), Path(self.directory)
-        if self.path.partition("?")[0] == "/":  # the only name of the folder
+        if self.path.partition("?")[0] == "/":  # this is the only URL of the folder
             file = folder / "index.html"
         if file.suffix not in SERVED or not file.is_relative_to(folder):
             return False
@@ -171,7 +171,7 @@ def _free_port() -> int:
 
 
 def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
-    """Start rerun's web viewer and wait for it; the file keeps it from opening a data port."""
+    """Start rerun's web viewer and wait until it answers. With a file it opens no data port."""
     program = Path(sys.executable).with_name("rerun")
     options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"{files}/none.rrd"]
     quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}

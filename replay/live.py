@@ -19,8 +19,8 @@ from tauguard.replay.estimates import arrow
 from tauguard.replay.robot import bodies, sheets
 from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, entity, log_shapes
 
-#: The only address that the viewer listens on; the longest wait for it [s].
-HOST, PATIENCE = "127.0.0.1", 20.0
+HOST = "127.0.0.1"  # the only address that the viewer listens on
+PATIENCE = 20.0  # longest wait for the viewer [s]
 #: Message if the viewer was closed, or began to listen and then found no display.
 GONE = "the rerun viewer ended; without a display use --save FILE.rrd"
 #: Radius of a target's mark [m].

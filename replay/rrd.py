@@ -114,7 +114,7 @@ def written(path: Path, application: str) -> Iterator[Any]:
 
 
 def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
-    """Send the layout before any data: it tells the viewer not to play at once.
+    """Send the layout before any data, because it tells the viewer not to play at once.
 
     Without the flush a busy machine may write data first.
     """

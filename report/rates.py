@@ -19,7 +19,7 @@ def rate(successes: int, trials: int) -> dict[str, Any]:
     n, share, z = int(trials), int(successes) / int(trials), float(ndtri(0.975))
     middle = (2 * n * share + z**2) / (2 * (n + z**2))
     side = z / (2 * (n + z**2)) * math.sqrt(4 * n * share * (1 - share) + z**2)
-    # The exact bounds at the ends; rounding would leave 1e-17 there.
+    # At the ends the bounds are exactly 0 or 1; rounding would leave 1e-17.
     low = 0.0 if successes == 0 else middle - side
     high = 1.0 if successes == trials else middle + side
     return {"value": successes / trials, "low": low, "high": high, "n": trials}

@@ -21,8 +21,8 @@ PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
 TURNING = (0.005, 0.1)
 #: Prior of the gear ratio.
 GEAR = 101.0
-#: Least half width of an interval, relative to the largest value of any joint, for the error of the
-#: friction law.
+#: Least half width of an interval, relative to the largest value of any joint. It covers the error
+#: of the form of the friction law.
 FORM = 0.02
 #: Length of the running median of the model's error, in samples.
 MEDIAN = 9

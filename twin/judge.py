@@ -25,9 +25,10 @@ from tauguard.traces import Trace
 from tauguard.twin.play import played, residual_of
 from tauguard.twin.signals import SLOW
 
-#: Length of a classifier's window, of a span whose peak is used, and of a group of windows in one
-#: fold; time at a log's beginning that is left out, because the estimator settles [s].
-WINDOW, SPAN, GROUP, BEGIN = 0.2, 0.5, 5.0, 1.0
+WINDOW = 0.2  # length of a classifier's window [s]
+SPAN = 0.5  # length of a span whose peak is used [s]
+GROUP = 5.0  # length of a group of windows that are in one fold [s]
+BEGIN = 1.0  # time at a log's beginning that is left out, because the estimator settles [s]
 #: Units of position [rad] and velocity [rad/s] in the distance between two windows.
 PLACE, SPEED = 0.1, 0.2
 #: Two windows repeat a motion if their distance is below ALIKE and the time between them is above
@@ -35,8 +36,8 @@ PLACE, SPEED = 0.1, 0.2
 ALIKE, APART, REPEATED = 2.0, 1.5, 1.0
 #: Least duration for a root mean square [s].
 SHORTEST = 1.0
-#: Least number of windows of each kind for an area under a curve, and number of folds.
-FEWEST, FOLDS = 40, 5
+FEWEST = 40  # least number of windows of each kind for an area under a curve
+FOLDS = 5  # number of folds
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +55,8 @@ class Likeness:
     logistic regression; 0.5: they cannot distinguish them."""
     standing_auc: tuple[float, float]
     programs_auc: tuple[float, float]
-    """Areas for real residuals of these logs and of the logs from which the twin was identified,
-    moving; 0.5 if the errors in both are alike. NaN if the latter logs are not given."""
+    """Areas for classifiers of real residuals in motion: these logs against the logs from which the
+    twin was identified. 0.5: the errors in both are alike. NaN: the latter logs are not given."""
     real_residuals: tuple[Array, ...]  #: of each log [N m]
     twin_residuals: tuple[Array, ...]
     times: tuple[Array, ...]  #: of the residuals [s]
@@ -125,8 +126,8 @@ def compare(
         _peaks(twin, standing) / _peaks(real, standing),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        told_apart(real, twin, False, seed),
-        told_apart(real, twin, True, seed),
+        classifier_areas(real, twin, False, seed),
+        classifier_areas(real, twin, True, seed),
         _programs_auc([track(arm, trace) for trace in own], real, seed),
         tuple(one.residual for one in real),
         tuple(one.residual for one in twin),
@@ -281,7 +282,7 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
     return before, repeated
 
 
-def told_apart(
+def classifier_areas(
     real: Sequence[Track], twin: Sequence[Track], still: bool, seed: int
 ) -> tuple[float, float]:
     """Areas under the curves of two classifiers of windows of real and simulated residuals.
@@ -302,7 +303,7 @@ def told_apart(
 
 
 def _programs_auc(own: Sequence[Track], real: Sequence[Track], seed: int) -> tuple[float, float]:
-    """Areas for moving windows of real residuals in the twin's own logs and in held-out logs."""
+    """Areas for moving windows of real residuals: the twin's own logs against held-out logs."""
     logs = [*own, *real]
     windows = _windows(logs, False)
     labels = np.array([float(log >= len(own)) for log, _ in windows])

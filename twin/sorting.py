@@ -43,7 +43,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         odd.append(rest[found[0]])
     rest = [k for k in range(len(told)) if k not in odd]
     if len(rest) >= 4:
-        side = _two_sides(errors, rest)
+        side = _split_in_two(errors, rest)
         if side is not None:
             one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
             raise ValueError(
@@ -76,7 +76,7 @@ def _errors(arm: ArmModel, recordings: Sequence[Recording]) -> Errors:
     return error
 
 
-def _two_sides(errors: Errors, logs: Sequence[int]) -> Bools | None:
+def _split_in_two(errors: Errors, logs: Sequence[int]) -> Bools | None:
     """Whether each log is of the second of two arms, shape (len(logs),); None: all are of one.
 
     As in k-means, each log is moved to the group whose other logs predict it better, in turn.

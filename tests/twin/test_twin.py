@@ -12,7 +12,7 @@ from tauguard.twin import compare, identify_twin, with_intervals
 from tauguard.twin.description import write_twin
 from tauguard.twin.drive_fit import fit_friction
 from tauguard.twin.identify import USUAL, left_over, turned
-from tauguard.twin.judge import Track, told_apart
+from tauguard.twin.judge import Track, classifier_areas
 from tauguard.twin.play import friction_torque, modelled
 from tauguard.twin.signals import Motion, bridged_stop, motion_of, quantum, without_gaps
 from tests.detectors.synthetic_arm import (
@@ -227,10 +227,10 @@ def test_a_cycle_that_repeats_does_not_tell_two_draws_of_one_process_apart():
     a, b = cycle(1, places=10), cycle(2, places=11)
     elsewhere = replace(a, motion=1000 * a.t[:, None])
     # Were no place met twice, the classifier would be tested on what it learned there.
-    assert told_apart([elsewhere], [b], False, 0)[0] > 0.9
-    assert abs(told_apart([a], [b], False, 0)[0] - 0.5) < 0.15
+    assert classifier_areas([elsewhere], [b], False, 0)[0] > 0.9
+    assert abs(classifier_areas([a], [b], False, 0)[0] - 0.5) < 0.15
 
 
 def test_a_difference_at_all_places_of_a_cycle_is_found():
     a, b = cycle(1, places=10), cycle(2, places=11, shake=0.45)
-    assert told_apart([a], [b], False, 0)[0] > 0.95
+    assert classifier_areas([a], [b], False, 0)[0] > 0.95
