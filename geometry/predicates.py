@@ -1,4 +1,4 @@
-"""Exact signs of orientation: a floating-point filter (Shewchuk 1997), then exact dyadic numbers."""
+"""Exact signs of orientation: a floating-point filter (Shewchuk 1997), then dyadic numbers."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -76,8 +76,8 @@ def load_line(begin: float | None, end: float | None) -> str:
     if max(known) <= BUSY * cores:
         return text
     return (
-        f"{text}: busy machine: times are too long, and their ratios inaccurate; measure again on an "
-        "idle machine; errors are not affected"
+        f"{text}: busy machine: times are too long, and their ratios inaccurate; measure again on "
+        "an idle machine; errors are not affected"
     )
 
 

@@ -15,8 +15,9 @@ def two_cores(monkeypatch):
 
 @pytest.mark.parametrize(("begin", "end"), [(7.9, 1.0), (0.1, 2 * BUSY + 0.1), (None, 3.0)])
 def test_times_of_a_busy_machine_are_not_to_be_trusted(begin, end):
-    assert "times are too long and their ratios rough, measure again on an idle one" in load_line(
-        begin, end
+    assert (
+        "times are too long, and their ratios inaccurate; measure again on an idle machine"
+        in load_line(begin, end)
     )
 
 
