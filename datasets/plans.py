@@ -65,7 +65,7 @@ def collision_plans(
 
 
 def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
-    """Length of an episode that holds ``collisions`` slots [s]."""
+    """Length of an episode with this number of collisions, each in a slot of ``SLOT`` [s]."""
     return begin + SLOT * collisions + 0.5
 
 

@@ -133,7 +133,7 @@ class _Found:
 
     times: list[str]
     groups: dict[str, tuple[str, ...]]  #: columns by signal
-    joints: tuple[str, ...]  #: the joints of the positions, if names tell them
+    joints: tuple[str, ...]  #: joints of the position columns, if the columns' names contain them
     lacks: str  #: what is missing for a map; empty: nothing
 
     @property

@@ -196,10 +196,10 @@ def explained(
     error, whole = (float(np.sqrt(x[worst] / max(rows[worst], 1))) for x in (left, torque))
     said = (
         f"{100 * fraction[worst]:.0f} % of the torque of {joints[worst]} in motion is not "
-        f"explained ({error:.2g} N m of {whole:.2g} N m, root mean square): friction that "
-        "changes with temperature, a load that was not named (--payload), contacts (nothing may "
-        "touch the arm in these logs), another arm's robot file, or wrong order, signs, units "
-        "(milliamperes?) or gains of the currents or torques"
+        f"explained ({error:.2g} N m of {whole:.2g} N m, root mean square); possible causes: "
+        "friction that changes with temperature, a load that was not named (--payload), contacts "
+        "(nothing may touch the arm in these logs), another arm's robot file, or wrong order, "
+        "signs, units (milliamperes?) or gains of the currents or torques"
     )
     if fraction[worst] > limit:
         raise ValueError(said)

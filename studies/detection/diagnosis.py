@@ -1,10 +1,10 @@
-"""After the alarm: which link, which force, where, and what kind of event, against the truth.
+"""Errors of the diagnosis after an alarm: link, force, point and kind of the event.
 
 Four methods are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis. ``exposed``: the same, where nothing can reach link 1. ``usual``, the peer: the link of
-the last joint with a significant residual, and the damped least-squares force at the middle of that
-link. ``exact``: ``surface`` with the true external torque; the errors that remain are due to other
-contacts that explain the same torques.
+hypothesis. ``exposed``: the same without the points of link 1, which nothing can reach. ``usual``,
+for comparison: the link of the last joint with a significant residual, and the damped least-squares
+force at the middle of that link. ``exact``: ``surface`` with the true external torque; the
+remaining errors are due to other contacts that explain the same torques.
 """
 
 from collections.abc import Sequence

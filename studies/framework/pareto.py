@@ -40,7 +40,7 @@ def svg(points: Sequence[Point]) -> str:
 
 
 def draw_points(points: Iterable[Point], figure: Any) -> None:
-    """A panel for each question whose points have an error."""
+    """Draw a panel for each ``Point.question`` that has points with a known error."""
     shown = groups([p for p in points if not math.isnan(p.error)], lambda p: p.question)
     if not shown:
         figure.text(0.5, 0.5, NOTHING, ha="center")

@@ -58,7 +58,7 @@ def all_parts() -> dict[str, Part]:
 
 
 def find(name: str) -> dict[str, Part]:
-    """Find parts by the name of a study, which gives all its parts, by a full name or by an alias.
+    """Find one part by its full name or alias, or all parts of a study by the name of the study.
 
     Raises:
         ValueError: no study or part has that name. The message suggests the nearest name or lists

@@ -59,7 +59,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 
 def impact_rows(rng: np.random.Generator, kind: str, n: int) -> list[Row]:
-    """Times and errors of ``time_of_impact``, and of advancement over coal's distance."""
+    """Times and errors of ``time_of_impact``, and of advancement that uses coal's distances."""
     a, b, ma, mb = moving_pairs(rng, kind, n)
     early, touch = bracket(a, b, ma, mb)
 

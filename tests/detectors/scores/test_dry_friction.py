@@ -45,7 +45,7 @@ def test_what_free_motion_seldom_exceeds_counts_one_at_most(dry):
     """Heavy tails widen the unit of the windows, joint by joint; others leave it as it is."""
     front = FrontEndSettings().fit(dry, nominal.nominal_arm(dry))
     detector = SrqSvr()
-    found = detector.bare(dry, front)
+    found = detector.initial_scaling(dry, front)
     signal = np.concatenate([np.abs(front.scaled(t, found)[free_rows(t, 3.0)]) for t in dry])
     most = np.quantile(signal, 0.999, axis=0)
     wider = found.noise_model.weights[list(found.joints), 0] / front.arm.noise_model.weights[:4, 0]
