@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.envs.episodes.episode import CollisionPlan
+from tauguard.envs.episodes.labels import homogeneous
 from tauguard.envs.episodes.motions import Motion
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.models import Scene
@@ -78,7 +79,7 @@ class Aim:
             for body in scene.link_bodies
         ]
         #: Direction of each geom's axis in its body.
-        self._lines = np.array([_matrix(quat)[2::3] for quat in model.geom_quat])
+        self._lines = homogeneous(model.geom_pos, model.geom_quat)[:, :3, 2]
         self._still = np.abs(motion.qd).max(axis=1) <= 1e-9
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
@@ -275,13 +276,6 @@ class Aim:
         along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
         reach = (-along).max(axis=0)
         return np.asarray((reach >= CLAMP_TRAVEL[0]) & (reach <= CLAMP_TRAVEL[1]))
-
-
-def _matrix(quat: Array) -> Array:
-    """The rotation matrix of a quaternion (wxyz), row by row, shape (9,)."""
-    turned = np.zeros(9)
-    mujoco.mju_quat2Mat(turned, quat)
-    return turned
 
 
 def pulse_wrench(

@@ -36,10 +36,6 @@ class Wrenches:
         wrenches.point[rows] = felt[:, :, 7:10]
         return wrenches
 
-    def at(self, rows: NDArray[np.intp]) -> Wrenches:
-        """The wrenches of some samples."""
-        return Wrenches(self.force[rows], self.torque[rows], self.point[rows])
-
     def rows(self) -> NDArray[np.intp]:
         """The samples with a force or a torque on some link, shape (K,)."""
         return np.flatnonzero(self.pushed().any(axis=1))
@@ -51,7 +47,7 @@ class Wrenches:
 
 
 def homogeneous(positions: Array, quaternions: Array) -> Array:
-    """Matrices (T, k, 4, 4) of positions, shape (T, k, 3), and quaternions (wxyz), (T, k, 4)."""
+    """Matrices (..., 4, 4) of positions, shape (..., 3), and quaternions (wxyz), (..., 4)."""
     w, x, y, z = np.moveaxis(quaternions, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
@@ -167,12 +167,6 @@ class AlongMotion:
     motion: Motion
     feed_forward: Array  #: torque at every row [N m], shape (T, n)
     recorded: Rollout  #: states at all rows of the motion
-
-    def without_obstacles(self, loop: SimulationLoop) -> AlongMotion:
-        """The same motion in a loop of the same arm that records no contacts and obstacles."""
-        states = self.recorded
-        states = replace(states, contact=states.contact[:, :0], poses=states.poses[:, :0])
-        return replace(self, loop=loop, recorded=states)
 
     def __call__(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1

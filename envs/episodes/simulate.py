@@ -177,7 +177,9 @@ class Simulation:
         bare = scene_for(replace(self.episode, collisions=()), visuals=False)
         loop = SimulationLoop(replace(bare, drive=self.scene.drive), self.nominal)
         loop.reset(self.motion.q[0])
-        return whole.without_obstacles(loop)
+        states = self._rollout
+        states = replace(states, contact=states.contact[:, :0], poses=states.poses[:, :0])
+        return replace(whole, loop=loop, recorded=states)
 
     def run(self) -> Trace:
         """Simulate the whole episode."""

@@ -206,7 +206,7 @@ class Striking:
             else labels.Wrenches.from_contacts(rollout.contact)
         )
         rows = wrenches.rows()
-        felt = wrenches.at(rows)
+        felt = labels.Wrenches(*(part[rows] for part in vars(wrenches).values()))
         tau = labels.external_torque(self._poses, rollout.q[rows], felt)
         peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
         peak_force = float(np.linalg.norm(felt.force, axis=2).max(initial=0.0))
