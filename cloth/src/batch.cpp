@@ -185,10 +185,10 @@ TAUGUARD_INLINE Cut cut(const Group* groups, std::int32_t* queries, int n, Piece
       found.left += !(sure >> i & 1);
       found.clear += (sure & ~roots[0] & ~roots[1]) >> i & 1;
       for (int k = 0; k < 2; ++k) {
-        if (!((sure & roots[k]) >> i & 1)) continue;
-        Piece& piece = pieces[found.pieces++];
+        Piece& piece = pieces[found.pieces];  // counted only if it has a root
         piece = {k ? at[i] : 0, k ? 1 - at[i] : at[i], {}, query};
         for (int j = 0; j < 4; ++j) piece.cubic[j] = part[k].b[j][i];
+        found.pieces += (sure & roots[k]) >> i & 1;
       }
     }
   }

@@ -62,7 +62,7 @@ struct BatchKernels {
   void (*at_start)(bool vf, const Ends& x, const std::int32_t* rows, const std::int32_t* queries,
                    int n, AtStart* found);
   // Cuts the cubics of n queries (indices into the groups) once. Queries that need more cuts are
-  // moved to the front of `queries`.
+  // moved to the front of `queries`. `pieces` has room for 2 n + 1.
   Cut (*cut)(const Group* groups, std::int32_t* queries, int n, Piece* pieces);
   // For each piece: a time at most 2^-32 before the contact at its root, or `never`, `edge` or
   // `unknown`. Writes toi up to a multiple of `width`.
