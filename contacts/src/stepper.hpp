@@ -50,9 +50,8 @@ struct Settings {
   int most;
   double beyond, room, smallest, push;
   int watched, look;
-  double deeper_geom, deeper_flex, turned, allowed;
-  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper_geom,
-                  deeper_flex, turned, allowed)
+  double deeper, turned, allowed;
+  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper, turned, allowed)
 };
 
 // What a guard covers.
