@@ -48,6 +48,30 @@ TAUGUARD_INLINE bool all_eight(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)
 TAUGUARD_INLINE double largest(Double4 x) {
   return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
 }
+// Rows first, ..., first + 3 of `count` vectors side by side; a row beyond the last repeats it.
+TAUGUARD_INLINE Vec3x4 lanes_of(const Vec3* rows, std::size_t count, std::size_t first) {
+  const auto at = [&](std::size_t i) { return rows[std::min(first + i, count - 1)]; };
+  const Vec3 p = at(0), q = at(1), r = at(2), s = at(3);
+  return {Double4{p.x, q.x, r.x, s.x}, Double4{p.y, q.y, r.y, s.y}, Double4{p.z, q.z, r.z, s.z}};
+}
+TAUGUARD_INLINE Vec3 lane_of(const Vec3x4& v, int lane) {
+  return {v.x[lane], v.y[lane], v.z[lane]};
+}
+
+// The least and the greatest projection of points on four vectors.
+struct Range4 {
+  Double4 low, high;
+};
+template <class Points>
+TAUGUARD_INLINE Range4 range(const Points& points, const Vec3x4& n) {
+  Range4 r{splat(INFINITY), splat(-INFINITY)};
+  for (const Vec3& p : points) {
+    const Double4 x = dot(n, Vec3x4{splat(p.x), splat(p.y), splat(p.z)});
+    r.low = min(x, r.low), r.high = max(x, r.high);
+  }
+  return r;
+}
+
 // Cyclic shifts. Lane k of the result is lane k + 1 (turn1) or k + 2 (turn2) of four lanes; next3
 // shifts the first three lanes by one.
 TAUGUARD_INLINE Double4 turn1(Double4 x) { return __builtin_shufflevector(x, x, 1, 2, 3, 0); }

@@ -123,25 +123,13 @@ class FacetDepth {
     const Double4 scale = 1 / length;
     f.normal = scale * c;
     f.slack = spans ? 0x1p-46 * (both * scale) * size_ : Double4{};
-    const Range ra = range(a_, f.normal), rb = range(b_, f.normal);
+    const Range4 ra = range(a_, f.normal), rb = range(b_, f.normal);
     f.top[0] = spans ? ra.high - rb.low : splat(INFINITY);
     f.top[1] = spans ? rb.high - ra.low : splat(INFINITY);
     const Double4 least = min(f.top[0], f.top[1]);
     apart = any(least < -f.slack);
     way = std::min(way, -largest(-least));
     return all(least > f.slack);
-  }
-
-  struct Range {
-    Double4 low, high;
-  };
-  static TAUGUARD_INLINE Range range(const Points<double>& points, const Vec3x4& n) {
-    Range r{splat(INFINITY), splat(-INFINITY)};
-    for (const Vec3& p : points) {
-      const Double4 x = dot(n, Vec3x4{splat(p.x), splat(p.y), splat(p.z)});
-      r.low = min(x, r.low), r.high = max(x, r.high);
-    }
-    return r;
   }
 
   // The least lower bound of all facets that have one below `way`. Sets `normal`.

@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "advancement.hpp"
+#include "convex_lanes.hpp"
 #include "tauguard/geometry/interrupt.hpp"
 #include "tauguard/rigid/distance.hpp"
 
@@ -46,22 +47,22 @@ double separation_along(const MovingBody& a, const MovingBody& b, const Vec3& n)
   return least(b.now, n) - most(a.now, n) - rounding(a, b);
 }
 
-// Tries the unit vectors n and -n. True if one of them separates the bodies more than `best` and
-// replaces it.
-bool consider(const MovingBody& a, const MovingBody& b, const Vec3& n, Axis* best) {
-  double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY;
-  for (const Vec3& p : a.now) {
-    const double x = dot(n, p);
-    a_lo = std::min(a_lo, x), a_hi = std::max(a_hi, x);
+// Tries those of four unit vectors that are `regular`, and their opposites. The first one that
+// separates the bodies most, and more than `best`, replaces `best`. Returns the lane, or -1.
+TAUGUARD_INLINE int consider(const MovingBody& a, const MovingBody& b, const Vec3x4& n,
+                             Mask4 regular, Axis* best) {
+  const Range4 ra = range(a.now, n), rb = range(b.now, n);
+  const Double4 forward = rb.low - ra.high - rounding(a, b),
+                backward = ra.low - rb.high - rounding(a, b), both = max(forward, backward);
+  int chosen = -1;
+  if (!any(regular & (both > best->separation))) return chosen;
+  for (int lane = 0; lane < 4; ++lane) {
+    if (!regular[lane] || !(both[lane] > best->separation)) continue;
+    chosen = lane;
+    const bool ahead = forward[lane] >= backward[lane];
+    *best = {(ahead ? 1.0 : -1.0) * lane_of(n, lane), {}, both[lane]};
   }
-  for (const Vec3& p : b.now) {
-    const double x = dot(n, p);
-    b_lo = std::min(b_lo, x), b_hi = std::max(b_hi, x);
-  }
-  const double forward = b_lo - a_hi - rounding(a, b), backward = a_lo - b_hi - rounding(a, b);
-  if (!(std::max(forward, backward) > best->separation)) return false;
-  *best = forward >= backward ? Axis{n, {}, forward} : Axis{-1.0 * n, {}, backward};
-  return true;
+  return chosen;
 }
 
 // The rate of change of v / |v|, where v is the vector between the nearest points of the hulls and
@@ -97,7 +98,7 @@ Axis nearest_axis(const MovingBody& a, const MovingBody& b) {
   return {n, norm(rate) < HUGE_VAL ? rate : Vec3{}, separation_along(a, b, n)};
 }
 
-Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
+TAUGUARD_CLONES Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   Axis best;
   if (rounding(a, b) > 0) {
     best = nearest_axis(a, b);
@@ -105,16 +106,17 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   }
   int chosen = -1;  // 0: turns with a, 1: with b, 2: crossed edges x, y
   Vec3 x{}, y{};
-  for (const Vec3& n : a.normal)
-    if (consider(a, b, n, &best)) chosen = 0;
-  for (const Vec3& n : b.normal)
-    if (consider(a, b, n, &best)) chosen = 1;
+  for (const MovingBody* body : {&a, &b})
+    for (std::size_t i = 0; i < body->normal.size(); i += 4)
+      if (consider(a, b, lanes_of(body->normal.data(), body->normal.size(), i), ~Mask4{}, &best) >=
+          0)
+        chosen = body == &b;
   for (const Vec3& ea : a.edge)
-    for (const Vec3& eb : b.edge) {
-      const Vec3 n = cross(ea, eb);
-      const double square = dot(n, n);
-      if (square > 1e-24 && consider(a, b, (1 / std::sqrt(square)) * n, &best))
-        chosen = 2, x = ea, y = eb;
+    for (std::size_t j = 0; j < b.edge.size(); j += 4) {
+      const Vec3x4 n = cross(lanes_of(&ea, 1, 0), lanes_of(b.edge.data(), b.edge.size(), j));
+      const Double4 square = dot(n, n);
+      const int lane = consider(a, b, (1 / sqrt(square)) * n, square > 1e-24, &best);
+      if (lane >= 0) chosen = 2, x = ea, y = b.edge[std::min(j + lane, b.edge.size() - 1)];
     }
   if (best.separation <= enough && !(a.complete && b.complete)) {
     Axis other;
