@@ -32,7 +32,7 @@ KINDS = (
 
 
 #: Fields of MjData that determine the kinematics of a state.
-_POSE = int(
+POSE = int(
     mujoco.mjtState.mjSTATE_QPOS
     | mujoco.mjtState.mjSTATE_MOCAP_POS
     | mujoco.mjtState.mjSTATE_MOCAP_QUAT
@@ -85,7 +85,7 @@ class State:
                 slow in a loop.
         """
         scratch = mujoco.MjData(model) if scratch is None else scratch
-        mujoco.mj_copyState(model, data, scratch, _POSE)
+        mujoco.mj_copyState(model, data, scratch, POSE)
         mujoco.mj_kinematics(model, scratch)
         if not model.nflex:
             vertices = _NO_VERTICES

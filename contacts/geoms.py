@@ -5,6 +5,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
@@ -51,20 +52,23 @@ def geom_name(model: Any, geom: int) -> str:
 
 
 def hull_vertices(model: Any, geom: int) -> Array:
-    """Vertices of a mesh geom's convex hull, in the geom's frame. Shape (V, 3), m.
+    """Vertices of a mesh geom's convex hull, in the geom's frame. Shape (V, 3), m."""
+    rows = hull_rows(model, int(model.geom_dataid[geom]))
+    return np.asarray(model.mesh_vert[rows], dtype=np.float64)
 
-    MuJoCo stores the graph of the hull in ``mjModel.mesh_graph``. For a mesh without a graph all
-    vertices are returned; they have the same hull.
+
+def hull_rows(model: Any, mesh: int) -> NDArray[np.int64]:
+    """Rows of ``mjModel.mesh_vert`` that are vertices of the convex hull of a mesh.
+
+    MuJoCo stores the graph of the hull in ``mjModel.mesh_graph``. For a mesh without a graph the
+    rows of all its vertices are returned; they have the same hull.
     """
-    mesh = int(model.geom_dataid[geom])
-    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices = np.asarray(model.mesh_vert[start : start + count], dtype=np.float64)
-    graph = int(model.mesh_graphadr[mesh])
+    start, graph = int(model.mesh_vertadr[mesh]), int(model.mesh_graphadr[mesh])
     if graph < 0:
-        return vertices
+        return np.arange(start, start + int(model.mesh_vertnum[mesh]))
     number = int(model.mesh_graph[graph])
-    ids = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
-    return np.asarray(vertices[ids], dtype=np.float64)
+    local = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
+    return start + np.asarray(local, dtype=np.int64)
 
 
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:

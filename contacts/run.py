@@ -39,13 +39,7 @@ class Run:
     states: list[State] = field(default_factory=list)
 
     def recording(self) -> dict[str, Any]:
-        """Arguments of :func:`tauguard.replay.contacts.write_contacts_rrd`, except the notes.
-
-        Raises:
-            ValueError: the states were not kept.
-        """
-        if len(self.states) != len(self.times):
-            raise ValueError("the states were not kept; call compare(..., keep=True)")
+        """Arguments of :func:`tauguard.replay.contacts.write_contacts_rrd`, except the notes."""
         count = len(self.times)
         return {
             "model": self.model,

@@ -13,6 +13,7 @@ from typing import Any
 import mujoco
 from mujoco.introspect import ast_nodes
 
+from tauguard.contacts.checker import POSE
 from tauguard.models.mujoco_library import function_address, variable_address
 
 #: MuJoCo's functions, by their names in the native guard.
@@ -45,12 +46,6 @@ REFUSED = {
     "speculative": mujoco.mjtEnableBit.mjENBL_SPECULATIVE,
     "sleep": mujoco.mjtEnableBit.mjENBL_SLEEP,
 }
-#: Parts of the state that determine the kinematics.
-POSE = int(
-    mujoco.mjtState.mjSTATE_QPOS
-    | mujoco.mjtState.mjSTATE_MOCAP_POS
-    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
-)
 #: Parts of the state that determine a step.
 INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
+from tauguard.contacts.geoms import hull_rows
 from tauguard.contacts.guard.engine import PHYSICS
 
 #: Fields that determine the pairs.
@@ -70,7 +71,7 @@ def followed_fields(model: Any, options: Regions) -> Regions:
         if array.size:
             out.append((array.ctypes.data, array.nbytes))
     vertices = model.mesh_vert
-    for row in hull_rows(model).tolist():
+    for row in _hull_rows(model).tolist():
         out.append((vertices[row].ctypes.data, vertices[row].nbytes))
     return out
 
@@ -110,17 +111,11 @@ def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
             )
 
 
-def hull_rows(model: Any) -> NDArray[np.int64]:
+def _hull_rows(model: Any) -> NDArray[np.int64]:
     """Rows of ``mesh_vert`` that are vertices of the hulls of mesh geoms, sorted."""
-    rows = []
     kinds = np.array(geom_kinds(model))
-    for mesh in np.unique(model.geom_dataid[kinds == "mesh"]).tolist():
-        start, graph = int(model.mesh_vertadr[mesh]), int(model.mesh_graphadr[mesh])
-        local = np.arange(int(model.mesh_vertnum[mesh]))
-        if graph >= 0:
-            number = int(model.mesh_graph[graph])
-            local = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
-        rows.append(start + np.unique(local).astype(np.int64))
+    meshes = np.unique(model.geom_dataid[kinds == "mesh"]).tolist()
+    rows = [np.unique(hull_rows(model, mesh)) for mesh in meshes]
     return np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
 
 
@@ -177,7 +172,7 @@ def refuse_values(model: Any) -> None:
         _refuse_rows(model, name, _not_unit, "not of unit length")
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     _refuse_rows(model, "geom_size", lambda rows: (rows < 0) & ~plane[:, None], "negative")
-    hulls = hull_rows(model)
+    hulls = _hull_rows(model)
     for row in hulls[~np.isfinite(model.mesh_vert[hulls]).all(axis=1)].tolist():
         raise ValueError(f"mesh_vert: row {row} is {model.mesh_vert[row].tolist()}, not finite")
 

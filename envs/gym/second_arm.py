@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
+from typing import TypeVar
 
 import mujoco
 import numpy as np
 
 from tauguard.envs.gym.placing import SECOND
-from tauguard.models import Drive, Scene
+from tauguard.models import Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
+from tauguard.models.left_over import LeftOver
 from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
 from tauguard.models.scene import _add_label, label_region, lean_model, people_parts, region_names
@@ -18,6 +20,9 @@ from tauguard.models.scene import _add_label, label_region, lean_model, people_p
 APART = 1.1
 #: Name of the sensor of the force between the arms.
 ARMS = "contact_arms"
+#: Arrays of a drive's parts that all joints share.
+_SHARED = ("cycles", "slope_velocity", "log")
+T = TypeVar("T")
 
 
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
@@ -102,23 +107,13 @@ def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
     )
 
 
-def both_drives(drive: Drive) -> Drive:
-    """The drives of two equal arms, one after the other."""
-    parts: dict[str, object] = {}
-    for field in fields(drive):
-        value = getattr(drive, field.name)
-        if isinstance(value, np.ndarray):
-            parts[field.name] = np.concatenate([value, value])
-        elif value is not None and not isinstance(value, float):
-            parts[field.name] = _doubled(value)
-    return replace(drive, **parts)  # type: ignore[arg-type]
-
-
-def _doubled(part: object) -> object:
-    """Friction, ripple or sensors of both arms; all joints share the array ``cycles``."""
-    rows = {
-        field.name: np.concatenate([value, value])
-        for field in fields(part)  # type: ignore[arg-type]
-        if isinstance(value := getattr(part, field.name), np.ndarray) and field.name != "cycles"
-    }
-    return replace(part, **rows)  # type: ignore[type-var]
+def both_drives(part: T) -> T:
+    """The drives (or a part of them) of two equal arms, one after the other."""
+    both: dict[str, object] = {}
+    for field in fields(part):  # type: ignore[arg-type]
+        value = getattr(part, field.name)
+        if is_dataclass(value):
+            both[field.name] = both_drives(value)
+        elif isinstance(value, np.ndarray) and field.name not in _SHARED:
+            both[field.name] = np.concatenate([value, value], int(isinstance(part, LeftOver)))
+    return replace(part, **both)  # type: ignore[type-var]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from oracles.recorded_collisions import FRAMES, keys, load_frame
 from studies.cloth import shared
-from studies.cloth.shared import CLOTHS, Step, scaled
-from studies.framework import answer, table_rows, time_in_turn, timed
+from studies.cloth.shared import CLOTHS, Step
+from studies.framework import answer, per, table_rows, time_in_turn, timed
 from tauguard.cloth import Frame as FrameAnswer
 from tauguard.cloth import Groups
 from tauguard.cloth.comparators import METHODS
@@ -106,7 +106,7 @@ def _methods(frame: Frame, repeats: int) -> list[Row]:
                 "triangles": len(frame.faces),
                 "method": entry[0],
                 "volume": entry[1],
-                "frame_ms": scaled(time, 1e3),
+                "frame_ms": per(time, 1, 1e3),
                 "times_ab2pf": time["median"] / ours,
                 "candidates": found.stats.vf["candidates"] + found.stats.ee["candidates"],
                 "ab2pf_hits": len(reference.vf) + len(reference.ee),
@@ -180,11 +180,11 @@ def _peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row
                 "scene": frame.name,
                 "peer": f"ipctk LBVH + {name}",
                 "peer_candidates": sum(map(len, lists.values())),
-                "broad_ms": scaled(times["LBVH"], 1e3),
+                "broad_ms": per(times["LBVH"], 1, 1e3),
                 "vf_ns": 1e9 * seconds["fv"],
                 "ee_ns": 1e9 * seconds["ee"],
                 "peer_ms": 1e3 * total,
-                "ab2pf_ms": scaled(times["ours"], 1e3),
+                "ab2pf_ms": per(times["ours"], 1, 1e3),
                 "speedup": total / times["ours"]["median"],
             }
         )

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from oracles.recorded_collisions import KINDS, QUERY_SETS, load_frame, load_queries
 from studies.cloth import shared
 from studies.cloth.shared import Step, narrow_phases
-from studies.framework import answer, groups, table_rows, time_in_turn, timed
+from studies.framework import answer, groups, per, table_rows, time_in_turn, timed
 from tauguard.cloth import MeshCCD
 from tauguard.cloth.comparators import METHODS, solve
 from tauguard.cloth.scenes import SCENES
@@ -154,7 +154,7 @@ def _methods(
                 "method": method,
                 "n": n,
                 "of": len(queries.rows),
-                "ns": {key: 1e9 * value / n for key, value in times[method].items()},
+                "ns": per(times[method], n),
                 "misses": rate(int((hit & ~found.hit).sum()), int(hit.sum())),
                 "false_hits": rate(int((found.hit & ~hit).sum()), int((~hit).sum())),
                 "late": int((toi > first).sum()),

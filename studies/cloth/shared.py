@@ -45,11 +45,6 @@ def narrow_phases(ipctk: Any) -> dict[str, Any]:
     }
 
 
-def scaled(times: dict[str, float], factor: float) -> dict[str, float]:
-    """Median, low and high in another unit."""
-    return {key: factor * value for key, value in times.items()}
-
-
 def run_row(quick: bool, **settings: object) -> Row:
     """The row with a part's settings; times are processor times, as median [least, most]."""
     return {"study": "run", "run": "quick" if quick else "full", **settings}

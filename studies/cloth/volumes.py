@@ -6,8 +6,8 @@ from time import process_time
 
 import numpy as np
 
-from studies.cloth.shared import CLOTHS, run_row, scaled, step_at
-from studies.framework import answer, table_rows, time_in_turn
+from studies.cloth.shared import CLOTHS, run_row, step_at
+from studies.framework import answer, per, table_rows, time_in_turn
 from tauguard.cloth import VOLUMES, MeshCCD
 from tauguard.cloth.scenes import SCENES, Scene
 from tauguard.report import Row
@@ -57,7 +57,7 @@ def _rows(scene: Scene, moment: float, kinds: Sequence[str], repeats: int) -> li
             "scene": scene.name,
             "triangles": len(scene.faces),
             "volume": kind,
-            "frame_ms": scaled(times[kind], 1e3),
+            "frame_ms": per(times[kind], 1, 1e3),
             "vf_candidates": stats.vf["candidates"],
             "ee_candidates": stats.ee["candidates"],
             "bytes_per_triangle": stats.bytes / len(scene.faces),

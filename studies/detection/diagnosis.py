@@ -15,7 +15,7 @@ import numpy as np
 
 from studies.detection.events import Event, payload_events, push_events, struck_events
 from studies.detection.motions import CALIBRATE, SPEEDS, TEST, Training, free_pool, stream
-from studies.framework import groups, time_in_turn
+from studies.framework import groups, per, time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.calibration.nominal import nominal_design
@@ -292,7 +292,7 @@ def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row
         },
         repeats=15,
     )
-    scaled = {n: {k: 1e6 * v for k, v in t.items()} for n, t in times.items()}
+    scaled = {name: per(time, 1, 1e6) for name, time in times.items()}
     return {"study": "cost", "surface_points": len(surface.link), **scaled}
 
 

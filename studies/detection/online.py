@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.framework import time_in_turn
+from studies.framework import per, time_in_turn
 from tauguard.arrays import Array
 from tauguard.report import Row
 
@@ -146,7 +146,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
     with threadpool_limits(1):
         taken = time_in_turn(calls, repeats, time.process_time)
         found = alarm.detect(replace(trace))
-    us = {k: {n: 1e6 * v / len(trace.t) for n, v in t.items()} for k, t in taken.items()}
+    us = {name: per(time, len(trace.t), 1e6) for name, time in taken.items()}
     rest = {n: us["detection"][n] - us["observer"]["median"] for n in ("median", "low", "high")}
     total = us["simulation"]["median"] + us["detection"]["median"]
     return {

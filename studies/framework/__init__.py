@@ -8,6 +8,7 @@ from studies.framework.rows import (
     answer,
     groups,
     number,
+    per,
     table_rows,
     time_in_turn,
     timed,
@@ -16,5 +17,5 @@ from studies.framework.study import Part, Study
 
 __all__ = [
     "Each", "Incomplete", "JobCache", "Part", "Point", "Study", "Workers", "answer", "draw_found",
-    "groups", "number", "table_rows", "time_in_turn", "timed",
+    "groups", "number", "per", "table_rows", "time_in_turn", "timed",
 ]  # fmt: skip

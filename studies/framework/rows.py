@@ -81,6 +81,11 @@ def time_in_turn(
     }
 
 
+def per(seconds: dict[str, float], number: int, unit: float = 1e9) -> dict[str, float]:
+    """Measured times divided by ``number`` cases [ns], or in another ``unit``."""
+    return {name: value * unit / max(1, number) for name, value in seconds.items()}
+
+
 def table_rows(rows: Sequence[Row], name: str) -> list[Row]:
     """The rows of one table."""
     return [row for row in rows if row.get("study") == name]

@@ -29,8 +29,3 @@ def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
 def count(rate: Row) -> float:
     """The number of cases that a rate counts: its value times ``n``."""
     return 0.0 if rate["value"] is None else float(round(rate["value"] * rate["n"]))
-
-
-def per(seconds: dict[str, float], number: int, unit: float = 1e9) -> dict[str, float]:
-    """A measured time divided by ``number`` pairs [ns], or in another ``unit``."""
-    return {name: value * unit / max(1, number) for name, value in seconds.items()}

@@ -19,9 +19,9 @@ from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_impact import sweep_errors
 from oracles.convex_overlap import truth
 from oracles.convex_pairs import pairs_by_outcome, shifted, take
-from studies.framework import table_rows, time_in_turn
+from studies.framework import per, table_rows, time_in_turn
 from studies.rigid import peer
-from studies.rigid.bars import count, error, faster, per, within
+from studies.rigid.bars import count, error, faster, within
 from tauguard.report import Row, rate
 from tauguard.rigid import PlaneCache
 from tauguard.rigid.comparators import overlap_by

@@ -14,8 +14,8 @@ from oracles import coal_peer
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_distance import exact_distance, exactly_meet, extent, relative_error
 from oracles.convex_pairs import random_bodies, take
-from studies.framework import table_rows, time_in_turn
-from studies.rigid.bars import count, error, faster, per
+from studies.framework import per, table_rows, time_in_turn
+from studies.rigid.bars import count, error, faster
 from tauguard.report import Row, rate
 from tauguard.rigid import distance, overlap
 from tauguard.rigid.queries import native_overlap

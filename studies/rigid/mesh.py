@@ -19,9 +19,9 @@ from oracles import coal_peer
 from oracles.coal_motion import MovingDistance
 from oracles.convex_pairs import REST, farthest, random_bodies, random_motions, shifted, take
 from oracles.surfaces import bumpy_surface, poses_near
-from studies.framework import table_rows, time_in_turn
+from studies.framework import per, table_rows, time_in_turn
 from studies.rigid import peer
-from studies.rigid.bars import count, error, faster, per
+from studies.rigid.bars import count, error, faster
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
 from tauguard.rigid import Impacts, MeshTree, Motion, distance, overlap, time_of_impact

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from oracles import coal_peer
 from oracles.coal_motion import CONTACT, MovingDistance, advanced_times
-from studies.framework import time_in_turn
-from studies.rigid.bars import per
+from studies.framework import per, time_in_turn
 from tauguard.arrays import Array
 from tauguard.report import Row
 from tauguard.rigid import Impacts

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from oracles.hull_volumes import HullVolumes, enclosed
 from oracles.surfaces import pieces
-from studies.framework import time_in_turn
-from studies.rigid.bars import count, error, per
+from studies.framework import per, time_in_turn
+from studies.rigid.bars import count, error
 from studies.rigid.mesh import load
 from tauguard.report import Row, rate
 from tauguard.rigid.comparators import VOLUMES

@@ -10,7 +10,7 @@ from gymnasium.vector import SyncVectorEnv
 
 from oracles.bare_physics import REACH, bare, batched, driven, reach, recorded
 from oracles.reaction_swings import SPEEDS, spread, swing
-from studies.framework import answer, number, table_rows, time_in_turn
+from studies.framework import answer, number, per, table_rows, time_in_turn
 from tauguard.contacts import registered
 from tauguard.datasets import demo_plan, simulate_all
 from tauguard.detectors import CollisionAlarm, make_detector, train
@@ -100,7 +100,7 @@ def steps(count: int, repeats: int, seed: int) -> list[Row]:
         {
             "study": "step",
             "what": name,
-            "us_per_action": {k: 1e6 * v / count for k, v in seconds.items()},
+            "us_per_action": per(seconds, count, 1e6),
             "ratio_to_physics": seconds["median"] / base,
             "ratio_to_rollout": seconds["median"] / rollout,
             "added_us": 1e6 * (seconds["median"] - whole) / count,

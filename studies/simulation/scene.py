@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from oracles.bare_physics import rollout_along
-from studies.framework import time_in_turn
+from studies.framework import per, time_in_turn
 from tauguard.arrays import Array
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.episodes.simulate import workspace
@@ -74,7 +74,7 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
         {
             "study": "cost",
             "scene": name,
-            "us_per_step": {k: 1e6 * v / steps for k, v in one.items()},
+            "us_per_step": per(one, steps, 1e6),
             "ratio_to_rollout": one["median"] / base,
         }
         for name, one in taken.items()
@@ -112,7 +112,7 @@ def timesteps(seed: int, seconds: float) -> list[Row]:
             {
                 "study": "timestep",
                 "timestep_ms": 1e3 * timestep,
-                "us_per_simulated_ms": {k: 1e3 * v / seconds for k, v in taken.items()},
+                "us_per_simulated_ms": per(taken, 1, 1e3 / seconds),
                 "q_error_rad": float(error),
             }
         )

@@ -1,6 +1,7 @@
 """React, ClothReach and TwoArms: what happens in them is what their names say."""
 
 import warnings
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -9,7 +10,9 @@ from gymnasium.utils.env_checker import check_env
 
 from oracles.contact_forces import contact_torques
 from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers
+from tauguard.envs.gym.second_arm import both_drives
 from tauguard.models import BodyProxy, cura6, cura6_drive, pin_model
+from tauguard.models.left_over import LeftOver
 
 from ..models.arms import SEVEN, TETRAHEDRON
 
@@ -187,3 +190,17 @@ def test_two_arms_use_the_same_arm_twice():
     observation, _ = env.reset(seed=0)
     assert observation.shape == (48,)
     assert np.abs(observation[36:39] - observation[39:42]).max() > 0.1
+
+
+def test_the_drives_of_two_arms_double_what_each_joint_has():
+    drive, log = cura6_drive(), np.repeat([0, 1], 200)
+    errors = np.random.default_rng(7).normal(size=(2, 400, 6))
+    left_over = LeftOver(100.0, log, *errors)
+    friction = replace(drive.friction, slope=np.ones((6, 2)), slope_velocity=np.array([0.1, 1.0]))
+    sensors = replace(drive.sensors, left_over=left_over)
+    both = both_drives(replace(drive, friction=friction, sensors=sensors))
+    np.testing.assert_array_equal(both.gain, np.tile(drive.gain, 2))
+    assert both.friction.slope.shape == (12, 2)
+    assert both.friction.slope_velocity.tolist() == [0.1, 1.0]
+    np.testing.assert_array_equal(both.sensors.left_over.qd[:, 6:], left_over.qd)
+    assert both.ripple.cycles.shape == drive.ripple.cycles.shape
