@@ -147,7 +147,10 @@ def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
             head = head_of(configuration)
             if (folder / HEAD).is_file():
                 _check_same(folder, head)
-            elif any(not _is_part(entry) for entry in folder.iterdir()):
+            elif any(
+                not (entry.name.startswith(".") and entry.name.endswith(PART))
+                for entry in folder.iterdir()
+            ):
                 raise ValueError(
                     f"{folder}: not empty, and no dataset; name a new or an empty folder"
                 )
@@ -264,10 +267,6 @@ def _check_same(folder: Path, head: dict[str, Any]) -> None:
             f"{folder}: was begun with {why}: new shards would not have the same bytes; "
             "name another folder"
         )
-
-
-def _is_part(entry: Path) -> bool:
-    return entry.name.startswith(".") and entry.name.endswith(PART)
 
 
 @contextlib.contextmanager

@@ -60,7 +60,8 @@ def generate_dataset(
 
             stack.callback(remove_parts, folder)
             results = stack.enter_context(contextlib.closing(on_cluster(make_shard, todo, ray)))
-        with _progress(configuration) as bar:
+        total = sum(split.episodes for split in configuration.splits)
+        with tqdm(total=total, desc="generate", unit="episode", disable=None, leave=False) as bar:
             for one in results:
                 _count(done, one, bar)
         write_cards(folder)
@@ -72,11 +73,6 @@ def tasks(configuration: Configuration, folder: Path) -> Iterator[ShardTask]:
     text, code_hash = configuration.to_json(), code()
     for split, number in shards(configuration):
         yield ShardTask(str(folder.resolve()), text, split, number, code_hash)
-
-
-def _progress(configuration: Configuration) -> tqdm[None]:
-    total = sum(split.episodes for split in configuration.splits)
-    return tqdm(total=total, desc="generate", unit="episode", disable=None, leave=False)
 
 
 def _count(done: Built, one: Done, bar: tqdm[None]) -> None:

@@ -26,7 +26,6 @@ CLAMP_SECONDS = (0.4, 0.8)
 def collision_plans(
     rng: np.random.Generator,
     count: int,
-    begin: float = BEGIN,
     strata: Sequence[tuple[float, float]] = STRATA,
     kinds: Sequence[str] = KIND_CYCLE,
     links: Sequence[int] = (2, 3, 4, 5, 6),
@@ -37,7 +36,6 @@ def collision_plans(
     Args:
         rng: shuffles the combinations of kind, link and stratum.
         count: number of collisions.
-        begin: start of the first slot [s].
         strata: ranges of severity (peak torque), cycled [N m].
         kinds: kinds of collisions, cycled.
         links: links that are struck, cycled, 1-based.
@@ -52,7 +50,7 @@ def collision_plans(
         plans.append(
             CollisionPlan(
                 kind=kind,
-                time=begin + SLOT * i + OFFSET + float(rng.uniform(0, SPREAD)),
+                time=BEGIN + SLOT * i + OFFSET + float(rng.uniform(0, SPREAD)),
                 link=int(link_of[i]),
                 severity=strata[int(levels[i])],
                 duration=float(

@@ -148,7 +148,7 @@ def _stated(configuration: Configuration, split: Split) -> Balance:
     }
     for counts in found.values():
         counts.update({value: (fold - 1) * n for value, n in counts.items()})
-    levels = [_level(low, high) for low, high in split.severities]
+    levels = [stratum(math.sqrt(low * high)) for low, high in split.severities]
     links = [str(link) for link in split.links]
     for name, values, stream in (
         ("kind", split.kinds, 7),
@@ -170,10 +170,6 @@ def _dealt_counts(values: Sequence[T], seed: list[int], count: int) -> Counter[T
         found[value] += rounds
     found.update(dealt(values, seed, rounds * len(values) + i) for i in range(rest))
     return found
-
-
-def _level(low: float, high: float) -> str:
-    return stratum(math.sqrt(low * high))
 
 
 def class_order(value: str) -> tuple[float, str]:

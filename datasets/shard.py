@@ -24,7 +24,7 @@ from tauguard.datasets.columns_of_shards import (
     stored,
     table,
 )
-from tauguard.datasets.configuration import Configuration, Split
+from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.detectors import RobotNumbers, observe
@@ -72,12 +72,6 @@ def manifest_path(split: str, number: int) -> str:
     return f"manifest/{split}-{number:06d}.jsonl"
 
 
-def numbers_in(configuration: Configuration, split: Split, shard: int) -> range:
-    """The numbers of the episodes in a shard."""
-    first = shard * configuration.episodes_per_shard
-    return range(first, min(first + configuration.episodes_per_shard, split.episodes))
-
-
 def make_shard(task: ShardTask) -> Done:
     """Simulate and write a shard, unless it exists and is intact.
 
@@ -93,7 +87,8 @@ def make_shard(task: ShardTask) -> Done:
         )
     configuration = Configuration.from_json(task.configuration)
     split = next(s for s in configuration.splits if s.name == task.split)
-    numbers = numbers_in(configuration, split, task.number)
+    each, first = configuration.episodes_per_shard, task.number * configuration.episodes_per_shard
+    numbers = range(first, min(first + each, split.episodes))
     folder = Path(task.folder)
     kept = fault(folder, task.split, task.number) is None
     if not kept:

@@ -215,10 +215,6 @@ class _SilenceClock:
         self._check_silence()  # a silence lasts until the end of the session
 
 
-def _no_report(sample: Sample, answer: Answer) -> None:
-    pass
-
-
 def listen(
     stream: RobotStream,
     monitor: Monitor,
@@ -242,7 +238,9 @@ def listen(
     collecting = gc.isenabled()
     gc.disable()  # garbage collection would delay answers
     try:
-        with _SilenceClock(session, lateness.most, report or _no_report) as clock:
+        with _SilenceClock(
+            session, lateness.most, report or (lambda sample, answer: None)
+        ) as clock:
             while (now := time.monotonic()) < end:
                 sample = stream.read(min(lateness.most, end - now))
                 clock.check()

@@ -156,12 +156,6 @@ def sample_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
     }
 
 
-def contact_layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
-    """The layout of each checker's topic."""
-    checkers = form.get("checkers", [])
-    return {f"/contacts/{one['name']}": layout(*CHECKED, one["partners"]) for one in checkers}
-
-
 def sample_topics(
     trace: Trace, detection: Detection | None, form: Mapping[str, Any]
 ) -> list[Topic]:
@@ -229,11 +223,13 @@ def decode(contents: Contents) -> Trace:
     form = {k: json.loads(v) for k, v in contents.metadata["tauguard.trace"].items()}
     if form["format"] != FORMAT:
         raise ValueError(f"format {form['format']}, this version reads {FORMAT}")
-    sampled, checked = sample_layouts(form), contact_layouts(form)
+    sampled = sample_layouts(form)
+    checkers = {f"/contacts/{one['name']}": one for one in form.get("checkers", [])}
+    checked = {topic: layout(*CHECKED, one["partners"]) for topic, one in checkers.items()}
     events = {topic: layout(*one) for topic, one in EVENTS.items()}
     tables = collect(contents, sampled | events | checked)
     rows = dict.fromkeys(sampled, form["rows"])
-    rows |= {f"/contacts/{one['name']}": one["rows"] for one in form.get("checkers", [])}
+    rows |= {topic: one["rows"] for topic, one in checkers.items()}
     for topic, wanted in rows.items():
         if (found := len(tables[topic]["sec"])) != wanted:
             raise ValueError(

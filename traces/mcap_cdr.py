@@ -49,10 +49,10 @@ class Layout:
         self.size += dtype.itemsize
         return self
 
-    def sequence(self, name: str, count: int, kind: str = "f8") -> Layout:
-        """A ``float64[]`` (or other ``kind``) with ``count`` elements in every message."""
+    def sequence(self, name: str, count: int) -> Layout:
+        """A ``float64[]`` with ``count`` elements in every message."""
         self._constant(count.to_bytes(4, "little"), align=4)
-        return self.number(name, kind, count) if count else self
+        return self.number(name, "f8", count) if count else self
 
     def string(self, text: str) -> Layout:
         """A ``string`` that is ``text`` in every message."""

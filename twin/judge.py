@@ -97,7 +97,6 @@ def compare(
     arm: ArmModel,
     drive: Drive,
     traces: Sequence[Trace],
-    seed: int = 0,
     own: Sequence[Trace] = (),
 ) -> Likeness:
     """Compute the twin's currents along logs, and compare its residuals with the real ones.
@@ -106,12 +105,10 @@ def compare(
         arm: calibrated without these logs.
         drive: drive of the twin.
         traces: held-out logs.
-        seed: seed of sensor noise and classifier.
         own: the logs from which the twin was identified, for ``programs_auc``.
     """
     others = [
-        replace(trace, current=played(arm, drive, trace, seed + k))
-        for k, trace in enumerate(traces)
+        replace(trace, current=played(arm, drive, trace, k)) for k, trace in enumerate(traces)
     ]
     real, twin = ([track(arm, trace) for trace in logs] for logs in (traces, others))
     moving = [one.fast for one in real]
@@ -126,9 +123,9 @@ def compare(
         _peaks(twin, standing) / _peaks(real, standing),
         (np.diff(both, axis=1) ** 2).mean(axis=1) / (2 * both.var(axis=1) + 1e-12),
         ((both[:, lag:] * both[:, :-lag]).mean(axis=1) / ((both**2).mean(axis=1) + 1e-12)),
-        classifier_areas(real, twin, False, seed),
-        classifier_areas(real, twin, True, seed),
-        _programs_auc([track(arm, trace) for trace in own], real, seed),
+        classifier_areas(real, twin, False),
+        classifier_areas(real, twin, True),
+        _programs_auc([track(arm, trace) for trace in own], real),
         tuple(one.residual for one in real),
         tuple(one.residual for one in twin),
         tuple(one.t for one in real),
@@ -283,7 +280,7 @@ def _alike(place: Array, logs: NDArray[np.int64], starts: Array) -> tuple[NDArra
 
 
 def classifier_areas(
-    real: Sequence[Track], twin: Sequence[Track], still: bool, seed: int
+    real: Sequence[Track], twin: Sequence[Track], still: bool
 ) -> tuple[float, float]:
     """Areas under the curves of two classifiers of windows of real and simulated residuals.
 
@@ -291,7 +288,6 @@ def classifier_areas(
         real: real logs.
         twin: the twin along the same motion.
         still: whether windows in which the arm stands are used, or those in which it moves.
-        seed: seed of the classifiers.
 
     Returns:
         Areas of boosted trees and of logistic regression; NaN with too few windows or groups.
@@ -299,24 +295,24 @@ def classifier_areas(
     windows = _windows(real, still)
     table = np.concatenate([_features(real, windows), _features(twin, windows)])
     groups = np.tile(_groups_of(real, windows), 2)
-    return _area(table, np.repeat([0, 1], len(windows)), groups, seed)
+    return _area(table, np.repeat([0, 1], len(windows)), groups)
 
 
-def _programs_auc(own: Sequence[Track], real: Sequence[Track], seed: int) -> tuple[float, float]:
+def _programs_auc(own: Sequence[Track], real: Sequence[Track]) -> tuple[float, float]:
     """Areas for moving windows of real residuals: the twin's own logs against held-out logs."""
     logs = [*own, *real]
     windows = _windows(logs, False)
     labels = np.array([float(log >= len(own)) for log, _ in windows])
     if min(np.sum(labels == 0), np.sum(labels == 1)) < FEWEST:
         return (float("nan"),) * 2
-    return _area(_features(logs, windows), labels, _groups_of(logs, windows), seed)
+    return _area(_features(logs, windows), labels, _groups_of(logs, windows))
 
 
-def _area(table: Array, labels: Array, groups: NDArray[np.int64], seed: int) -> tuple[float, float]:
+def _area(table: Array, labels: Array, groups: NDArray[np.int64]) -> tuple[float, float]:
     if len(table) < 2 * FEWEST or len(np.unique(groups)) < FOLDS:
         return (float("nan"),) * 2
     models = (
-        HistGradientBoostingClassifier(max_iter=100, random_state=seed),
+        HistGradientBoostingClassifier(max_iter=100, random_state=0),
         make_pipeline(StandardScaler(), LogisticRegression(max_iter=1000)),
     )
     with threadpool_limits(1):  # for small tables, threads cost more time than they save

@@ -188,15 +188,10 @@ class AlarmStream:
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> bool:
         """Whether the alarm is on at this sample, as :meth:`CollisionAlarm.detect` computes it.
 
-        Args:
-            q: [rad], float64, shape (n,).
-            qd: [rad/s], shape (n,).
-            current: [A], shape (n,).
-            dt: time since the last sample [s] (default: sample interval of the training traces).
+        Args: as :meth:`~tauguard.detectors.ScoreStream.step`.
 
         Raises:
-            ValueError: wrong shapes, numbers that are not finite, or a sample interval that differs
-                from the training's.
+            ValueError: as there, or a sample interval that differs from the training's.
         """
         interval = self._dt if dt is None else dt
         if not self._first and not same_rate(interval, self._dt):

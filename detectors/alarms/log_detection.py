@@ -16,7 +16,7 @@ from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.motion_regimes import SEEN, SHORTLY, motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion, Judged
-from tauguard.traces.trace import Detection, Trace
+from tauguard.traces.trace import Alarm, Detection, Trace
 
 STRANGE = 0.2  # fraction of a log in alarm above which it may be the log of another arm
 
@@ -66,8 +66,8 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     detection = replace(monitored.detection, residual=residual)
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     strange = bool(detection.alarm[rows].mean() > STRANGE)
-    quiet = rows if strange else rows & ~_near(detection)
-    doubts = check_torques(arm.robot, trace, tau, residual, quiet, LOG_GAIN, touched=strange)
+    quiet = rows if strange else rows & ~_within(detection.alarms, trace.t, AROUND)
+    doubts = check_torques(arm.robot, trace, tau, residual, quiet, touched=strange)
     notes = [] if strange else list(doubts)
     if strange:
         load = "check the load (--payload)" if load_known else "give the load (--payload)"
@@ -78,7 +78,7 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     unwatched = 0.0
     if isinstance(alarm.detector, FittedFreeMotion):
         judged, names = alarm.detector.judge(trace), trace.joint_names
-        watched = rows & ~_inside(monitored.faults, trace)
+        watched = rows & ~_within(monitored.faults, trace.t)
         unwatched, said = _unwatched(judged, names, watched)
         notes += said
         notes += _prior_knowledge(alarm.detector, trace)
@@ -124,11 +124,11 @@ def _unwatched(judged: Judged, names: Sequence[str], rows: Bools) -> tuple[float
     return total, notes
 
 
-def _inside(faults: tuple[Span, ...], trace: Trace) -> Bools:
-    """Rows within faults, shape (T,)."""
-    inside = np.zeros(len(trace.t), dtype=np.bool_)
-    for fault in faults:
-        inside |= (trace.t >= fault.start) & (trace.t <= fault.end)
+def _within(spans: Sequence[Span | Alarm], t: Array, around: float = 0.0) -> Bools:
+    """Samples in spans, or at most ``around`` [s] before or after one, shape (T,)."""
+    inside = np.zeros(len(t), dtype=np.bool_)
+    for one in spans:
+        inside |= (t >= one.start - around) & (t <= one.end + around)
     return inside
 
 
@@ -148,14 +148,6 @@ def _prior_knowledge(detector: FittedFreeMotion, trace: Trace) -> list[str]:
         f"the training logs show less than {SEEN:g} s of {lacking}; this log shows {seconds:.1f} s "
         "of it, in which bounds learned on other arms apply"
     ]
-
-
-def _near(detection: Detection) -> Bools:
-    """Rows within :data:`AROUND` of an alarm, shape (T,)."""
-    near = np.zeros(len(detection.t), dtype=np.bool_)
-    for alarm in detection.alarms:
-        near |= (detection.t > alarm.start - AROUND) & (detection.t < alarm.end + AROUND)
-    return near
 
 
 def most_changed_joint(found: LogDetection, start: float, end: float) -> int:

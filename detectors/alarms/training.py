@@ -49,9 +49,7 @@ FOLDS = 3
 UNLIKE = 0.05
 
 
-def held_out(
-    traces: Sequence[Trace], fraction: float = HELD_OUT
-) -> tuple[list[Trace], list[Trace]]:
+def held_out(traces: Sequence[Trace]) -> tuple[list[Trace], list[Trace]]:
     """Traces to train on, and collision-free ones for the threshold.
 
     Returns:
@@ -59,7 +57,7 @@ def held_out(
         threshold comes from motion that the detector was trained on.
     """
     free = [i for i, t in enumerate(traces) if not _collisions(t)]
-    count = min(len(free) - 1, max(1, round(fraction * len(free)))) if len(free) > 1 else 0
+    count = min(len(free) - 1, max(1, round(HELD_OUT * len(free)))) if len(free) > 1 else 0
     if count == 0:
         return list(traces), list(traces)
     # Evenly spaced, because traces are often listed by speed or payload.
@@ -120,11 +118,11 @@ def train_and_score(
     if min(folds, free) < 2:
         own, rest = held_out(traces)
         fitted = detector.fit(own, arm)
-        found = _free_scores(fitted, rest, CONFIRMATION)
+        found = _free_scores(fitted, rest)
     else:
         found = _cross_fitted(detector, traces, arm, left_out(traces, min(folds, free)))
         fitted = detector.fit(traces, arm)
-    alarm, scores = _with_rate(fitted, found, per_hour, CONFIRMATION)
+    alarm, scores = _with_rate(fitted, found, per_hour)
     return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
 
 
@@ -171,10 +169,10 @@ def train_beside(
                 f"because the rest has {seconds:.1f} s of motion, expected {LEAST:g} s or more"
             )
         fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
-        found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]], CONFIRMATION)
+        found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]])
     found = [replace(scores, floor=None) for scores in found]
     whole = detector.fit([*struck, *logs.values()], arm)
-    alarm, scores = _with_rate(whole, found, per_hour, CONFIRMATION)
+    alarm, scores = _with_rate(whole, found, per_hour)
     beyond = max(1.0, 1 / (UNLIKE * (len(scores) + 1)))
     least = beyond * max(one.peak for one in scores)
     if least > alarm.threshold:
@@ -225,62 +223,52 @@ def _cross_fitted(
     for part in parts:
         own = [t for i, t in enumerate(traces) if i not in part]
         left = [traces[i] for i in sorted(part) if not _collisions(traces[i])]
-        found += _free_scores(detector.fit(own, arm), left, CONFIRMATION)
+        found += _free_scores(detector.fit(own, arm), left)
     return found
 
 
-def with_rate(
-    detector: FittedDetector,
-    traces: Sequence[Trace],
-    per_hour: float,
-    confirmation: float = CONFIRMATION,
-) -> CollisionAlarm:
+def with_rate(detector: FittedDetector, traces: Sequence[Trace], per_hour: float) -> CollisionAlarm:
     """The alarm of a fitted detector with a speed normalisation and a threshold for a rate.
 
     Args:
         detector: fitted.
         traces: traces that the detector was not trained on; only collision-free rows are used.
         per_hour: accepted false alarms per hour of such motion.
-        confirmation: confirmation time [s].
 
     Raises:
         ValueError: no collision-free motion, or ``per_hour`` not above 0.
     """
-    found = _free_scores(detector, traces, confirmation)
-    return _with_rate(detector, found, per_hour, confirmation)[0]
+    return _with_rate(detector, _free_scores(detector, traces), per_hour)[0]
 
 
-def _free_scores(
-    detector: FittedDetector, traces: Sequence[Trace], confirmation: float
-) -> list[FreeScores]:
+def _free_scores(detector: FittedDetector, traces: Sequence[Trace]) -> list[FreeScores]:
     """Scores of the collision-free rows, not yet normalised."""
-    plain = CollisionAlarm(detector, np.inf, confirmation)
+    plain = CollisionAlarm(detector, np.inf, CONFIRMATION)
     return [plain.free_scores(trace) for trace in long_enough(plain, traces)]
 
 
 def _with_rate(
-    detector: FittedDetector, found: Sequence[FreeScores], per_hour: float, confirmation: float
+    detector: FittedDetector, found: Sequence[FreeScores], per_hour: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """Normalise the scores and choose the threshold from them."""
-    alarm, scores = normalised(detector, found, confirmation)
+    alarm, scores = normalised(detector, found)
     return replace(alarm, threshold=threshold_for_rate(scores, per_hour)), scores
 
 
 def normalised(
-    detector: FittedDetector, found: Sequence[FreeScores], confirmation: float = CONFIRMATION
+    detector: FittedDetector, found: Sequence[FreeScores]
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """An alarm with infinite threshold, and the scores from which the threshold is chosen.
 
     Args:
         detector: fitted.
         found: scores of the detector in collision-free motion, not normalised.
-        confirmation: confirmation time [s].
 
     Returns:
         The alarm with its normalisation, and the normalised scores.
     """
     levels, floor = normalisations(found)
-    alarm = CollisionAlarm(detector, np.inf, confirmation, levels, floor=floor)
+    alarm = CollisionAlarm(detector, np.inf, CONFIRMATION, levels, floor=floor)
     return alarm, [one.over(levels, floor) for one in found]
 
 

@@ -32,6 +32,10 @@ from tauguard.traces.trace import Trace
 
 #: Default friction columns.
 DEFAULT = FrictionModel()
+#: Rate of the filter of residual and columns [1/s].
+RATE = 30.0
+#: Number of rounds; each weights the joints by the residuals of the round before.
+ROUNDS = 2
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,6 @@ def calibrate(
     *,
     friction: FrictionModel | None = None,
     priors: Priors | None = None,
-    rate: float = 30.0,
-    rounds: int = 2,
 ) -> Calibration:
     """Identify inertial numbers, friction, drive gains and the traces' payloads together.
 
@@ -88,8 +90,6 @@ def calibrate(
             collisions are left out.
         friction: friction columns (default: those of ``arm.friction``, or the default model).
         priors: standard deviations of the unknowns around the nominal arm.
-        rate: rate of the filter of residual and columns [1/s].
-        rounds: each round weights the joints by the residuals of the round before.
 
     Returns:
         The calibrated arm with its friction model and noise levels.
@@ -104,12 +104,12 @@ def calibrate(
     for trace in kept:
         if len(trace.joint_names) != robot.joints:
             raise ValueError(f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}")
-    data = [_columns(trace, arm, model, rate) for trace in kept]
+    data = [_columns(trace, arm, model) for trace in kept]
     if sum(len(one.current) for one in data) < 200:
         raise ValueError(
             "calibrate: fewer than 200 collision-free rows; give 4 s of motion or more"
         )
-    system, solution, level = _solved(data, robot, model, priors, rounds)
+    system, solution, level = _solved(data, robot, model, priors)
     inertial = solution[: INERTIAL * robot.joints].reshape(-1, INERTIAL)
     weights: Array = solution[system.friction : system.gain].reshape(robot.joints, -1)
     fast = bool(data) and max(trace.dt for trace in kept) <= SLOWEST
@@ -124,27 +124,27 @@ def calibrate(
     return Calibration(found, payloads, level)
 
 
-_COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel, float], Filtered]] = {}
+_COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel], Filtered]] = {}
 
 
-def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> Filtered:
+def _columns(trace: Trace, arm: ArmModel, model: FrictionModel) -> Filtered:
     """The columns of the collision-free rows of a trace.
 
     They are cached for the last settings as long as the trace exists, because all folds of a
     cross-validation need them.
     """
     key, found = _COLUMNS.get(id(trace), (None, None))
-    if found is None or key is None or key[0] is not arm or key[1:] != (model, rate):
-        known = trace, arm.robot, arm.drive_gain, model, rate, free_rows(trace)
+    if found is None or key is None or key[0] is not arm or key[1:] != (model,):
+        known = trace, arm.robot, arm.drive_gain, model, RATE, free_rows(trace)
         found = filtered_columns(*known, sampled=trace.dt > SLOWEST)
         if id(trace) not in _COLUMNS:
             weakref.finalize(trace, _COLUMNS.pop, id(trace), None)
-        _COLUMNS[id(trace)] = (arm, model, rate), found
+        _COLUMNS[id(trace)] = (arm, model), found
     return found
 
 
 def _solved(
-    data: Sequence[Filtered], robot: RobotNumbers, model: FrictionModel, priors: Priors, rounds: int
+    data: Sequence[Filtered], robot: RobotNumbers, model: FrictionModel, priors: Priors
 ) -> tuple[System, Array, Array]:
     """The last round's equations, their solution, and each joint's RMS residual [N m]."""
     deviations = _deviations(robot, priors, model.columns, len(data))
@@ -152,7 +152,7 @@ def _solved(
     level: Array = np.maximum(np.sqrt(np.mean(squares, axis=0)), 1e-6)
     level = level / level.max()
     nothing = np.zeros(INERTIAL)
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         system = System(robot, model.columns, len(data), measured=True)
         for k, one in enumerate(data):
             system.add(one, k, 1 / (priors.softness * level), nothing)

@@ -22,6 +22,9 @@ REVERSAL = 0.05  # speed over which the sign of friction changes [rad/s]
 #: every log of three real arms and 2 to 8 in most of them. A wrong sign negates the result.
 AGAINST = -1.0
 
+#: Rate of the filter of torques and currents [1/s].
+DRAG_RATE = 20.0
+
 #: Least motion of a joint that is checked [s].
 ENOUGH = 3.0
 
@@ -55,7 +58,7 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
             )
 
 
-def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> Array:
+def drag(robot: RobotNumbers, trace: Trace, sign: Array) -> Array:
     """The part of each joint's current that depends on the direction of motion, shape (n,).
 
     It is divided by the standard deviation of the current that neither this part nor the rigid-body
@@ -63,9 +66,9 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     :data:`ENOUGH`.
     """
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
-    torque = low_pass(rate, dt, *momentum_terms(robot, trace.q, trace.qd))
-    direction = lagged(rate, dt, np.tanh(trace.qd / REVERSAL))
-    current = lagged(rate, dt, trace.current * sign)
+    torque = low_pass(DRAG_RATE, dt, *momentum_terms(robot, trace.q, trace.qd))
+    direction = lagged(DRAG_RATE, dt, np.tanh(trace.qd / REVERSAL))
+    current = lagged(DRAG_RATE, dt, trace.current * sign)
     rows, found = moving_span(trace), np.full(n, np.nan)
     for j in range(n):
         on = rows & (np.abs(trace.qd[:, j]) > FAST)
@@ -272,7 +275,6 @@ def check_torques(
     tau: Array,
     residual: Array,
     rows: Bools,
-    rate: float,
     touched: bool = False,
 ) -> tuple[str, ...]:
     """Notes on torques that the motion does not explain well.
@@ -281,9 +283,8 @@ def check_torques(
         robot: the arm.
         trace: a log.
         tau: torques at the joints minus friction [N m], shape (T, n).
-        residual: residual of an observer [N m], shape (T, n).
+        residual: residual of an observer with :data:`LOG_GAIN` [N m], shape (T, n).
         rows: rows in which nothing touches the arm, shape (T,).
-        rate: rate of that observer [1/s].
         touched: True if there can be contacts in these rows.
 
     Raises:
@@ -292,8 +293,8 @@ def check_torques(
     if not rows.any():
         return ()
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
-    needed = low_pass(rate, dt, *momentum_terms(robot, trace.q, trace.qd))
-    given = lagged(rate, dt, tau)
+    needed = low_pass(LOG_GAIN, dt, *momentum_terms(robot, trace.q, trace.qd))
+    given = lagged(LOG_GAIN, dt, tau)
     poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (200, n))
     most = STRENGTH * float(np.linalg.norm(np.abs(gravity_torque(robot, poses)).max(axis=0)))
     if most < 1e-6:

@@ -64,6 +64,10 @@ _UNIT = np.zeros((10, 4, 4))
 _UNIT[np.arange(10), _LOWER[0], _LOWER[1]] = 1.0
 
 
+#: Largest number of Levenberg-Marquardt steps.
+ROUNDS = 60
+
+
 def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
     """Log-Cholesky coordinates of ten numbers, shape (10,).
 
@@ -106,7 +110,7 @@ def from_coordinates(theta: Array) -> tuple[Array, Array]:
 
 
 def solve_physically_consistent(
-    matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int = 60
+    matrix: Array, vector: Array, inertial: Array, armature: Array
 ) -> Array:
     """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
 
@@ -120,7 +124,6 @@ def solve_physically_consistent(
         vector: shape (N,).
         inertial: assumed inertial numbers, shape (n, 10).
         armature: assumed armatures [kg m^2], shape (n,).
-        rounds: largest number of Levenberg-Marquardt steps.
 
     Returns:
         x, shape (N,): every ``inertial - x`` is consistent and every ``armature - x`` above 0.
@@ -133,11 +136,11 @@ def solve_physically_consistent(
     follows: NDArray[Any] = np.linalg.solve(own, np.column_stack([coupled, vector[body:]]))
     reduced = matrix[:body, :body] - coupled.T @ follows[:, :body]
     target = vector[:body] - coupled.T @ follows[:, body]
-    x = _descend(0.5 * (reduced + reduced.T), target, inertial, armature, rounds)
+    x = _descend(0.5 * (reduced + reduced.T), target, inertial, armature)
     return np.concatenate([x, follows[:, body] - follows[:, :body] @ x])
 
 
-def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int) -> Array:
+def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array) -> Array:
     """Levenberg-Marquardt over log-Cholesky coordinates; returns x of bodies and armatures."""
     n = len(inertial)
     start: NDArray[Any] = np.linalg.solve(matrix, vector)
@@ -149,7 +152,7 @@ def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rou
     inside[(10 * np.arange(n)[:, None] + _DIAGONAL).ravel()] = -2.0
     x, slope = _unknowns(state, inertial, armature)
     cost, damping = 0.5 * x @ matrix @ x - vector @ x + inside @ state, 1e-3
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         gradient = slope.T @ (matrix @ x - vector) + inside
         hessian = slope.T @ matrix @ slope
         scaled = hessian + damping * np.diag(np.diag(hessian) + 1e-12)

@@ -78,17 +78,7 @@ class NativeStream:
         self.native, self._dt = native, dt
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample.
-
-        Args:
-            q: [rad], float64, shape (n,).
-            qd: [rad/s], shape (n,).
-            current: [A], shape (n,).
-            dt: time since the last sample [s] (default: the constructor's).
-
-        Raises:
-            ValueError: wrong shapes or numbers that are not finite; the state is as before.
-        """
+        """As :meth:`~tauguard.detectors.ScoreStream.step`; the state is kept after an error."""
         try:
             return self.native.step(q, qd, current, self._dt if dt is None else dt)
         except TypeError:

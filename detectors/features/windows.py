@@ -150,20 +150,23 @@ def peaks(score: Array, count: int, gap: int) -> NDArray[np.int64]:
     return np.array(sorted(chosen), dtype=np.int64)
 
 
+#: Fraction of the windows that are from collisions.
+STRUCK = 0.2
+
+
 def draw_windows(
     rng: np.random.Generator,
     prepared: Sequence[Prepared],
     shape: WindowShape,
     count: int,
-    positive: float = 0.2,
 ) -> tuple[Array, Array]:
-    """Random windows and targets, a fraction ``positive`` of them from collisions.
+    """Random windows and targets, a fraction :data:`STRUCK` of them from collisions.
 
     Raises:
         ValueError: no collision or no free motion in the traces.
     """
     x, y = [], []
-    for name, fraction in (("collision", positive), ("free", 1 - positive)):
+    for name, fraction in (("collision", STRUCK), ("free", 1 - STRUCK)):
         masks = [getattr(p, name) for p in prepared]
         total = sum(int(m.sum()) for m in masks)
         if total == 0:

@@ -49,17 +49,17 @@ def _line(path: str | Path, said: str, expected: str) -> str:
     return f"{path}: {' '.join(said.split())[:1000]}" + (f"; {expected}" if expected else "")
 
 
-def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
-    """A text file of at most ``most`` bytes, UTF-8.
+def read_text(path: str | Path) -> str:
+    """A text file of at most :data:`MOST_TEXT` bytes, UTF-8.
 
     Raises:
         ValueError: the file is longer, or not text.
         OSError: missing or unreadable.
     """
     with open(path, "rb") as stream:
-        data = stream.read(most + 1)
-    if len(data) > most:
-        raise ValueError(f"{path}: more than {most >> 20} MiB; expected a smaller text file")
+        data = stream.read(MOST_TEXT + 1)
+    if len(data) > MOST_TEXT:
+        raise ValueError(f"{path}: more than {MOST_TEXT >> 20} MiB; expected a smaller text file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -227,10 +227,10 @@ def test_a_cycle_that_repeats_does_not_tell_two_draws_of_one_process_apart():
     a, b = cycle(1, places=10), cycle(2, places=11)
     elsewhere = replace(a, motion=1000 * a.t[:, None])
     # Were no place met twice, the classifier would be tested on what it learned there.
-    assert classifier_areas([elsewhere], [b], False, 0)[0] > 0.9
-    assert abs(classifier_areas([a], [b], False, 0)[0] - 0.5) < 0.15
+    assert classifier_areas([elsewhere], [b], False)[0] > 0.9
+    assert abs(classifier_areas([a], [b], False)[0] - 0.5) < 0.15
 
 
 def test_a_difference_at_all_places_of_a_cycle_is_found():
     a, b = cycle(1, places=10), cycle(2, places=11, shake=0.45)
-    assert classifier_areas([a], [b], False, 0)[0] > 0.95
+    assert classifier_areas([a], [b], False)[0] > 0.95

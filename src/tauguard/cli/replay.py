@@ -43,7 +43,8 @@ def command(
     if not (path.is_dir() or path.suffix == ".rrd"):
         asked = out or robot or whole
         there = path.with_suffix(".rrd")
-        fits = (web or open) and not asked and _fits(there, path)
+        fits = (web or open) and not asked and there.exists() and path.exists()
+        fits = fits and there.stat().st_mtime >= path.stat().st_mtime
         if fits:
             print(f"{there}: made from {path.name} before, shown as it is")
         shown = there if fits else recorded(path, out, robot, whole)
@@ -64,12 +65,6 @@ def newest(path: Path) -> Path:
         return path
     print(f"{path}: {len(found)} recordings; showing the newest, {found[-1].name}")
     return found[-1]
-
-
-def _fits(recording: Path, file: Path) -> bool:
-    """Whether both files exist and ``recording`` is not older than ``file``."""
-    both = recording.exists() and file.exists()
-    return both and recording.stat().st_mtime >= file.stat().st_mtime
 
 
 def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> Path:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.recording import Recording
-    from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
+    from tauguard.detectors.evaluation.cross_validation import CrossValidation
     from tauguard.detectors.scores.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
@@ -268,6 +268,8 @@ def odd_notes(validation: CrossValidation) -> list[str]:
     from tauguard.detectors.evaluation.card_page import times
 
     notes = []
+    count = sum(len(log.alarms) for log in validation.kept) or "none"
+    others = f"{count} in {sum(log.seconds for log in validation.kept) / 60:.1f} min"
     for log in validation.left_out:
         cause = (
             f"a load (then give --payload {log.name}=KG or =unknown), another temperature"
@@ -276,9 +278,9 @@ def odd_notes(validation: CrossValidation) -> list[str]:
         )
         notes.append(
             f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {_others(validation.kept)}. Possible causes: {cause}, or a motion that they do "
-            "not show. The log is left out of the training; if nothing touched the arm, keep it "
-            f"with --accept {log.name}"
+            f"have {others}. Possible causes: {cause}, or a motion that they do not "
+            "show. The log is left out of the training; if nothing touched the arm, keep it with "
+            f"--accept {log.name}"
         )
     notes += [
         f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "
@@ -292,11 +294,6 @@ def odd_notes(validation: CrossValidation) -> list[str]:
         if log.throughout
     ]
     return notes
-
-
-def _others(logs: Sequence[CrossValidatedLog]) -> str:
-    count = sum(len(log.alarms) for log in logs)
-    return f"{count or 'none'} in {sum(log.seconds for log in logs) / 60:.1f} min"
 
 
 def show_card(
