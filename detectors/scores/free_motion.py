@@ -94,6 +94,8 @@ class Judged:
     t: Array  #: [s], shape (T,)
     qd: Array  #: [rad/s], shape (T, n)
     qdd: Array  #: absolute accelerations [rad/s^2], shape (T, n)
+    shaken: Array  #: accelerations in the bound, which decay; 0 at rest [rad/s^2], shape (T, n)
+    around: Array  #: the same of the joint that accelerates most [rad/s^2], shape (T, n)
     ratio: Array  #: each joint's signal over its bound, at most 1 until confirmed, (T, n)
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: minus the estimated errors of the model [N m], shape (T, n)
@@ -164,13 +166,16 @@ class FittedFreeMotion(Frozen):
             raise ValueError(
                 f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
             )
-        ratio, bound, residual, qdd, rest, hides = (np.empty_like(trace.q) for _ in range(6))
+        ratio, bound, residual, qdd, shaken, around, rest, hides = (
+            np.empty_like(trace.q) for _ in range(8)
+        )
         steps = np.concatenate([[self.dt], intervals(trace.t, len(trace.t))])
         q, qd, current = (np.ascontiguousarray(x) for x in (trace.q, trace.qd, trace.current))
         native(self.arm, self.bound, self.load).run(
-            steps, q, qd, current, ratio, bound, residual, qdd, rest, hides
+            steps, q, qd, current, ratio, bound, residual, qdd, shaken, around, rest, hides
         )
-        return Judged(trace.t, trace.qd, qdd, ratio, bound, residual, rest > 0, hides)
+        signals = trace.qd, qdd, shaken, around, ratio, bound, residual, rest > 0, hides
+        return Judged(trace.t, *signals)
 
 
 @dataclass(frozen=True)
@@ -340,11 +345,14 @@ def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
 
 def _in_motion(bound: Bound, part: Judged) -> Array:
     """The bound of joints in motion without the additions at starts [N m], shape (T, n)."""
-    speed, own = np.abs(part.qd), np.abs(part.qdd)
-    hardest = np.broadcast_to(own.max(axis=1, keepdims=True), own.shape)
-    terms = np.stack([np.ones_like(speed), speed, own, hardest, np.exp(-speed / CREEP)])
+    terms = _terms(np.abs(part.qd), part.shaken, part.around)
     bounds: Array = np.maximum(np.einsum("ktj,jk->tj", terms, bound.moving), bound.least)
     return bounds
+
+
+def _terms(speed: Array, shaken: Array, around: Array) -> Array:
+    """What the bound in motion is linear in, ordered as :data:`PRIOR`, shape (5, ...)."""
+    return np.stack([np.ones_like(speed), speed, shaken, around, np.exp(-speed / CREEP)])
 
 
 def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
@@ -357,14 +365,12 @@ def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
         parts = [np.abs(getattr(p, name)[r]) for p, r in pairs]
         return np.concatenate([np.empty((0, len(friction))), *parts])
 
-    qd, qdd, residual = stacked("qd"), stacked("qdd"), stacked("residual")
-    hardest = qdd.max(axis=1, initial=0.0)
+    terms = _terms(*map(stacked, ("qd", "shaken", "around")))
+    residual = stacked("residual")
     found = np.empty((len(friction), len(PRIOR)))
     for j, level in enumerate(friction):
-        on = qd[:, j] >= SLOW
-        speed = qd[on, j]
-        slowness = np.exp(-speed / CREEP)
-        x = np.column_stack([np.ones(on.sum()), speed, qdd[on, j], hardest[on], slowness])
+        on = terms[1, :, j] >= SLOW
+        x = terms[:, on, j].T
         weight = WORTH / EVERY * USUAL
         found[j] = level * upper_quantile(x, residual[on, j] / level, QUANTILE, PRIOR, weight)
     return found

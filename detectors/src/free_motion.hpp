@@ -36,8 +36,7 @@ class FreeMotion {
   const std::vector<double>& residual() const { return left_; }
   // Absolute accelerations [rad/s^2].
   const std::vector<double>& qdd() const { return estimator_.acceleration(); }
-  bool rest(std::size_t j) const { return regimes_.rest(j); }
-  Regimes::Hides hides(std::size_t j) const { return regimes_.hides(j); }
+  const Regimes& regimes() const { return regimes_; }
 
   void reset() {
     count_ = 0;

@@ -28,11 +28,11 @@ FreeMotion* make(const Estimator& estimator, const Numbers& rest, const Numbers&
 void copy(const std::vector<double>& from, double* to) { std::copy(from.begin(), from.end(), to); }
 
 void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out2 bound,
-         Out2 residual, Out2 qdd, Out2 rest, Out2 hides) {
+         Out2 residual, Out2 qdd, Out2 shaken, Out2 around, Out2 rest, Out2 hides) {
   const std::size_t rows = q.shape(0), n = stream.joints();
   for (const auto& a : {q, qd, current})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
-  for (const auto& a : {ratio, bound, residual, qdd, rest, hides})
+  for (const auto& a : {ratio, bound, residual, qdd, shaken, around, rest, hides})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
   require(dt.shape(0) == rows, "run: dt must have one interval per row of q");
   nb::gil_scoped_release release;
@@ -45,8 +45,10 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
     copy(stream.residual(), residual.data() + at);
     copy(stream.qdd(), qdd.data() + at);
     for (std::size_t j = 0; j < n; ++j) {
-      rest.data()[at + j] = stream.rest(j);
-      hides.data()[at + j] = stream.hides(j);
+      shaken.data()[at + j] = stream.regimes().shaken(j);
+      around.data()[at + j] = stream.regimes().around(j);
+      rest.data()[at + j] = stream.regimes().rest(j);
+      hides.data()[at + j] = stream.regimes().hides(j);
     }
   }
 }
@@ -59,7 +61,8 @@ void bind_free_motion(nb::module_& m) {
            "turned"_a, "fast"_a, "hard"_a, "beyond"_a, "low"_a, "high"_a)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "ratio"_a.noconvert(),
            "bound"_a.noconvert(), "residual"_a.noconvert(), "qdd"_a.noconvert(),
-           "rest"_a.noconvert(), "hides"_a.noconvert());
+           "shaken"_a.noconvert(), "around"_a.noconvert(), "rest"_a.noconvert(),
+           "hides"_a.noconvert());
   m.attr("REGIME_SLOW") = slow;
   m.attr("REGIME_CREEP") = Regimes::creep;
   m.attr("REGIME_SETTLES") = Regimes::settles;

@@ -105,6 +105,9 @@ class Regimes {
   }
 
   bool rest(std::size_t j) const { return joints_[j].rest; }
+  // Accelerations in the bound [rad/s^2]: joint j's own and the largest; 0 at rest.
+  double shaken(std::size_t j) const { return joints_[j].shaken; }
+  double around(std::size_t j) const { return joints_[j].around; }
 
   // Whether joint j is the reason why joints are not judged: it moves (or did soon before), or it
   // stands elsewhere while joints move, and no log shows its motion.
@@ -166,7 +169,7 @@ class Regimes {
       double signal = left[j];
       if (one.rest) {
         if (!was || age_ < settling) one.base = one.before = residual[j];
-        one.shaken = one.hard = 0.0;
+        one.shaken = one.around = one.hard = 0.0;
         bound[j] = of_.rest[j] + std::max(of_.stop[j] * stirred_, of_.turned[j] * one.own);
         signal = changed(one, residual[j], bound[j], dt);
       } else {
@@ -195,28 +198,31 @@ class Regimes {
   struct Joint {
     // Time at rest or yielding, time above the speed `slow`, and time in motion until now [s].
     double slow_for = 10.0, quick_for = 0.0, moved = 0.0;
-    double base = 0.0, before = 0.0;  // baseline of the residual, and a slower baseline [N m]
-    double home = 0.0;                // `before` at the beginning of a contact [N m]
-    double most = 0.0;                // largest change from `home` in the contact [N m]
-    double bound = 1.0;               // bound at the beginning of the contact [N m]
-    double since = after;             // time since the end of a contact [s]
-    double own = 0.0;                 // fraction of `turned` that is added to the bound
-    double above = 0.0;               // weighted time above the bound [s]
-    int count = 0;                    // number of successive samples above the bound
-    double shaken = 0.0, hard = 0.0;  // parts of the bound due to acceleration [N m], [beyond]
-    int close = 0;                    // successive samples in motion above `near` times the bound
-    double unknown_for = 0.0;         // remaining time of motion that no log shows [s]
-    bool rest = false, held = false;  // held: takes part in a contact
-    bool away = false;                // stands where no log shows it
+    double base = 0.0, before = 0.0;    // baseline of the residual, and a slower baseline [N m]
+    double home = 0.0;                  // `before` at the beginning of a contact [N m]
+    double most = 0.0;                  // largest change from `home` in the contact [N m]
+    double bound = 1.0;                 // bound at the beginning of the contact [N m]
+    double since = after;               // time since the end of a contact [s]
+    double own = 0.0;                   // fraction of `turned` that is added to the bound
+    double above = 0.0;                 // weighted time above the bound [s]
+    int count = 0;                      // number of successive samples above the bound
+    double shaken = 0.0, around = 0.0;  // accelerations that decay: own, largest [rad/s^2]
+    double hard = 0.0;                  // part of the bound due to acceleration beyond the logs
+    int close = 0;                      // successive samples in motion above `near` times the bound
+    double unknown_for = 0.0;           // remaining time of motion that no log shows [s]
+    bool rest = false, held = false;    // held: takes part in a contact
+    bool away = false;                  // stands where no log shows it
   };
 
   double moving(std::size_t j, double qd, double qdd, double hardest, double dt) {
     const double* per = &of_.moving[RegimeBounds::terms * j];
     Joint& one = joints_[j];
     const double speed = std::fabs(qd), keep = std::exp(-dt / lag);
-    one.shaken = std::max(per[2] * std::fabs(qdd) + per[3] * hardest, keep * one.shaken);
+    one.shaken = std::max(std::fabs(qdd), keep * one.shaken);
+    one.around = std::max(hardest, keep * one.around);
     one.hard = std::max(harder * (std::fabs(qdd) / of_.hard[j] - 1.0), keep * one.hard);
-    const double linear = per[0] + per[1] * speed + per[4] * std::exp(-speed / creep) + one.shaken;
+    const double linear = per[0] + per[1] * speed + per[2] * one.shaken + per[3] * one.around +
+                          per[4] * std::exp(-speed / creep);
     const double more = std::max(speed / of_.fast[j] - 1.0, 0.0) + one.hard;
     return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-one.moved / starts) +
            of_.beyond[j] * std::min(more, farthest);

@@ -198,14 +198,17 @@ def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
         [
             np.ones_like(speed),
             speed,
-            np.abs(seen.qdd),
-            np.abs(seen.qdd).max(1)[:, None] + 0 * speed,
+            seen.shaken,
+            seen.around,
             np.exp(-speed / CREEP),
         ]
     )
     least = np.maximum(np.einsum("ktj,jk->tj", linear, bound.moving), bound.least)
     above = (seen.bound - least)[went]
     assert above.min() > -1e-9
+    both = ~seen.rest[1:] & ~seen.rest[:-1]
+    decayed = np.maximum(seen.qdd[1:], np.exp(-0.3) * seen.shaken[:-1])  # 10 ms of 33 ms
+    np.testing.assert_allclose(seen.shaken[1:][both], decayed[both], atol=1e-9)
     assert (np.median(above, axis=0) < 0.2 * bound.friction).all()  # what slow errors leave
 
 
