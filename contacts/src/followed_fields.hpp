@@ -89,7 +89,7 @@ class FollowedModel {
   // Whether a copied field has changed.
   bool changed() const { return fields_.changed(); }
   // Whether a copied field has changed or a number has become invalid.
-  bool to_look_at() {
+  bool needs_check() {
     if (!all_.changed()) return false;
     if (fields_.changed() || !numbers_.valid()) return true;
     all_.take();

@@ -102,7 +102,7 @@ class Guard {
     refuse_within_step();
     const Stepping stepping(this);
     owner_ = owner;
-    if (model_.to_look_at() || !stepper_->acceptable()) owner.attr("_follow")();
+    if (model_.needs_check() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {

@@ -101,7 +101,7 @@ void ImpactZone::add_rows(int count, int a, const double* at_a, int b, const dou
   std::vector<double> of_a(6 * nv, 0), of_b(6 * nv, 0);
   e_.jac(e_.model, e_.data, of_a.data(), of_a.data() + 3 * nv, at_a, a);
   e_.jac(e_.model, e_.data, of_b.data(), of_b.data() + 3 * nv, at_b, b);
-  const Vec3 carried[] = {mocap_.way(a, at_a) - mocap_.way(b, at_b),
+  const Vec3 carried[] = {mocap_.displacement(a, at_a) - mocap_.displacement(b, at_b),
                           mocap_.turn(a) - mocap_.turn(b)};
   for (std::size_t i = 0; i < 6 * nv; ++i) of_a[i] -= of_b[i];
   for (int k = 0; k < count; ++k) {

@@ -72,7 +72,7 @@ void Mocap::write(const Poses& poses) {
 }
 
 // Computes the kinematics of `other` for its joint positions and the given mocap poses.
-void Mocap::stand(const Poses& poses) {
+void Mocap::place_other(const Poses& poses) {
   for (std::size_t m = 0; m < poses.size(); ++m) {
     std::copy_n(poses[m].pos, 3, e_.other_mocap_pos + 3 * m);
     std::copy_n(poses[m].quat, 4, e_.other_mocap_quat + 4 * m);
@@ -105,7 +105,7 @@ bool Mocap::begin() {
   read(&commanded_);
   from_ = start_, to_ = commanded_;
   e_.copy_state(e_.model, e_.data, e_.other, e_.signature.pose);
-  stand(start_);
+  place_other(start_);
   return continued;
 }
 
@@ -132,13 +132,13 @@ void Mocap::add_turns(double* turn) const {
 
 bool Mocap::shifted() {
   if (!moves_ || jumps_) return false;
-  stand(to_);
+  place_other(to_);
   if (e_.ntendon) e_.tendon(e_.model, e_.other);
   e_.energy_pos(e_.model, e_.other);
   return true;
 }
 
-Vec3 Mocap::way(int body, const double* point) const {
+Vec3 Mocap::displacement(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
   if (m < 0 || !moves_) return {};
   const Pose &from = from_[m], &to = to_[m], &at = jumps_ ? to : from;
@@ -160,12 +160,12 @@ bool Mocap::carries(const Partners& pair) const {
   return moves_ && (hangs(pair.first) || hangs(pair.second));
 }
 
-double Mocap::parting(const Contact& contact) const {
+double Mocap::separation(const Contact& contact) const {
   if (!moves_) return 0;
   double sum = 0;
   for (int i = 0; i < 2; ++i) {
     if (contact.geom[i] < 0) continue;
-    const Vec3 w = way(e_.geom_bodyid[contact.geom[i]], contact.at);
+    const Vec3 w = displacement(e_.geom_bodyid[contact.geom[i]], contact.at);
     for (int k = 0; k < 3; ++k) sum += (i ? 1 : -1) * contact.normal[k] * w[k];
   }
   return sum;
@@ -180,7 +180,7 @@ double Mocap::work(const double* velocity, double length) {
     double force = 0;
     for (int row = contact.row; row < contact.row + e_.normal_rows(contact); ++row)
       force += (*e_.efc_force)[row];
-    sum -= force * parting(contact);
+    sum -= force * separation(contact);
   }
   if (std::none_of(pulled_.begin(), pulled_.end(), [](char p) { return p; })) return sum;
   speed_.resize(*e_.nefc);

@@ -57,11 +57,11 @@ class Mocap {
   // Whether some mocap body moves and one of the partners is a geom attached to a mocap body.
   bool carries(const Partners& pair) const;
   // The distance by which mocap bodies separate the partners along the contact's normal [m].
-  double parting(const Contact& contact) const;
+  double separation(const Contact& contact) const;
   // The displacement of a point that moves with the mocap body to which `body` is attached, and the
   // rotation vector of this body [rad]. The point is given in the present kinematics of the data,
   // which are those of the start of a sub-step or of the end of a whole step.
-  Vec3 way(int body, const double* point) const;
+  Vec3 displacement(int body, const double* point) const;
   Vec3 turn(int body) const;
   // Work of mocap bodies on all others, by contacts and equality constraints [J]. `velocity` is the
   // mean velocity of the sub-step.
@@ -76,7 +76,7 @@ class Mocap {
   bool jumps() const { return moves_ && jumps_; }
   void read(Poses* poses) const;
   void write(const Poses& poses);
-  void stand(const Poses& poses);
+  void place_other(const Poses& poses);
 
   const Engine& e_;
   std::vector<char> pulled_;

@@ -77,7 +77,7 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
     note_lost(hits);
     hits = unseen(std::move(hits));
     change = budget_.change(velocity_.data(), length, x_t1_.data());
-    const bool fails = !bearable(hits, length);
+    const bool fails = !tolerable(hits, length);
     if (!fails && !budget_.exceeded(change)) break;
     if (length <= least_ * whole_ || report_.steps >= s_.most) {
       change = last_resort(length, hits, change);
@@ -107,7 +107,7 @@ std::vector<Held> Stepper::held(double length) const {
 
 // Whether the hits are acceptable: no pair passes through, every pair is held (rows.hpp), and the
 // sub-step is already short.
-bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
+bool Stepper::tolerable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     return !hit.passed && speeds_.count(hit.pair) && length <= s_.deeper * whole_ * 1.000001;
   });

@@ -95,7 +95,7 @@ void Rows::aim_contact(const Contact& contact, double length, double push) {
   const double normal = count > 1 ? 0.5 * (now[first] + now[first + 1]) : now[first];
   const double apart =
       contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
-  const double speed = apart - mocap_.parting(contact) / length;
+  const double speed = apart - mocap_.separation(contact) / length;
   for (int row = first; row < first + count; ++row) {
     // Friction acts only if the bodies touch. Otherwise only normal motion is stopped.
     const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);

@@ -145,7 +145,7 @@ bool Stepper::step(const std::function<void()>& each) {
   report_ = Report{};
   if (hits.empty() && (!watched || within_budget())) {
     report_.contacts = *e_.ncon;
-    const bool released = stands();
+    const bool released = accept_step();
     if (lost) report_.passed = marked(passed_);
     mocap_.remember();
     stepping_ = false;
@@ -162,7 +162,7 @@ bool Stepper::step(const std::function<void()>& each) {
 }
 
 // Accepts the plain step. True if the contact parameters of some pair were restored.
-bool Stepper::stands() {
+bool Stepper::accept_step() {
   watched_ = std::max(watched_ - 1, 0);
   if (!guarded_count_) return false;
   ++since_;

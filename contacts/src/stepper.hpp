@@ -98,7 +98,7 @@ class Stepper {
   std::vector<int> stiffened() const;
 
  private:
-  bool stands();
+  bool accept_step();
   std::vector<PairHit> judge(Depth depth = Depth::all);
   bool finite() const;
   void number_pairs();
@@ -108,7 +108,7 @@ class Stepper {
   double join(const std::vector<PairHit>& through, double length);
   void move(double length);
   double shorter(const std::vector<PairHit>& hits, double length);
-  bool bearable(const std::vector<PairHit>& hits, double length) const;
+  bool tolerable(const std::vector<PairHit>& hits, double length) const;
   void note_lost(const std::vector<PairHit>& hits);
   void note_reset();
   std::vector<PairHit> unseen(std::vector<PairHit> hits);

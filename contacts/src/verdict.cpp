@@ -12,10 +12,10 @@ constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
 // Distances in unit roundoffs of the positions. `rounded` is the margin by which pairs must be
 // apart at the start. A sweep of the shapes of the last level ends at a distance of at least 128
-// (first_contact); `left_over` is below it.
+// (first_contact). The smaller `left_over` is the distance that they must still have afterwards.
 constexpr double rounded = 512, left_over = 64;
-// Bound on the relative rounding of sums of distances; longest chord of a rotation of radius 1.
-constexpr double slack = 1e-12, whole_chord = 2;
+constexpr double slack = 1e-12;    // bound on the relative rounding of sums of distances
+constexpr double whole_chord = 2;  // longest chord of a rotation of radius 1
 // Times at which eroded shapes are tested for overlap, as fractions of the rest of the step.
 constexpr double later[] = {1.0, 0.5, 0.25};
 

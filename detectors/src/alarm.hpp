@@ -88,7 +88,7 @@ struct AlarmSettings {
   std::int64_t samples = 1;  // successive samples above the threshold for an alarm
   std::int64_t memory = 1;   // window of the largest speed, in samples
   Levels levels;
-  Levels floor;  // normalisation of the plain thresholds; with K = 0 they are not used
+  Levels floor;  // normalisation of the thresholds on the residual; K = 0: not used
 };
 
 class Alarm {
@@ -114,8 +114,8 @@ class Alarm {
     const double plain = floored ? scores_->floor() : 0.0;
     if (!std::isfinite(score) || !std::isfinite(plain))
       throw std::invalid_argument(
-          "the score is not a number: a sample was far out of any arm's range; start a new stream "
-          "without it");
+          "the score is not a number, because a sample was beyond any arm's range; start a new "
+          "stream and leave it out");
     time_ = time_ < 0 ? 0.0 : time_ + dt;
     if (!set_.levels.speed.empty()) {
       const double now = speed_.step(qd, joints());

@@ -31,7 +31,7 @@
 // Without `sampled`, a measured torque acts until the next sample. With `sampled`, for low sample
 // rates, the mean of two samples acts between them. This avoids a lag of half a sample, by which
 // errors would be as large as a collision while an arm accelerates. The error of the mean is at
-// most half the difference of the samples, if a brake acts just after one of them.
+// most half the difference of the samples; it is so large if a brake acts just after one of them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 //
@@ -216,7 +216,7 @@ class Estimator {
     for (double& x : inertia_) x = std::sqrt(x);
   }
 
-  // Drive torques minus friction, and how much a unit of each own unknown of a joint reduces them.
+  // Drive torques minus friction, and their decrease per unit of each of the joint's own unknowns.
   void drive(const double* q, const double* qd, const double* current) {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {

@@ -1,7 +1,7 @@
 // The free-motion detector: each joint's ratio of signal to bound from the samples of an arm.
 //
 // Samples are averaged over `interval`; an alarm needs tens of milliseconds above a bound anyway.
-// The estimator gets the mean before the last one, with the median of the last three currents.
+// The estimator gets the second of the last three means, with the median of their currents.
 #pragma once
 
 #include <algorithm>

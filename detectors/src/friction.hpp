@@ -9,8 +9,9 @@
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
 //   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
 //   ripple frequency c, tau |tau| with `saturation`
-// The load is the drive's torque or, with `modelled`, the torque by the arm's model: the drive
-// torque of a joint that carries no load is mostly friction, which would then predict itself.
+// The load is the drive's torque or, with `modelled`, the torque by the arm's model. The drive
+// torque of a joint without load is mostly friction, so as the load it would predict friction from
+// friction.
 #pragma once
 
 #include <algorithm>

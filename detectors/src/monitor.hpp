@@ -79,7 +79,7 @@ class Monitor {
     known_ = true;
     time_ = t;
     const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
-    // When an alarm ends, `torques_` forgets it, so that the contact's torques are not a fault.
+    // When an alarm ends, the torque check starts again, so that the contact is not a fault.
     if (said_.alarm && !up) torques_.reset();
     const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
     if (t < ready_ && reason_.fault != Fault::none)

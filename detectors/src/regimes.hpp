@@ -10,8 +10,8 @@
 // all joints that stood is the residual minus its level before the contact. The contact is released
 // when the joint that had the largest ratio falls below half of it. It is also released when
 // nothing has changed for a second and the remaining signal is within what static friction can
-// keep. For a second after the release only a change away from the former level counts, so letting
-// go is not a new contact. Joints that the contact turned get a higher bound, because their
+// keep. For a second after the release only a change away from the former level counts, so that the
+// release is not a new contact. Joints that the contact turned get a higher bound, because their
 // controllers act.
 //
 // While the signal at rest is above half of its bound, the baseline follows more slowly, so that a
@@ -19,10 +19,10 @@
 // baseline follows at its normal rate; in a contact it helps to detect the release.
 //
 // In motion the signal is the residual without slow errors. The bound is linear in speed,
-// accelerations and slowness; slowness covers friction between static and sliding near standstill.
-// A joint that starts gets a higher bound, and so does one that is faster or accelerates harder
-// than the training logs show: friction and inertia beyond them are extrapolated. The parts due to
-// acceleration decay as the residual does: the observer still shows an error when its jerk is over.
+// accelerations and exp(-speed / `creep`), which covers the change from static to sliding friction.
+// A joint that starts gets a higher bound. So does a joint that is faster, or accelerates more,
+// than in the training logs, because friction and inertia are extrapolated there. The parts due to
+// acceleration decay with the time constant of the observer, as the errors that they cover do.
 //
 // A joint that moves in no training log has `low` and `high`, the positions at which it stood.
 // While it moves, and soon after, nothing is judged. While it stands elsewhere, moving joints are
@@ -35,7 +35,7 @@
 //
 // A robot's protective stop ends a contact within 30 to 80 ms, before the duration is reached. So
 // if the arm brakes to standstill at once, a joint is confirmed whose signal was near its bound for
-// three samples before the arm began to brake. What comes later may be due to the braking.
+// three samples before the arm began to brake. Later signals may be due to the braking.
 #pragma once
 
 #include <algorithm>
@@ -51,7 +51,7 @@ struct RegimeBounds {
   std::vector<double> rest;        // bound of a joint that has been at rest for long [N m], n
   std::vector<double> stop;        // added by present or recent motion of any joint [N m], n
   std::vector<double> least;       // least bound in motion [N m], n
-  std::vector<double> moving;      // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
+  std::vector<double> moving;      // per 1, |qd_j|, |qdd_j|, largest |qdd|, exp(-|qd_j| / creep)
   std::vector<double> start;       // added at a start [N m], n
   std::vector<double> turned;      // added after a contact has turned the joint [N m], n
   std::vector<double> fast, hard;  // largest speed, acceleration in logs [rad/s, rad/s^2], n
@@ -66,7 +66,7 @@ class Regimes {
   static constexpr double gives = 0.2;  // time for which a standing arm yields to a push [s]
   static constexpr double full_speed = 0.1;  // speed from which `stop` counts fully [rad/s]
   static constexpr double settling = 0.3;    // of the observer at the beginning [s]
-  static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
+  static constexpr double creep = 0.05;      // speed at which exp(-speed / creep) is 1/e [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double wary = 0.5;        // fraction of the bound above which `slower` applies
@@ -265,7 +265,7 @@ class Regimes {
     return change;
   }
 
-  // A contact, or one more joint in it.
+  // Begins a contact, or adds a joint to it.
   void begin(const double* bound) {
     if (!touched_) peak_ = still_ = 0.0;
     touched_ = true;

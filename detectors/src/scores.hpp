@@ -20,7 +20,7 @@ class Scores {
   virtual void reset() = 0;  // the next sample is the first
   // The score of a sample, `dt` s after the last one; n numbers each.
   virtual double step(const double* q, const double* qd, const double* current, double dt) = 0;
-  // The score of the plain thresholds that this detector contains, at the same sample.
+  // The score of the detector's thresholds on the residual, if it has any, at the same sample.
   virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
   // An estimator that steps with each sample as given, or null.
   virtual const Estimator* estimator() const { return nullptr; }
@@ -113,7 +113,7 @@ inline double severity(double target) {
   return bounded / (1 - bounded);
 }
 
-// Plain thresholds on the residual with another scaling; none if `limits` is empty.
+// Thresholds on the residual with another scaling; none if `limits` is empty.
 struct Floor {
   Scaling scaling;
   std::vector<double> limits;

@@ -103,7 +103,7 @@ struct Controls {
   }
 
   // The wanted motor torque [N m] of joint i in physics step `row` of the action or table,
-  // `elapsed` after its beginning.
+  // `elapsed` [s] after the beginning of the action.
   double wanted(const Joint& j, std::size_t i, std::size_t row, double elapsed, double q,
                 double qd) const {
     if (mode == Mode::table) {

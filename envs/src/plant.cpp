@@ -60,8 +60,8 @@ void check_action(const Plant& p, Vector action) {
   check(action.data(), action.shape(0), 0);
 }
 
-// During the lifetime of an object, MuJoCo does not read the clock for `MjData.timer`, which takes
-// a tenth of a small arm's step. Any thread can call the function that replaces the clock.
+// While an object of this class lives, MuJoCo does not read the clock for `MjData.timer`, which
+// takes a tenth of a small arm's step. Any thread can call the function that replaces the clock.
 class Untimed {
  public:
   using Clock = double (*)();
