@@ -10,7 +10,7 @@ from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobia
 from tauguard.detectors.diagnosis.diagnosis import SURE, Diagnoser
 from tauguard.detectors.diagnosis.severity import CONTACT_FRACTION
 from tauguard.detectors.diagnosis.tool_contact import tool_severity
-from tests.detectors.diagnosis.test_severity import HOME, ROBOT, SURFACE, seen
+from tests.detectors.diagnosis.test_severity import HOME, ROBOT, seen, surface
 
 FRICTION = np.array([8.0, 6.0, 5.0, 2.0, 2.0, 2.0])
 GEARED = ArmModel(ROBOT, np.ones(6), FrictionModel.coulomb_viscous(FRICTION, np.zeros(6)))
@@ -52,7 +52,7 @@ def test_intervals_hold_what_friction_hides():
 def test_a_tool_of_unknown_length_is_allowed_for():
     rng, held, wide = np.random.default_rng(6), 0, []
     poses = link_poses(ROBOT, HOME)
-    tip = SURFACE.only([6])
+    tip = surface().only([6])
     side = np.sign((tip.point @ ROBOT.axis[-1]).mean())
     end = np.max(side * (tip.point @ ROBOT.axis[-1]))
     for _ in range(40):
@@ -93,5 +93,5 @@ def test_a_residual_below_its_first_value_leaves_an_impulse_within_what_the_peak
 
 
 def test_a_diagnoser_that_is_told_the_tool_names_the_last_link():
-    assert set(Diagnoser.of(DIRECT, SURFACE, at_tool=True).surface.link) == {5}
+    assert set(Diagnoser.of(DIRECT, surface(), at_tool=True).surface.link) == {5}
     assert 0.5 < SURE < 1
