@@ -37,7 +37,8 @@ SETTINGS = {
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
     "look": 16,  # largest number of steps between two tests whether held pairs have separated
     "allowed": 0.01,  # energy that contacts may add, as a fraction of the initial kinetic energy
-    "deeper": 1 / 2,  # longest sub-step in which a held pair may get deeper [step]
+    "deeper_geom": 1 / 8,  # longest sub-step in which a held pair may get deeper [step]
+    "deeper_flex": 1 / 2,  # the same for pairs with a flex
     "turned": 1.0,  # rotation in a step above which full turns are counted [rad]
 }
 

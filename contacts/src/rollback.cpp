@@ -109,7 +109,9 @@ std::vector<Held> Stepper::held(double length) const {
 // sub-step is already short.
 bool Stepper::tolerable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
-    return !hit.passed && speeds_.count(hit.pair) && length <= s_.deeper * whole_ * 1.000001;
+    const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
+    const double share = rigid ? s_.deeper_geom : s_.deeper_flex;
+    return !hit.passed && speeds_.count(hit.pair) && length <= share * whole_ * 1.000001;
   });
 }
 

@@ -50,8 +50,9 @@ struct Settings {
   int most;
   double beyond, room, smallest, push;
   int watched, look;
-  double deeper, turned, allowed;
-  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper, turned, allowed)
+  double deeper_geom, deeper_flex, turned, allowed;
+  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper_geom,
+                  deeper_flex, turned, allowed)
 };
 
 // What a guard covers.
