@@ -33,9 +33,9 @@ class Planned:
     split: str
     number: int  #: within the split, from 0
     arm: str
-    individual: int  #: seed of the arm's mismatch, -1 for none
+    individual: int  #: seed of the arm's differences from the nominal arm; -1: none
     episode: Episode
-    source: str = ""  #: name or file of the arm; "": the name ``arm``
+    source: str = ""  #: name or file from which the arm is read; "": ``arm``
 
     @property
     def name(self) -> str:

@@ -83,7 +83,7 @@ def add_sheet(
     radius: float,
     young: float,
 ) -> None:
-    """Add an elastic sheet of any shape, free of pins, as the flex ``garment_sheet``.
+    """Add an elastic sheet of any shape, pinned nowhere, as the flex ``garment_sheet``.
 
     Args:
         spec: a spec with the integrator ``discrete``.

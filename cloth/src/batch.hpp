@@ -18,8 +18,9 @@ inline constexpr int width = 4;
 // `width` queries.
 struct Group {
   enum Field { cubic = 0, error = 4, big = 5, scale = 6, fields = 7 };
-  // scale: a power of two that brings the largest difference into [1, 2); big: this scaled
-  // difference. The cubic and its error are those of the scaled query.
+  // The largest difference is the largest coordinate of a query's three vectors between vertices,
+  // at both ends of the step. scale: a power of two that brings it into [1, 2); big: the largest
+  // difference times `scale`. The cubic and its error are those of the scaled query.
   alignas(64) double value[fields][width];
   enum Flag : std::int64_t {
     odd = 1,       // the largest difference is too small, too large or not finite
@@ -35,7 +36,7 @@ struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-// What is known of a piece, or of a query, in place of a time of contact. `never`: no contact.
+// Values that a piece or a query can have in place of a time of contact. `never`: no contact.
 // `edge`: rounding leaves open whether the contact point is in the feature. `unknown`: rounding
 // leaves open whether there is a root.
 inline constexpr double never = std::numeric_limits<double>::infinity(), edge = -1, unknown = -2;

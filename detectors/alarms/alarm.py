@@ -46,11 +46,11 @@ class CollisionAlarm(Frozen):
     threshold: float  #: of the normalised score
     confirmation: float = CONFIRMATION  #: confirmation time [s]
     normalisation: SpeedNormalisation | None = None  #: None: the score is not normalised
-    inputs: UsualInput | None = None  #: limits of usual samples; None: unknown, no fault checks
+    inputs: UsualInput | None = None  #: limits of samples without a fault; None: no fault checks
     floor: SpeedNormalisation | None = None
-    """Normalisation of the score of ``detector.floor``: thresholds on the residual, used in
-    addition to a learned score. The larger of the two normalised scores is used. None: only the
-    learned score is used."""
+    """Normalisation of the floor's score. The floor, ``detector.floor``, sets thresholds on the
+    residual beside a learned score. The larger of the two normalised scores is used. None: only the
+    detector's own score is used."""
 
     def __post_init__(self) -> None:
         """Check the fields: ``ValueError``."""
@@ -58,7 +58,7 @@ class CollisionAlarm(Frozen):
         if np.isnan(self.threshold):
             raise ValueError("threshold: not a number")
         if self.floor is not None and (self.normalisation is None or floor_of(self) is None):
-            raise ValueError("floor: needs a detector with plain thresholds and a normalisation")
+            raise ValueError("floor: needs a normalisation and a detector with a floor")
 
     @property
     def settle(self) -> float:
@@ -166,7 +166,7 @@ class AlarmStream:
     """
 
     def __init__(self, alarm: CollisionAlarm) -> None:
-        """Start before the first sample."""
+        """Set up the state before the first sample."""
         detector = alarm.detector
         self._dt, self._first = detector.dt, True
         self.native = _observer.Alarm(

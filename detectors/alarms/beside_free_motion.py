@@ -77,7 +77,7 @@ class BothStreams:
     """The free-motion detector and the learned alarm, sample by sample."""
 
     def __init__(self, detector: BesideFreeMotion) -> None:
-        """Start before the first sample."""
+        """Set up the state before the first sample."""
         self._free = detector.free.stream()
         self._learned = AlarmStream(detector.learned)
         self._threshold = detector.learned.threshold

@@ -64,7 +64,7 @@ class Monitor:
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
-        """Begin before the first sample."""
+        """Set up the state before the first sample."""
         torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
         self._usual = usual
         self._native = _observer.Monitor(

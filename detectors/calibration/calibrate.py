@@ -54,7 +54,7 @@ class Priors:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibrated arm and how it was found."""
+    """A calibrated arm, with the payloads of its traces and the residual that remains."""
 
     arm: ArmModel
     payloads: Array  #: mass and first moment of each trace's payload [kg, kg m], (traces, 4)

@@ -49,11 +49,11 @@ class TorqueCheck:
     """
 
     def __init__(self, arm: ArmModel, dt: float, ratios: Array | None = None) -> None:
-        """Begin before the first sample.
+        """Set up the state before the first sample.
 
         Args:
             arm: calibrated.
-            dt: sample interval of steps [s].
+            dt: time between two calls of :meth:`step` [s].
             ratios: of the training traces, see :func:`torque_ratios` (default: all 1).
         """
         seen = np.ones((3, arm.robot.joints)) if ratios is None else ratios
@@ -286,7 +286,7 @@ class FaultCheck:
     """Checks samples one by one for faults."""
 
     def __init__(self, usual: UsualInput) -> None:
-        """Begin before the first sample."""
+        """Set up the state before the first sample."""
         self.usual = usual
         self.native = _observer.FaultCheck(
             usual.dt,

@@ -109,7 +109,7 @@ class FrontEndSettings:
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
         """Identify the arm and its noise model from the collision-free rows.
 
-        The last result is cached as long as the traces exist, for methods with equal settings.
+        Equal settings return their last result again if traces and arm are the same objects.
 
         Raises:
             ValueError: traces of different arms or rates, or without collision-free motion, or no

@@ -20,8 +20,9 @@
 // With `weighted`, the unexplained residual is multiplied by s / S. s is the standard deviation of
 // its noise, S that of noise and payload error together.
 //
-// The noise of the residual grows with the speed and with `motion_numbers` more quantities of a
-// joint (only if there are unknowns; M is the mass matrix of arm and estimated payload):
+// The noise of a joint's residual grows with the joint's speed and with `motion_numbers` other
+// quantities. M is the mass matrix of arm and estimated payload. Without unknowns the first three
+// quantities are 0.
 // * the torque of accelerations, sum_k |M_jk qdd_k|, because inertia is uncertain;
 // * the norm of the joint's row of M, because at rest most of the noise is velocity noise times
 //   inertia;
@@ -29,9 +30,10 @@
 // * with `sampled`, half the change of torque since the last sample.
 //
 // Without `sampled`, a measured torque acts until the next sample. With `sampled`, for low sample
-// rates, the mean of two samples acts between them. This avoids a lag of half a sample, by which
-// errors would be as large as a collision while an arm accelerates. The error of the mean is at
-// most half the difference of the samples; it is so large if a brake acts just after one of them.
+// rates, the mean of two samples acts between them. This avoids a lag of half a sample. While an
+// arm accelerates, such a lag would cause residuals as large as those of a collision. The error of
+// the mean is at most half the difference of the samples, and reaches this if a brake acts just
+// after the first of them.
 //
 // The plain residual is that of an observer of rate `plain_gain` without a Kalman filter.
 //
@@ -55,7 +57,7 @@ namespace tauguard::detectors {
 
 constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
-constexpr int motion_numbers = 4;           // number of the quantities above without the speed
+constexpr int motion_numbers = 4;           // number of the quantities listed above
 constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
 constexpr double slow = 0.02;               // largest speed of a joint at rest [rad/s]
 

@@ -1,18 +1,19 @@
 // The regime of each joint of a real arm (at rest, starting, in motion, in a contact), and for each
-// regime the signal that is judged and its largest value without a contact, the bound.
+// regime the signal that is judged and its largest value without a contact, the bound. The ratio of
+// a joint is the magnitude of its signal divided by its bound.
 //
 // At rest, static friction can hold any torque. The signal is therefore the residual minus a
 // baseline that follows the residual. Motion of one joint changes the torques of the joints at
 // rest, by the integral action of their controllers and by changing loads. Motion therefore raises
 // the bound at rest, fully from `full_speed` on. This addition decays within about a second.
 //
-// A contact with a standing arm lasts from its beginning to its release. Meanwhile the signal of
-// all joints that stood is the residual minus its level before the contact. The contact is released
-// when the joint that had the largest ratio falls below half of it. It is also released when
-// nothing has changed for a second and the remaining signal is within what static friction can
-// keep. For a second after the release only a change away from the former level counts, so that the
-// release is not a new contact. Joints that the contact turned get a higher bound, because their
-// controllers act.
+// A contact with a standing arm begins when a ratio above 1 of a joint at rest is confirmed. Until
+// the contact is released, the signal of all joints that stood is the residual minus its level
+// before the contact. The contact is released when the ratio of the joint with the largest ratio
+// falls below half of that largest ratio. It is also released when nothing has changed for a second
+// and the remaining signal is within what static friction can keep. For a second after the release
+// only a change away from the former level counts, so that the release is not a new contact. Joints
+// that the contact turned get a higher bound, because their controllers act.
 //
 // While the signal at rest is above half of its bound, the baseline follows more slowly, so that a
 // push that grows slowly is found. During a contact, soon after it, and while a joint moves, the
@@ -30,8 +31,9 @@
 //
 // A ratio above 1 is reported as 1 until it is confirmed by its duration. In motion and soon after
 // it, the required duration is longer, because ripple and jerks exceed a bound for longer than
-// noise at rest. Time counts more above a ratio of 2, and twice from a ratio of 3 on, so that an
-// impact of some tens of ms is confirmed. A gap between samples counts as one sample.
+// noise at rest. Time at a ratio of 3 or more counts twice, and time at ratios from 2 to 3 counts
+// between once and twice, so that an impact of some tens of ms is confirmed. A gap between samples
+// counts as one sample.
 //
 // A robot's protective stop ends a contact within 30 to 80 ms, before the duration is reached. So
 // if the arm brakes to standstill at once, a joint is confirmed whose signal was near its bound for
@@ -51,11 +53,11 @@ struct RegimeBounds {
   std::vector<double> rest;        // bound of a joint that has been at rest for long [N m], n
   std::vector<double> stop;        // added by present or recent motion of any joint [N m], n
   std::vector<double> least;       // least bound in motion [N m], n
-  std::vector<double> moving;      // per 1, |qd_j|, |qdd_j|, largest |qdd|, exp(-|qd_j| / creep)
+  std::vector<double> moving;      // factors of 1, |qd|, |qdd|, largest |qdd|, exp(-|qd| / creep)
   std::vector<double> start;       // added at a start [N m], n
   std::vector<double> turned;      // added after a contact has turned the joint [N m], n
   std::vector<double> fast, hard;  // largest speed, acceleration in logs [rad/s, rad/s^2], n
-  std::vector<double> beyond;      // added at 2 `fast`, in proportion to the excess [N m], n
+  std::vector<double> beyond;      // added at 2 `fast`; grows linearly from 0 at `fast` [N m], n
   std::vector<double> low, high;   // positions in logs of joints that move in no log [rad], n
   static constexpr double anywhere = 1e6;  // `high` of joints that move in some log [rad]
 };

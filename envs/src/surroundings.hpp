@@ -1,4 +1,4 @@
-// The surroundings of a plant's drives, and the arrays for its results.
+// What a plant has besides its drives (links, people, contact sensors), and arrays for its results.
 #pragma once
 
 #include <cstddef>

@@ -32,8 +32,8 @@ inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
 // Whether the sign of `side` may be wrong because of rounding (step 1 of depth_bound.hpp). `spread`
-// is the largest difference of the face's corners along its normal. True if a square leaves the
-// range of doubles.
+// is the largest difference of the face's corners along its normal. Also true if a square is too
+// small or too large for a double.
 inline bool side_is_rounding(double side, double spread, double square, double size) {
   const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
   return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);

@@ -1,4 +1,4 @@
-"""Simulation and environments: cost of the parts of a scene, and of the time step."""
+"""Simulation and environments: computing time of their parts, error against time step."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ STUDY = Study(
     {
         "scene": Part(
             "simulation.scene",
-            "computing time of each part of a scene; error at each time step",
+            "computing time of each part of a scene; error for each length of the time step",
         ),
         "needs": Part(
             "simulation.needs",
