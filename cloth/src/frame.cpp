@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <numeric>
 #include <vector>
 
 #include "apart.hpp"
@@ -41,30 +42,31 @@ struct Answers {
   Hit hits[CandidateBlock::capacity];
 };
 
-// All collisions in the order of their pairs. A pair occurs once, so the order is unique. It is a
-// radix sort from the last digit, which skips bits that no pair uses.
-SpareArray<Hit> in_order(const std::vector<Part>& parts,
+// All collisions in the order of their pairs. A pair occurs once, so the order is unique.
+// `features` is the number of values of a pair's first number. Hits are put into groups of
+// successive first numbers, at most two groups per hit, and the groups are sorted in parallel.
+SpareArray<Hit> in_order(const std::vector<Part>& parts, std::size_t features, int threads,
                          const std::shared_ptr<SpareMemory>& spare) {
-  constexpr int digit = 11;
+  constexpr std::size_t grain = 4096;
   std::size_t n = 0;
   for (const auto& part : parts) n += part.hits.size();
-  SpareArray<Hit> hits(spare, n), other(spare, n);
-  std::uint64_t used = 0;
-  Hit* next = hits.data();
-  for (const auto& part : parts) {
-    for (const auto& hit : part.hits) used |= hit.pair;
-    next = std::copy(part.hits.begin(), part.hits.end(), next);
-  }
-  for (int shift = 0; shift < 64 && used >> shift != 0; shift += digit) {
-    shift += __builtin_ctzll(used >> shift);
-    const auto value = [shift](const Hit& hit) { return hit.pair >> shift & ((1u << digit) - 1); };
-    const Hit *begin = hits.data(), *end = begin + n;
-    std::size_t start[(1 << digit) + 1] = {};
-    for (const Hit* hit = begin; hit < end; ++hit) ++start[value(*hit) + 1];
-    for (int i = 0; i < 1 << digit; ++i) start[i + 1] += start[i];
-    for (const Hit* hit = begin; hit < end; ++hit) other[start[value(*hit)]++] = *hit;
-    std::swap(hits, other);
-  }
+  int shift = 0;
+  while (features >> shift > 2 * n) ++shift;
+  const std::size_t groups = (features >> shift) + 1;
+  SpareArray<Hit> hits(spare, n);
+  // The start of each group, and after the hits were moved its end.
+  SpareArray<std::size_t> place(spare, groups + 1);
+  std::fill_n(place.data(), groups + 1, 0);
+  for (const auto& part : parts)
+    for (const auto& hit : part.hits) ++place[(hit.first() >> shift) + 1];
+  std::partial_sum(place.data(), place.data() + groups, place.data());
+  for (const auto& part : parts)
+    for (const auto& hit : part.hits) hits[place[hit.first() >> shift]++] = hit;
+  geometry::interruptible_for(groups, threads, grain, [&](auto begin, auto end, auto) {
+    for (auto group = begin; group < end; ++group)
+      std::sort(hits.data() + (group == 0 ? 0 : place[group - 1]), hits.data() + place[group],
+                [](const Hit& a, const Hit& b) { return a.pair < b.pair; });
+  });
   return hits;
 }
 
@@ -106,16 +108,16 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
     all.stats += part.stats;
     all.narrow_s += part.narrow_s;
   }
-  const auto hits = in_order(parts, ccd.spare());
+  const bool vf = kind == MeshCcd::Kind::vf;
+  const Topology& of = ccd.topology();
+  const Features &a = vf ? of.vertices : of.edges, &b = vf ? of.faces : of.edges;
+  const auto hits = in_order(parts, vf ? of.rows() : a.size(), ccd.threads(), ccd.spare());
   const std::size_t n = hits.size();
   all.pairs = {ccd.spare(), 2 * n};
   all.toi = {ccd.spare(), n};
   all.point = {ccd.spare(), 3 * n};
   all.normal = {ccd.spare(), 3 * n};
   all.weights = {ccd.spare(), 4 * n};
-  const bool vf = kind == MeshCcd::Kind::vf;
-  const Topology& of = ccd.topology();
-  const Features &a = vf ? of.vertices : of.edges, &b = vf ? of.faces : of.edges;
   (vf ? describe_all<true> : describe_all<false>)(ccd.ends(), a, b, hits, ccd.threads(), all);
   return all;
 }
