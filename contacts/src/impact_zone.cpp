@@ -75,6 +75,7 @@ ImpactZone::ImpactZone(const Engine& engine, const Mocap& mocap, double length)
 bool ImpactZone::add(int pair, const Partners& partners,
                      const std::vector<std::int32_t>& vertices) {
   if (!added_.emplace(pair, vertices).second) return false;
+  begin_.push_back(carried_.size());
   const Place &one = partners.first, &other = partners.second;
   const int geom = other.kind == Place::geom ? e_.geom_bodyid[other.number] : -1;
   if (one.kind == Place::geom) {
@@ -112,6 +113,26 @@ void ImpactZone::add_rows(int count, int a, const double* at_a, int b, const dou
   }
 }
 
+// Multiplies the rows of each pair by a power of two that brings their largest inverse inertia into
+// [1, 4), so that the rows of heavy bodies do not count as dependent beside those of light ones.
+void ImpactZone::scale(std::vector<double>* square, std::vector<double>* speeds,
+                       std::vector<double>* factors) const {
+  const std::size_t n = carried_.size();
+  factors->assign(n, 1);
+  for (std::size_t k = 0; k < begin_.size(); ++k) {
+    const std::size_t end = k + 1 < begin_.size() ? begin_[k + 1] : n;
+    double most = 0;
+    for (std::size_t i = begin_[k]; i < end; ++i) most = std::max(most, (*square)[(n + 1) * i]);
+    if (!(most > 0)) continue;
+    const double factor = std::ldexp(1.0, -(std::ilogb(most) >> 1));
+    std::fill(factors->begin() + begin_[k], factors->begin() + end, factor);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    (*speeds)[i] *= (*factors)[i];
+    for (std::size_t j = 0; j < n; ++j) (*square)[n * i + j] *= (*factors)[i] * (*factors)[j];
+  }
+}
+
 // With the mocap velocity c and the impulses S: J M^-1 J' S = J v + c; mocap bodies do the work S
 // c.
 bool ImpactZone::join(double* work) {
@@ -128,8 +149,11 @@ bool ImpactZone::join(double* work) {
       square[n * i + j] = dot(&rows_[nv * i], &weighted_[nv * j], nv);
   }
   if (!finite(square) || !finite(speeds)) return false;
-  const std::vector<double> impulses = least_squares(square, speeds);
+  std::vector<double> factors;
+  scale(&square, &speeds, &factors);
+  std::vector<double> impulses = least_squares(square, speeds);
   for (std::size_t i = 0; i < n; ++i) {
+    impulses[i] *= factors[i];
     *work += impulses[i] * carried_[i];
     for (std::size_t k = 0; k < nv; ++k) joined[k] -= impulses[i] * weighted_[nv * i + k];
   }

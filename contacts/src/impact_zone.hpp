@@ -25,11 +25,14 @@ class ImpactZone {
 
  private:
   void add_rows(int count, int a, const double* at_a, int b, const double* at_b);
+  void scale(std::vector<double>* square, std::vector<double>* speeds,
+             std::vector<double>* factors) const;
 
   const Engine& e_;
   const Mocap& mocap_;
   double length_;
   std::set<std::pair<int, std::vector<std::int32_t>>> added_;
+  std::vector<std::size_t> begin_;                 // first row of each pair
   std::vector<double> free_;                       // velocity of the failed sub-step (nv)
   std::vector<double> rows_, weighted_, carried_;  // Jacobian J (R, nv), J M^-1, mocap velocity (R)
 };

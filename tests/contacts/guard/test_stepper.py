@@ -216,6 +216,25 @@ def test_partners_in_an_impact_zone_move_as_one_and_keep_their_momentum(aside):
         np.testing.assert_allclose(data.qvel, [-100, 0, 0, 0, 0, 0] * 2, atol=1e-9)
 
 
+def test_heavy_and_light_partners_in_one_impact_zone_do_not_stand_still():
+    """Two pairs of equal bodies, 1 kg and 1 mg, meet: each moves on with its mean velocity.
+
+    Spinning a ball of 1 mg and 1 mm takes 2.5e-12 of the impulse times length that 1 kg takes.
+    """
+    model = mujoco.MjModel.from_xml_string("""<mujoco><size memory="2600"/>
+      <option gravity="0 0 0" timestep="2e-3"/><worldbody>
+      <body><freejoint/><geom size=".1" mass="1"/></body>
+      <body pos=".5 0 0"><freejoint/><geom size=".1" mass="1"/></body>
+      <body pos="0 9 0"><freejoint/><geom size=".001" mass="1e-6"/></body>
+      <body pos=".005 9 0"><freejoint/><geom size=".001" mass="1e-6"/></body>
+      </worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qvel[::6] = 300, -100, 3, -1
+    report = GuardedStepper(model, data, most=2).step()
+    assert len(report.impact_zones) == 2
+    np.testing.assert_allclose(data.qvel[::6], [100, 100, 1, 1], rtol=1e-9)
+
+
 def test_a_state_that_somebody_changes_is_seen():
     """The guard keeps the last step's end; a ball that is put elsewhere starts from there."""
     model, data = ball_cloth(50.0, offset=1.0).start(1e-3)
