@@ -143,12 +143,9 @@ def load_arm(source: str | Robot) -> Arm:
             joints; the message says what would work.
         FileNotFoundError: no such name or file.
     """
-    robot = source if isinstance(source, Robot) else Robot.named(str(source))
+    robot = described_robot(source)
     if robot.file in NAMED:
         return _cura6(robot)
-    if robot.file.lower().endswith(".toml") and Path(robot.file).is_file():
-        described = Robot.from_toml(robot.file)
-        robot = described if robot.joints is None else replace(described, joints=robot.joints)
     path, sources = Path(robot.file), dict[str, str]()
     if not path.is_file():
         robot, path, sources = _by_name(robot)
@@ -161,6 +158,15 @@ def load_arm(source: str | Robot) -> Arm:
     except ValueError as error:
         raise ValueError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
     return replace(arm, spec=arm.spec.copy())
+
+
+def described_robot(source: str | Robot) -> Robot:
+    """The robot that ``source`` of :func:`load_arm` is, with what a TOML file says about it."""
+    robot = source if isinstance(source, Robot) else Robot.named(str(source))
+    if not (robot.file.lower().endswith(".toml") and Path(robot.file).is_file()):
+        return robot
+    described = Robot.from_toml(robot.file)
+    return described if robot.joints is None else replace(described, joints=robot.joints)
 
 
 @functools.lru_cache(maxsize=4)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
-from tauguard.models.arm import NAMED, Arm, Facts, load_arm
+from tauguard.models.arm import NAMED, Arm, Facts, described_robot, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
 from tauguard.models.drive import Drive
@@ -195,9 +195,10 @@ def masks_match(model: mujoco.MjModel) -> bool:
 
 def _nominal_text(arm: Arm, spec: SceneSpec, whole: mujoco.MjSpec) -> SpecText:
     """MJCF of the arm that an observer assumes, with a rigid gripper."""
-    if not (arm.facts.gripper and isinstance(spec.arm, Robot) and spec.arm.gripper == "passive"):
+    robot = described_robot(spec.arm)
+    if not (arm.facts.gripper and robot.gripper == "passive"):
         return SpecText(whole)
-    rigid = compose(replace(spec, arm=replace(spec.arm, gripper="weld")))
+    rigid = compose(replace(spec, arm=replace(robot, gripper="weld")))
     return rigid.arm_text
 
 

@@ -175,6 +175,8 @@ class Simulation:
         if self.episode.objects or not self.scene.obstacle_names:
             return whole
         bare = scene_for(replace(self.episode, collisions=()), visuals=False)
+        if bare.model.nv > len(bare.joint_names):  # joints of a passive gripper are not handed over
+            return whole
         loop = SimulationLoop(replace(bare, drive=self.scene.drive), self.nominal)
         loop.reset(self.motion.q[0])
         states = self._rollout

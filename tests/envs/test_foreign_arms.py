@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from tauguard.envs import CollisionPlan, Episode, Simulation
 from tauguard.envs.gym.settings import CONTROLS
 from tauguard.models import Robot
 from tests.models.arms import random_arm
@@ -45,6 +46,18 @@ def test_a_passive_gripper_works_in_every_environment(arm):
         env.reset(seed=0)
         _, _, _, _, info = env.step(np.zeros(env.action_space.shape))
         assert info["reason"] == ""
+
+
+def test_an_arm_with_a_passive_gripper_is_struck_and_clamped(arm, tmp_path):
+    """Simulated whole: the gripper's joints are no part of what an arm hands to its obstacles."""
+    robot = tmp_path / "arm.toml"
+    robot.write_text(f'file = "{arm(20, "fingers")}"\ngripper = "passive"\n')
+    plans = (CollisionPlan("strike", 1.0, 3), CollisionPlan("clamp", 3.0, 3))
+    run = Simulation(Episode(5, 5.0, 60.0, arm=str(robot), collisions=plans))
+    assert run.loop is run.striking.loop
+    trace = run.run()
+    assert [c.kind for c in trace.truth.collisions] == ["strike", "clamp"]
+    assert np.isfinite(trace.q).all()
 
 
 def test_the_velocity_servo_follows(arm):

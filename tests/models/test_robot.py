@@ -55,10 +55,14 @@ def test_an_unseen_arm_gets_what_its_file_leaves_open(arm, seed):
 
 @pytest.mark.parametrize("gripper", ["fingers", "jaw"])
 @pytest.mark.parametrize("kept", ["weld", "passive"])
-def test_a_gripper_is_welded_or_left_passive(arm, gripper, kept):
+@pytest.mark.parametrize("described", [False, True])
+def test_a_gripper_is_welded_or_left_passive(arm, gripper, kept, described, tmp_path):
     path = arm(3, gripper)
     bare = load_arm(str(arm(3)))
-    scene = compose(SceneSpec(arm=Robot(str(path), gripper=kept), payload=True))
+    robot = tmp_path / "arm.toml"
+    robot.write_text(f'file = "{path}"\ngripper = "{kept}"\n')
+    known = str(robot) if described else Robot(str(path), gripper=kept)
+    scene = compose(SceneSpec(arm=known, payload=True))
     assert scene.joint_names == bare.joints
     assert len(scene.facts.gripper) == (2 if gripper == "fingers" else 1)
     assert scene.model.njnt == len(bare.joints) + (len(scene.facts.gripper) * (kept == "passive"))
