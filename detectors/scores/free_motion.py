@@ -192,6 +192,8 @@ class FreeMotion:
                 load. The load of labelled ones is unknown, and those with collisions are left out.
                 Long ones are cut, so that each part can be left out once.
             arm: nominal numbers and drive gains; the gains are not identified.
+
+        Raises:
             ValueError: no or too little motion, or other joints.
         """
         recordings = [

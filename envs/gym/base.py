@@ -89,7 +89,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._reward_keys = {name: f"reward_{name}" for name in self.task.terms}
         self._picture: Any = None
         self._no_reward = dict.fromkeys(self.task.terms, 0.0)
-        self._onset = False
+        self._was_reset = False
 
     def __repr__(self) -> str:
         """The description of the batch, under this class's name."""
@@ -136,7 +136,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         super().reset(seed=seed)
         self.batch.draw(0, self.np_random, options or {})
         self.task.begin(0, self.np_random)
-        self._onset = True
+        self._was_reset = True
         if self.render_mode == "human":
             self.render()
         return self._seen.copy(), self._info(self._metrics(), self._no_reward, False, "")
@@ -147,7 +147,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         Raises:
             ValueError: an action of another shape, or with entries that are not finite.
         """
-        if not self._onset:
+        if not self._was_reset:
             raise gymnasium.error.ResetNeeded("call reset before step")
         batch, task = self.batch, self.task
         values = np.array(action, np.float64)
@@ -176,7 +176,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "memory": np.array(self.task.memory),
             "task": self.task.get_state(),
             "rng": self.np_random.bit_generator.state,
-            "begun": self._onset,
+            "begun": self._was_reset,
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -191,7 +191,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.task.memory[:] = state["memory"]
         self.task.set_state(state["task"])
         self.np_random.bit_generator.state = state["rng"]
-        self._onset = state["begun"]
+        self._was_reset = state["begun"]
 
     def __getstate__(self) -> dict[str, Any]:
         """The keywords and the state of the environment; the window is not copied."""
