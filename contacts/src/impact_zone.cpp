@@ -104,10 +104,23 @@ void ImpactZone::add_rows(int count, int a, const double* at_a, int b, const dou
   e_.jac(e_.model, e_.data, of_b.data(), of_b.data() + 3 * nv, at_b, b);
   const Vec3 carried[] = {mocap_.displacement(a, at_a) - mocap_.displacement(b, at_b),
                           mocap_.turn(a) - mocap_.turn(b)};
-  for (std::size_t i = 0; i < 6 * nv; ++i) of_a[i] -= of_b[i];
+  // The largest entries of linear motion and of rotation. A linear one is a product of an axis and
+  // a lever, which is a difference of positions of about the size `far`. 64 u covers 32 operations
+  // on them for each body. Rows below this are zero: a point on the axis of its joint does not
+  // move.
+  double most[2] = {0, 0}, far = 0;
+  for (std::size_t i = 0; i < 6 * nv; ++i) {
+    double& m = most[i / (3 * nv)];
+    m = std::max({m, std::fabs(of_a[i]), std::fabs(of_b[i])});
+    of_a[i] -= of_b[i];
+  }
+  for (int k = 0; k < 3; ++k) far = std::max({far, std::fabs(at_a[k]), std::fabs(at_b[k])});
+  const double rounded[] = {64 * unit_roundoff * (most[0] + far * most[1]),
+                            64 * unit_roundoff * most[1]};
   for (int k = 0; k < count; ++k) {
     const auto row = of_a.begin() + k * nv;
-    if (std::all_of(row, row + nv, [](double v) { return v == 0; })) continue;
+    const double least = rounded[k / 3];
+    if (std::all_of(row, row + nv, [&](double v) { return std::fabs(v) <= least; })) continue;
     rows_.insert(rows_.end(), row, row + nv);
     carried_.push_back(carried[k / 3][k % 3] / length_);
   }
