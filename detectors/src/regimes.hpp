@@ -71,7 +71,7 @@ class Regimes {
   static constexpr double creep = 0.05;      // speed at which exp(-speed / creep) is 1/e [rad/s]
   static constexpr double settles = 1.0;     // time constant with which motion is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
-  static constexpr double wary = 0.5;        // fraction of the bound above which `slower` applies
+  static constexpr double slowed = 0.5;      // fraction of the bound above which `slower` applies
   static constexpr double slower = 2.0;      // factor of `follow` while no joint moves
   static constexpr double ended = 5.0;       // time after a contact without `slower` [s]: the
                                              // controllers move torque between joints for seconds
@@ -259,7 +259,7 @@ class Regimes {
         (residual - one.home) * side > 0.0)
       one.base = one.before = residual;
     const double change = residual - one.base;
-    const bool grows = !touched_ && one.since >= ended && std::fabs(change) > wary * bound;
+    const bool grows = !touched_ && one.since >= ended && std::fabs(change) > slowed * bound;
     const double factor = grows ? 1.0 + (slower - 1.0) * (1.0 - stirred_) : 1.0;
     const double keep = std::exp(-dt / (factor * follow));
     one.base = residual - change * keep;

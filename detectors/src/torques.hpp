@@ -20,7 +20,7 @@ struct TorqueBounds {
   double rate = 20;             // rate of the observer [1/s]
   double fast = 0.5;            // time constant of the fast average [s]
   double slow = 4.0;            // time constant of the slow average [s]
-  double heard = 8.0;           // least RMS of `needed` to judge a ratio, in units of the noise
+  double least_snr = 8.0;       // least RMS of `needed` to judge a ratio, in units of the noise
   std::vector<double> opposed;  // least allowed fast ratio of each joint
   std::vector<double> least;    // least allowed slow ratio of each joint
   std::vector<double> most;     // largest allowed slow ratio of each joint
@@ -70,7 +70,7 @@ class TorqueCheck {
       fast_product_[j] += fast * (product - fast_product_[j]);
       slow_square_[j] += slow * (square - slow_square_[j]);
       slow_product_[j] += slow * (product - slow_product_[j]);
-      const double loud = set_.heard * noise_[j] * (set_.heard * noise_[j]);
+      const double loud = set_.least_snr * noise_[j] * (set_.least_snr * noise_[j]);
       const auto joint = static_cast<std::int32_t>(j);
       if (time_ > set_.fast && fast_square_[j] > loud) {
         const double ratio = fast_product_[j] / fast_square_[j];

@@ -11,18 +11,18 @@ Array = NDArray[np.float64]
 #: Array of bools.
 Bools = NDArray[np.bool_]
 
-#: Largest array, in elements, and largest text, in characters, that a message shows whole.
-FEW, SHORT = 7, 60
+FEW = 7  #: size of the largest array that a message shows whole [elements]
+SHORT = 60  #: length of the longest text that a message shows whole [characters]
 
 
 def runs(mask: ArrayLike) -> NDArray[np.int64]:
-    """Each run of True in a mask (T,), as first row and row after the last. Shape (K, 2)."""
+    """First row, and row after the last, of each run of True in a mask (T,); shape (K, 2)."""
     padded = np.concatenate([[False], np.asarray(mask, dtype=np.bool_), [False]])
     return np.flatnonzero(np.diff(padded.astype(np.int8))).reshape(-1, 2)
 
 
 def in_a_line(value: Any) -> str:
-    """A dataclass's ``__repr__`` with large arrays as shapes and long texts as sizes."""
+    """Short ``repr`` of a dataclass: the shape of a large array, the length of a long text."""
     fields = [field for field in dataclasses.fields(value) if field.repr]
     parts = [f"{field.name}={_brief(getattr(value, field.name))}" for field in fields]
     return f"{type(value).__name__}({', '.join(parts)})"

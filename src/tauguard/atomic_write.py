@@ -1,4 +1,4 @@
-"""Atomic writing: after any interruption a file is complete, or as it was before."""
+"""Atomic writing: after any interruption a file is either complete or unchanged."""
 
 import contextlib
 import os
@@ -15,9 +15,9 @@ PART = ".part"
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """A stream whose bytes become ``path`` when the block ends without an error.
 
-    The bytes go to a file beside ``path`` whose name begins with a dot and ends in ``.part``. It is
-    flushed to the disk and renamed. After an error it is removed and ``path`` is unchanged. Only a
-    process that is killed leaves its ``.part`` file (see :func:`remove_parts`).
+    The bytes go to a file beside ``path`` whose name begins with a dot and ends in ``.part``. That
+    file is flushed to the disk and renamed. After an error it is removed and ``path`` is unchanged.
+    Only a process that is killed leaves its ``.part`` file (see :func:`remove_parts`).
 
     Raises:
         OSError: the folder cannot be written, or the disk is full; the message names ``path``.
@@ -45,7 +45,7 @@ def write_atomic(path: Path, content: bytes | str) -> None:
 
 
 def write_changed(path: Path, text: str) -> None:
-    """Write ``text`` to ``path``, unless the file holds just that."""
+    """Write ``text`` to ``path``, unless the file has this content already."""
     if not path.is_file() or path.read_bytes() != text.encode():
         write_atomic(path, text)
 

@@ -1,6 +1,6 @@
 """Register the environments with Gymnasium; `gymnasium.make` imports their modules."""
 
-#: Name -> module and class prefix, and largest number of actions of an episode.
+#: Name -> module, prefix of the class names, and largest number of actions of an episode.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
     "tauguard/React-v1": ("react", "React", 500),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR, asked, asked_and_found
+from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR, false_alarm_text, requested
 from tauguard.detectors import FreeScores, poisson_rate
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 
@@ -14,10 +14,10 @@ def test_the_rate_that_was_asked_stands_beside_the_one_that_was_found():
     class Alarm:
         threshold = threshold_for_rate(scores, FALSE_ALARMS_PER_HOUR)
 
-    wanted = asked(Alarm(), scores)
+    wanted = requested(Alarm(), scores)
     assert wanted["low"] <= FALSE_ALARMS_PER_HOUR <= wanted["high"]
     found = poisson_rate(3, 0.2)
-    said = asked_and_found({"asked": wanted, "false_alarms_per_hour": found})
+    said = false_alarm_text({"asked": wanted, "false_alarms_per_hour": found})
     assert "requested 1, found 15.0" in said
     assert "from 3 alarms in 12 min" in said
     assert "5 min of training motion" in said

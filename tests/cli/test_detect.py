@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from tauguard.cli import main
-from tauguard.cli.detect import explained
+from tauguard.cli.detect import diagnosed
 from tauguard.datasets import real_arms
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.events import Alarm
@@ -223,7 +223,7 @@ def test_a_urdf_gives_link_and_force_of_each_alarm(tmp_path, shape, said):
         np.array([0.1, 0.1]),
     )
     alarms = SimpleNamespace(detection=SimpleNamespace(alarms=[Alarm(2.02, 2.4)]))
-    (event,), notes = explained(SimpleNamespace(arm=arm), trace, alarms, robot)
+    (event,), notes = diagnosed(SimpleNamespace(arm=arm), trace, alarms, robot)
     assert event["link"] == 2
     assert event["force_n"][1] == pytest.approx(30, rel=0.35)
     assert event["peak_force_n"]["low"] < 30 < event["peak_force_n"]["high"]

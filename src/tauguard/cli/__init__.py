@@ -106,7 +106,7 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
         if isinstance(error, ValueError | OSError):
             fail(f"{name}: {said(error)}")
         kind, wanted = type(error).__name__, os.environ.get("MUJOCO_GL")
-        if wanted and "mujoco" not in sys.modules:  # its import fails without that OpenGL
+        if wanted and "mujoco" not in sys.modules:  # importing it fails without this OpenGL
             fail(
                 f"{name}: MUJOCO_GL={wanted}: MuJoCo finds no such OpenGL; install libegl1 for egl "
                 "or libosmesa6 for osmesa, or unset it"

@@ -59,7 +59,7 @@ def command(
         torque: the logs hold joint torques in N m instead of currents, as ROS 2 efforts may. A
             JSON file of columns states this by its field "torque" instead.
         accept: write the file although a check fails. alarms: a log has bursts of torque like those
-            of contacts. error: the error of a joint's prediction exceeds twice its friction.
+            of contacts. error: the error of a joint's prediction exceeds twice the joint's friction.
             gravity: the gravity torques differ from those of the robot file. order: two joints'
             columns seem exchanged.
         reading: how logs are read.
@@ -67,7 +67,7 @@ def command(
     """
     import numpy as np
 
-    from tauguard.cli.free_logs import free_logs, hold_to
+    from tauguard.cli.free_logs import free_logs, run_check
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.evaluation.acceptance import check_held_out
     from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
@@ -75,7 +75,7 @@ def command(
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
-    beside = robot if robot.exists() else Path(robot.name)  # for an arm by name: the working folder
+    beside = robot if robot.exists() else Path(robot.name)  # a named arm: the working folder
     robot = bodies_file(robot)
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains cannot be combined with --scale {scale}, which finds the gains")
@@ -83,7 +83,7 @@ def command(
     found, held = identified(given, accept)
     names, recordings = list(given.logs), list(given.logs.values())
     logs_of = (found.arm, names, recordings)
-    hold_to("error", accept, lambda: check_held_out(*logs_of, held))
+    run_check("error", accept, lambda: check_held_out(*logs_of, held))
     target = out or beside.with_name(f"{beside.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=names)
     preset = recordings[0].trace.meta.get("columns", "")
@@ -102,10 +102,10 @@ def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, li
     Each RMS has shape (n,). With too few logs to leave one out, the list is empty.
 
     Raises:
-        ValueError: exchanged joints, other bodies than the robot file's, a wrong load, or bursts of
-            torque, unless ``accept`` names the check.
+        ValueError: exchanged joints, bodies other than those of the robot file, a wrong load, or
+            bursts of torque, unless ``accept`` names the check.
     """
-    from tauguard.cli.free_logs import explain, hold_to
+    from tauguard.cli.free_logs import explain, run_check
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown
     from tauguard.detectors.calibration.assessment import check_loads, left_out
@@ -115,17 +115,17 @@ def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, li
 
     arm, recordings = given.arm, list(given.logs.values())
     traces = [recording.trace for recording in recordings]
-    hold_to("order", accept, lambda: check_order(arm, given.logs))
+    run_check("order", accept, lambda: check_order(arm, given.logs))
     data = filtered_logs(arm, recordings) if given.scale == "gains" else None
     found = identify(arm, recordings, scale=given.scale, data=data)
     if data is not None:
         weight = (given.numbers, found.arm.robot, traces)
-        hold_to("gravity", accept, lambda: check_weight(*weight))
+        run_check("gravity", accept, lambda: check_weight(*weight))
         check_loads(arm, given.logs, data)
     elif (ratio := torque_per_ampere(found.arm, traces)) < SMALL_GAIN:
         print(
-            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as for joint "
-            "torques: if they are in N m, add --torque"
+            f"note: one unit of the current columns gives {ratio:.1f} N m, so the columns may hold "
+            "joint torques; if they do, add --torque"
         )
     held: list[Array] = []
     if each_can_be_left_out(recordings):
@@ -154,9 +154,9 @@ def summary(names: list[str], found: Identified, held: list[Array], target: Path
 
 
 def report(result: dict[str, Any], found: Identified, preset: str) -> None:
-    """Print the results; only gain and mass for a joint that moves in no log.
+    """Print the results. For a joint that moves in no log, print only gain and mass.
 
-    ``preset`` is named if its gains were taken.
+    The output names ``preset`` if the gains are those of the preset.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.report import table

@@ -28,7 +28,7 @@ def command(
 ) -> None:
     """Simulate a moving arm with collisions, train a detector on it, and record its alarms.
 
-    The folder then contains demo.mcap (a run with collisions, truth and detection), demo.rrd (the
+    The folder --out then contains demo.mcap (a run with collisions, truth and detection), demo.rrd (the
     same for rerun), model.skops (the trained detector), summary.json and summary.png (metrics of
     the detector on motions and collisions that it was not trained on).
 
@@ -78,7 +78,7 @@ def command(
         "seed": seed,
         "simulated_seconds": plan.seconds,
         **judged_figures(detector, judged, matchings),
-        "asked": asked(detector, scores),
+        "asked": requested(detector, scores),
         "timing": {
             "simulate_s": simulated - started,
             "train_s": fitted - simulated,
@@ -112,7 +112,7 @@ def judged_figures(
     }
 
 
-def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
+def requested(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
     """Requested rate of false alarms, and 95 % interval of the rate on training motion [1/h]."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 
@@ -121,7 +121,7 @@ def asked(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, f
     return {"per_hour": FALSE_ALARMS_PER_HOUR, "low": low, "high": high, "hours": expected.hours}
 
 
-def asked_and_found(summary: dict[str, Any]) -> str:
+def false_alarm_text(summary: dict[str, Any]) -> str:
     """The requested rate of false alarms beside the measured one, as text."""
     from tauguard.report import two_digits
 
@@ -142,7 +142,7 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     from tauguard.detectors.evaluation.metrics_page import text
 
     print(text(summary))
-    print(asked_and_found(summary))
+    print(false_alarm_text(summary))
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     recording = out / "demo.rrd"
     run = ".uv/bin/uv run --no-dev " if Path(".uv/bin/uv").is_file() else ""  # of a checkout

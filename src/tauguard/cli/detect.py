@@ -28,7 +28,7 @@ KINDS = {
     "clamp": "it lasts, and the force was against the motion or rose fast",
     "push": "it lasts, and the force was along the motion or rose slowly",
 }
-#: If less of a log was watched, the output says so [s].
+#: Below this time, the output says that almost nothing of the log was watched [s].
 WATCHED = 1.0
 #: Without a model, the detector is trained on this length of the log's beginning [s].
 QUIET = 20.0
@@ -72,16 +72,16 @@ def command(
             of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"],
             "torque": ["tau1", "tau2"]}; a number instead of a name is the column's index from 0.
         model: a model file of `tauguard train` for this arm and the log's sample rate.
-        payload: load that the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m),
-            for a model of `train --free` or no model; 0 for no load. Without this flag
-            the load is estimated from the motion; until then only hard contacts are detected.
+        payload: load that the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m);
+            0 for no load. It cannot be combined with a model from `train --traces`. Without this
+            flag the load is estimated from the motion; before, only hard contacts are detected.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
         at_tool: all contacts are at the tool, which narrows the intervals of the forces.
         quiet: without --model, length of the log's beginning in which nothing touches the arm [s]
             (default: 20). A collision in this time raises the thresholds, so that later collisions
             may be missed.
-        gains: without --model, N m per ampere, one number for each joint (known for calibrated
-            robot files and for the presets ur10e and ur5).
+        gains: without --model, N m per ampere, one number for each joint (not needed for
+            calibrated robot files and for the presets ur10e and ur5).
         out: folder for events.json, detect.mcap and detect.rrd.
         reading: how logs are read.
         json: write the results here as JSON.
@@ -98,7 +98,7 @@ def command(
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
-        raise ValueError("--quiet and --gains cannot be combined with --model (trained already)")
+        raise ValueError("--quiet and --gains are for training and cannot be combined with --model")
     robot = bodies_file(robot)
     check_no_device(log)
     numbers = robot_numbers(robot)
@@ -110,9 +110,9 @@ def command(
     else:
         seconds = QUIET if quiet is None else quiet
         refuse_touched(log, read, seconds)
-        trace, alarm = learned(log, read, robot, numbers, seconds, gains, payload)
+        trace, alarm = trained_on_beginning(log, read, robot, numbers, seconds, gains, payload)
     found = detect_in_log(alarm, trace, payload is not None)
-    causes, notes = explained(alarm.detector, trace, found, robot, at_tool, payload is not None)
+    causes, notes = diagnosed(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
     if read.touched is not None:
@@ -170,7 +170,7 @@ def trained(
     return trace, alarm
 
 
-def learned(
+def trained_on_beginning(
     log: Path,
     read: Log,
     robot: Path,
@@ -207,15 +207,15 @@ def learned(
     except ValueError as error:
         raise ValueError(
             f"{log}, its first {quiet:g} s (--quiet): {error}; or did something touch the arm in "
-            "them? `tauguard train --free` has --accept for a log that nothing touched"
+            "this time? If not, train with `tauguard train --free`, which has --accept"
         ) from None
-    print_notes([f"learned from the first {quiet:g} s; gains: {source}"])
+    print_notes([f"trained on the first {quiet:g} s; gains: {source}"])
     detector = dataclasses.replace(detector, settle=quiet)
     detector = detector if payload is None else detector.carrying(load)
     return trace, free_alarm(detector, [first[log.name].trace])
 
 
-def explained(
+def diagnosed(
     detector: Any,
     trace: Trace,
     found: LogDetection,
@@ -223,7 +223,7 @@ def explained(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Diagnoses of alarms, and notes. Without a chain of links in ``robot``, only torques."""
+    """Diagnoses of alarms, and notes. They lack links and forces if ``robot`` has no chain of links."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque

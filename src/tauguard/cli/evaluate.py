@@ -32,20 +32,20 @@ def command(
 
     Args:
         traces: folder of MCAP recordings with truth.
-        data: a dataset (`tauguard generate`) instead: its episodes of the model's arm, split by
-            split.
+        data: a dataset (`tauguard generate`) instead of --traces; the episodes of the model's arm
+            are used.
         splits: with --data, names of the splits (default: those that begin with "test").
         model: a model file that `tauguard train` wrote.
         alarms: with --data, the alarms of any other detector instead of a model: a CSV file with
             one line per alarm and the columns episode (SPLIT/NUMBER, as for `tauguard inspect
             --episode`), start and end [s]. All arms of the splits are evaluated.
-        detector: module:Class of the method, if it is not one of tauguard's own.
+        detector: module:Class of the method, if it is your own.
         json: write the metrics here as JSON.
         figure: draw the metrics here (PNG).
         events: a folder for ten seconds of every missed collision, late detection and false
             alarm, with pictures and a page for `tauguard replay --web`. An event is named by the
             file of its recording; with --data by SPLIT/NUMBER, as for `tauguard inspect --episode`.
-        late: with --events, a detection with a longer delay is late [s].
+        late: with --events, delay above which a detection is late [s].
     """
     from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
     from tauguard.replay.events import EventFolder, command_to_open

@@ -94,7 +94,7 @@ def free_detector(
     Args:
         arm: arm model of :func:`free_arm`.
         recordings: the logs, by file name.
-        accept: names of checks and logs to accept; None: the command has no such flag.
+        accept: names of checks and logs to accept; None: the command has no --accept.
 
     Raises:
         ValueError: too little motion, exchanged joints, another arm's gravity torques, much torque
@@ -104,10 +104,10 @@ def free_detector(
     from tauguard.detectors.scores.free_motion import FreeMotion
 
     logs = list(recordings.values())
-    hold_to("order", accept, lambda: check_order(arm, recordings))
+    run_check("order", accept, lambda: check_order(arm, recordings))
     found = FreeMotion().fit(logs, arm)
     weight = (arm.robot, found.arm.robot, [log.trace for log in logs])
-    hold_to("gravity", accept, lambda: check_weight(*weight))
+    run_check("gravity", accept, lambda: check_weight(*weight))
     explain(found.arm, recordings, (), accept)
     return found
 
@@ -124,7 +124,7 @@ def explain(
         arm: the identified arm model.
         recordings: the logs, by file name.
         held: residual of each log in cross-validation [N m], shape (n,); empty if not known.
-        accept: names of checks and logs to accept; None: the command has no such flag.
+        accept: names of checks and logs to accept; None: the command has no --accept.
 
     Raises:
         ValueError: the model explains too little torque, or torque has bursts like a contact's.
@@ -138,17 +138,17 @@ def explain(
     print_notes(notes)
     vouched = set(accept or ())
     others = {name: one for name, one in left.items() if not {name, Path(name).stem} & vouched}
-    hold_to("alarms", accept, lambda: check_bursts(joints, others))
+    run_check("alarms", accept, lambda: check_bursts(joints, others))
     return notes
 
 
-def hold_to(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
+def run_check(name: str, accept: Collection[str] | None, check: Callable[[], None]) -> None:
     """Run a check; ``--accept NAME`` turns its error into a printed note.
 
-    ``accept`` is None if the command has no such flag.
+    ``accept`` is None if the command has no such flag: the error is then raised unchanged.
 
     Raises:
-        ValueError: the message of the check, with the flag.
+        ValueError: the message of the check and the flag that accepts it.
     """
     from tauguard.cli.help_text import print_notes
 

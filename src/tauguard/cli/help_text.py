@@ -11,7 +11,7 @@ import tyro
 #: An argument of a docstring: its name, and its text with continuation lines.
 ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
-#: What a flag without a default takes, by type; tyro shows None as a choice.
+#: Placeholder of a flag's value in the help if the default is None; tyro would show None.
 METAVARS: dict[Any, str] = {str: "STR", Path: "PATH", int: "INT", float: "FLOAT"}
 
 

@@ -23,7 +23,7 @@ def command(
     """Show the content of a generated dataset; with --verify check all its bytes.
 
     The exit code is 2 if --verify finds damaged, missing or foreign files or a motion in two
-    splits, or if --episode gives other bytes. To repair damaged files, run the command that
+    splits, or if the repeated --episode has other bytes. To repair damaged files, run the command that
     generated the dataset again.
 
     Args:
@@ -69,7 +69,7 @@ def page(report: Mapping[str, Any]) -> str:
 
     code = report["code"]
     lines = [
-        f"{report['name']}, {report['rate']} rows a second, "
+        f"{report['name']}, {report['rate']} rows per second, "
         f"configuration {report['configuration_sha256'][:12]}",
         f"made by tauguard {code['tauguard']}, MuJoCo {code['mujoco']}",
         "",
@@ -99,7 +99,7 @@ def classes(name: str, one: Mapping[str, Any]) -> list[str]:
     """Collisions of a split by class, as achieved and as planned."""
     from tauguard.datasets.schedule import class_order
 
-    lines = [f"{name}: collisions there (planned)"]
+    lines = [f"{name}: collisions that happened (planned)"]
     for what in ("kind", "link", "severity"):
         there, wanted = one["achieved"].get(what, {}), one["planned"].get(what, {})
         both = sorted(there.keys() | wanted.keys(), key=class_order)
@@ -117,7 +117,9 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     for leak in report["leaks"]:
         lines.append(f"LEAK: {leak}")
     if not report["leaks"]:
-        lines.append("no motion is in two splits, and no value declared unseen in the first one")
+        lines.append(
+            "no motion is in two splits, and no value declared unseen is in the first split"
+        )
     if damaged is None:
         lines.append("files not checked (--verify reads every byte)")
     elif damaged:

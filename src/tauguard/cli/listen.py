@@ -138,7 +138,7 @@ def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> Non
 
     joints, dt = alarm.detector.arm.robot.joints, alarm.detector.dt
     if len(source.joint_names) != joints:
-        raise ValueError(f"the source has {len(source.joint_names)} joints, {model} {joints}")
+        raise ValueError(f"the source has {len(source.joint_names)} joints, {model} has {joints}")
     if not same_rate(1 / source.rate, dt):
         raise ValueError(
             f"the source gives {source.rate:.0f} samples a second, {model} was trained at "
@@ -290,12 +290,12 @@ def report(result: dict[str, Any]) -> None:
             f"longest {_us(latency['max'])}"
         )
     else:
-        print(f"no sample came: {result['ended']}")
+        print(f"no sample was received: {result['ended']}")
     print(f"state at the end: {result['state']}")
 
 
 def _us(value: float | None) -> str:
-    """Microseconds as text; None: beyond the histogram."""
+    """Microseconds as text; None: above the range of the histogram."""
     return "100,000 or more" if value is None else f"{value:,.0f}"
 
 
@@ -307,7 +307,7 @@ def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
     from tauguard.traces import Detection, write_mcap
 
     if len(session.rows) < 2:
-        raise ValueError(f"--record {path}: fewer than 2 samples were heard; nothing is written")
+        raise ValueError(f"--record {path}: fewer than 2 samples were received; nothing is written")
     trace, up = session.trace(), np.array(session.alarms)
     detection = Detection(
         detector=alarm.detector.name,

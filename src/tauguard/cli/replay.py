@@ -78,7 +78,7 @@ def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> P
     if out is None and usual.exists():
         raise FileExistsError(
             f"{usual} is there already: name the file to write with --out; "
-            f"`tauguard replay --web {usual}` shows that one"
+            f"`tauguard replay --web {usual}` shows the existing one"
         )
     trace = read_mcap(file)
     out = out or usual
@@ -102,6 +102,6 @@ def serve(shown: Path, port: int) -> None:
         )
     with BrowserReplay(folder, port) as replay:
         address = f"{replay.address}/" + ("" if shown.is_dir() else f"open/{quote(shown.name)}")
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the servers end with it
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # also stops the servers
         print(f"open {address} in a browser; Ctrl-C ends this", flush=True)
         replay.wait()

@@ -76,7 +76,7 @@ def command(
     if payloads_g is None:
         scale = torque_scale(robot)
         payloads_g = tuple(scale * load for load in LOADS)
-    first = 10_000  # smaller seeds are the demo's, whose model may be evaluated on these episodes
+    first = 10_000  # the demo uses smaller seeds; its model may be evaluated on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (
         struck_episodes(first + seed, episodes, collisions, speeds, payloads_g, arm, robot)

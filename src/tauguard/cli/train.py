@@ -56,7 +56,7 @@ def command(
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Recordings with
             labelled collisions are refused; collisions without a label raise the threshold.
-        false_alarms_per_hour: accepted rate on motion like the training's (default: 10). With
+        false_alarms_per_hour: accepted rate on motion like that of the training (default: 10). With
             --calibration the threshold guarantees this rate. With --free, training fails if
             cross-validation shows a higher rate.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
@@ -67,14 +67,14 @@ def command(
         robot: URDF or MJCF file of that arm; files of `tauguard calibrate` and `tauguard twin`
             contain its gains.
         columns: columns of CSV files, see `tauguard detect`.
-        gains: N m per ampere, one number for each joint (known for calibrated robot files and for
-            the presets ur10e and ur5).
+        gains: N m per ampere, one number for each joint (not needed for calibrated robot files and
+            for the presets ur10e and ur5).
         payload: loads in the logs, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
         accept: with --free, names of logs to keep even if they stand out, and of checks that may
             fail. alarms: more alarms in cross-validation than --false-alarms-per-hour, or bursts
-            of torque like a contact's. error: the residual exceeds its bounds half of the time.
+            of torque like those of contacts. error: the residual exceeds its bounds half of the time.
             gravity: the gravity torques differ from those of the robot file. order: two joints'
             columns seem exchanged.
         arm: for a dataset with several arms, the arm of the detector.
@@ -105,7 +105,7 @@ def command(
 
 
 DEFAULTS = {name: one.default for name, one in inspect.signature(command).parameters.items()}
-#: Flags of a training on labelled recordings, of one on free logs, and of one with a twin.
+#: Flags that --traces, --free and --twin allow.
 OF_TRACES = ("detector", "calibration", "confidence", "arm", "folds")
 OF_FREE = ("robot", "columns", "gains", "payload", "torque", "card", "accept", "reading")
 OF_TWIN = ("columns", "detector", "torque", "reading")
@@ -212,7 +212,7 @@ def free_motion(
     reading: Reading | None = None,
 ) -> None:
     """Train on logs in which nothing should have touched the arm."""
-    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, hold_to
+    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, run_check
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import not_shown, read_logs, with_loads
     from tauguard.detectors import save_model
@@ -225,23 +225,23 @@ def free_motion(
     own = dict(zip(traces, recordings, strict=True))
     arm, _ = free_arm(robot, read.numbers, own, gains)
     logs_kept = [name for name in accept if name not in ACCEPTABLE]
-    own, validation = sifted_logs(own, arm, logs_kept)
+    own, validation = validated_logs(own, arm, logs_kept)
     traces = {name: recording.trace for name, recording in own.items()}
     detector = free_detector(arm, own, accept)
     print_notes(not_shown(list(traces.values())))
     held = [log for log in validation.kept if log not in validation.accepted]
-    hold_to("error", accept, lambda: check_own_error(held))
-    hold_to("alarms", accept, lambda: check_own_alarms(held, per_hour))
+    run_check("error", accept, lambda: check_own_error(held))
+    run_check("alarms", accept, lambda: check_own_alarms(held, per_hour))
     save_model(free_alarm(detector, list(traces.values())), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), validation, card)
 
 
-def sifted_logs(
+def validated_logs(
     recordings: dict[str, Recording], arm: ArmModel, accept: Sequence[str]
 ) -> tuple[dict[str, Recording], CrossValidation]:
-    """The logs for the training; prints notes on logs that are left out or differ.
+    """Return the logs for the training, and print notes on logs that are left out or differ.
 
     Args:
         recordings: by file name.
@@ -249,7 +249,7 @@ def sifted_logs(
         accept: names of logs to keep in any case.
 
     Raises:
-        ValueError: ``accept`` names no log.
+        ValueError: a name in ``accept`` is not that of a log.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import log_named
@@ -278,8 +278,8 @@ def odd_notes(validation: CrossValidation) -> list[str]:
         )
         notes.append(
             f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {others}. Possible causes: {cause}, or a motion that they do not "
-            "show. The log is left out of the training; if nothing touched the arm, keep it with "
+            f"have {others}. Possible causes: {cause}, or a motion that the other "
+            "logs lack. The log is left out of the training; if nothing touched the arm, keep it with "
             f"--accept {log.name}"
         )
     notes += [

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
 
-#: Number of simulated episodes, each with other model errors of the twin; contacts per episode.
-STRUCK, CONTACTS = 24, 6
-#: Range of a push's duration [s]; fraction of the planned strikes that are replaced by pushes;
-#: fraction of these pushes that occur while the arm stands.
-PUSH, PUSHED, STANDING = (0.1, 1.2), 0.5, 0.5
+STRUCK = 24  #: number of simulated episodes; the twin's model errors differ between them
+CONTACTS = 6  #: contacts per episode
+PUSH = (0.1, 1.2)  #: range of a push's duration [s]
+PUSHED = 0.5  #: fraction of the planned strikes that are replaced by pushes
+STANDING = 0.5  #: fraction of these pushes that occur while the arm stands
 #: Speeds of the episodes in turn, in percent of the joints' largest speeds.
 SPEEDS = (10.0, 30.0, 60.0)
 
@@ -29,7 +29,7 @@ def twin_contacts(
     torque: bool,
     reading: Reading | None = None,
 ) -> None:
-    """Train a method on simulated contacts and free logs, to run beside ``free-motion``.
+    """Train a detector on simulated contacts and free logs; it runs together with ``free-motion``.
 
     Args:
         twin: description that `tauguard twin` wrote.
@@ -37,12 +37,12 @@ def twin_contacts(
         model: file to write.
         columns: columns of the logs.
         detector: one of ``tauguard.detectors.DETECTORS``.
-        per_hour: false alarms to accept in an hour of motion like the logs'.
+        per_hour: accepted false alarms per hour of motion like that of the logs.
         torque: the logs hold joint torques.
         reading: how logs are read.
 
     Raises:
-        ValueError: no twin, or logs of another rate or arm.
+        ValueError: ``twin`` is not a twin's file, or the logs have another rate or arm.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_logs
@@ -87,14 +87,14 @@ def twin_contacts(
 
 
 def contacts(twin: Path) -> list[Trace]:
-    """Simulated episodes with all kinds of contacts, each with other model errors of the twin."""
+    """Simulated episodes with all kinds of contacts; the twin's model errors differ between them."""
     import numpy as np
 
     from tauguard.datasets import struck_episodes
     from tauguard.envs import CollisionPlan, simulate
     from tauguard.models import Mismatch
 
-    def as_hands_do(rng: np.random.Generator, plan: CollisionPlan) -> CollisionPlan:
+    def some_as_pushes(rng: np.random.Generator, plan: CollisionPlan) -> CollisionPlan:
         if plan.kind == "clamp" or (plan.kind == "strike" and rng.random() > PUSHED):
             return plan
         standing = bool(rng.random() < STANDING)
@@ -107,6 +107,6 @@ def contacts(twin: Path) -> list[Trace]:
         )
         speed, rng = (SPEEDS[seed % len(SPEEDS)],), np.random.default_rng([seed, 7])
         for episode in struck_episodes(seed, 1, CONTACTS, speed, (0.0,), one, str(twin)):
-            plans = tuple(as_hands_do(rng, plan) for plan in episode.collisions)
+            plans = tuple(some_as_pushes(rng, plan) for plan in episode.collisions)
             found.append(simulate(replace(episode, collisions=plans)))
     return found

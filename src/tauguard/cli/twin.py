@@ -38,7 +38,7 @@ def command(
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
     json: Path | None = None,
 ) -> None:
-    """Identify a twin from logs in which nothing touched the arm, and compare both in other motion.
+    """Identify a twin from logs in which nothing touched the arm, and compare it with the arm.
 
     The twin is a robot file for `simulate --robot`, `generate` and the environments.
 
@@ -59,7 +59,7 @@ def command(
         reading: how logs are read.
         json: write the results here as JSON.
     """
-    from tauguard.cli.free_logs import explain, free_logs, hold_to
+    from tauguard.cli.free_logs import explain, free_logs, run_check
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors.calibration.assessment import left_out
@@ -73,11 +73,11 @@ def command(
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
     robot = bodies_file(robot)
-    given, left = of_one_arm(
+    given, left = without_odd_logs(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
     )
     print_notes(left)
-    hold_to("order", accept, lambda: check_order(given.arm, given.logs))
+    run_check("order", accept, lambda: check_order(given.arm, given.logs))
     recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
@@ -85,7 +85,7 @@ def command(
     if each_can_be_left_out(recordings):
         apart = left_out(given.arm, recordings, scale=given.scale)
     seen = explain(twin.arm, given.logs, apart, accept)
-    twin, own = sure_of(twin, given, limit)
+    twin, own = with_jackknife(twin, given, limit)
     print_notes(own)
     tried = read_logs(judge, columns, robot, torque, reading).traces if judge else None
     likeness, compared, reasons = judged(twin, given, limit, tried)
@@ -103,7 +103,7 @@ def command(
         write_json(json, result | {"judged_on": compared, "rows": rows})
 
 
-def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
+def without_odd_logs(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
     """Logs that a calibration from the other logs predicts, and a note on each log left out.
 
     Raises:
@@ -141,7 +141,7 @@ def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 
 
-def sure_of(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]:
+def with_jackknife(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, list[str]]:
     """The twin with intervals from twins identified without a part of the logs, and its notes."""
     from tauguard.detectors.calibration.recording import pieces
     from tauguard.twin import with_intervals
@@ -203,12 +203,12 @@ def _unloaded(recording: Recording) -> bool:
 def report(
     joints: tuple[str, ...], likeness: Likeness | None, logs: list[str], reasons: list[str]
 ) -> list[dict[str, Any]]:
-    """Print how similar twin and arm are, or why that is not known; return rows for JSON."""
+    """Print how similar twin and arm are, or why this is not known; return rows for JSON."""
     from tauguard.report import table
 
     if likeness is None:
         why = f"without {', '.join(logs)}, the other logs make no twin ({'; '.join(reasons)})"
-        few = "every third log, if it has no load, is left out for the test, and there is none"
+        few = "the comparison needs a third log, one without a load"
         print(f"not judged: {why if logs else few}; give more logs, or --judge")
         return []
     kinds = {

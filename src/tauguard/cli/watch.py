@@ -102,12 +102,12 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def opened(inner: Any, save: Path | None, port: int) -> Any:
-    """The viewer or, with ``save``, a writer of files; its charts are laid out."""
+    """Open the viewer or, with ``save``, a writer of an .rrd file, and lay out the charts."""
     from tauguard.replay.live import LiveView
 
     view = LiveView(inner.compiled.shown(), save, port)
     charts = {
-        "force": "Contact force [N], and of its limit [%]",
+        "force": "Contact force [N], and in percent of its limit",
         "tau_ext": "External torque, truth [N m]",
         "residual": "Residual of the detector [N m]",
         "tool": "Distance to the target [m]",
