@@ -59,7 +59,7 @@ def command(
         torque: the logs hold joint torques in N m instead of currents, as ROS 2 efforts may. A
             JSON file of columns states this by its field "torque" instead.
         accept: write the file although a check fails. alarms: a log has bursts of torque like those
-            of contacts. error: the error of a joint's prediction exceeds twice the joint's friction.
+            of contacts. error: a joint's prediction error exceeds twice the joint's friction.
             gravity: the gravity torques differ from those of the robot file. order: two joints'
             columns seem exchanged.
         reading: how logs are read.

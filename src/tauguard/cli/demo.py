@@ -28,8 +28,8 @@ def command(
 ) -> None:
     """Simulate a moving arm with collisions, train a detector on it, and record its alarms.
 
-    The folder --out then contains demo.mcap (a run with collisions, truth and detection), demo.rrd (the
-    same for rerun), model.skops (the trained detector), summary.json and summary.png (metrics of
+    The folder --out then contains demo.mcap (a run with collisions, truth and detection), demo.rrd
+    (the same for rerun), model.skops (the trained detector), summary.json and summary.png (metrics of
     the detector on motions and collisions that it was not trained on).
 
     Args:

@@ -23,8 +23,8 @@ def command(
     """Show the content of a generated dataset; with --verify check all its bytes.
 
     The exit code is 2 if --verify finds damaged, missing or foreign files or a motion in two
-    splits, or if the repeated --episode has other bytes. To repair damaged files, run the command that
-    generated the dataset again.
+    splits, or if the repeated --episode has other bytes. To repair damaged files, run the command
+    that generated the dataset again.
 
     Args:
         folder: folder of the dataset.

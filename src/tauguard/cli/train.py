@@ -74,9 +74,9 @@ def command(
         card: with --free, draw the card here (PNG).
         accept: with --free, names of logs to keep even if they stand out, and of checks that may
             fail. alarms: more alarms in cross-validation than --false-alarms-per-hour, or bursts
-            of torque like those of contacts. error: the residual exceeds its bounds half of the time.
-            gravity: the gravity torques differ from those of the robot file. order: two joints'
-            columns seem exchanged.
+            of torque like those of contacts. error: half of the time, the residual exceeds its
+            bounds. gravity: the gravity torques differ from those of the robot file. order: two
+            joints' columns seem exchanged.
         arm: for a dataset with several arms, the arm of the detector.
         folds: with --traces, number of folds of the cross-validation that sets the threshold; each
             fold needs one more training (default: 3). 1 is quicker, but only a third of the
@@ -278,9 +278,8 @@ def odd_notes(validation: CrossValidation) -> list[str]:
         )
         notes.append(
             f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {others}. Possible causes: {cause}, or a motion that the other "
-            "logs lack. The log is left out of the training; if nothing touched the arm, keep it with "
-            f"--accept {log.name}"
+            f"have {others}. Possible causes: {cause}, or a motion that the others lack. The log is "
+            f"left out of the training; if nothing touched the arm, keep it with --accept {log.name}"
         )
     notes += [
         f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "

@@ -87,7 +87,7 @@ def twin_contacts(
 
 
 def contacts(twin: Path) -> list[Trace]:
-    """Simulated episodes with all kinds of contacts; the twin's model errors differ between them."""
+    """Simulated episodes with all kinds of contacts and with different model errors of the twin."""
     import numpy as np
 
     from tauguard.datasets import struck_episodes

@@ -208,7 +208,7 @@ def report(
 
     if likeness is None:
         why = f"without {', '.join(logs)}, the other logs make no twin ({'; '.join(reasons)})"
-        few = "the comparison needs a third log, one without a load"
+        few = "no log is left for the comparison, which uses every third log that has no load"
         print(f"not judged: {why if logs else few}; give more logs, or --judge")
         return []
     kinds = {
