@@ -23,7 +23,7 @@ from tauguard.traces.resample import averaged
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
 HEAVIEST = 100.0
 
-#: Positions are far from a range if they are outside by more than this [rad].
+#: Positions that are outside of a range by more than this are far from it [rad].
 NEARBY = 0.5
 #: Joints travel alike in two logs if their ranges differ by less than this factor.
 ALIKE = 3.0
@@ -185,10 +185,10 @@ def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log
 
 
 def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
-    """Raise ``ValueError`` if positions [rad] are like those of other logs, and in degrees not.
+    """Raise ``ValueError`` if positions [rad] fit those of other logs, but not as degrees.
 
-    In degrees, two joints or more would be where the other logs never are, and fewer in radians; or
-    half of the joints travel as far as in the other logs, and would travel 57 times less.
+    They do not fit as degrees if at least two joints, and more than as radians, were where the
+    other logs never are, or if half of the joints as radians travel as far as in the other logs.
     """
     others = [log.trace.q for log in degrees.values()]
     least, most = (np.array([f(x, axis=0) for x in others]) for f in (np.min, np.max))

@@ -19,8 +19,8 @@ def on_cluster(
 ) -> Generator[Result]:
     """Yield the results of ``work`` in the order in which they are ready.
 
-    A task whose node or process is lost is repeated on another. The folder that the tasks write
-    must have the same path on all nodes. All nodes must have the same version of tauguard.
+    A task whose node or process is lost is repeated on another node. The folder that the tasks
+    write must have the same path on all nodes. All nodes must have the same version of tauguard.
 
     Args:
         work: function of one task.

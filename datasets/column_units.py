@@ -1,8 +1,8 @@
 """Units of a log's columns, by their names, else by their values.
 
-A unit in a name is used: "timestamp_us", "angle (deg)". Else, values decide: angles beyond two
-turns at two joints are degrees, currents above 100 are mA, and times with sample intervals of more
-than 0.5 are in milliseconds or a smaller unit.
+A unit in a column's name decides: "timestamp_us", "angle (deg)". Without one, the values decide:
+angles beyond two turns at two joints are degrees, currents above 100 are mA, and times with sample
+intervals of more than 0.5 are in milliseconds or a smaller unit.
 """
 
 import re
@@ -15,7 +15,7 @@ from tauguard.arrays import Array
 from tauguard.datasets.log_checks import AMPERES, FURTHEST
 from tauguard.detectors.faults.inputs import FASTEST
 
-#: Unit of a time column by its usual step: smallest step of each unit, and the unit [s].
+#: Units of a time column: smallest median step in the unit, and the unit [s].
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
 #: A unit in brackets: "time [ms]", "angle (rad)".
 UNIT = re.compile(r"[ _]*[\[(](?:\D|\^-?\d)*[\])]$")
@@ -26,7 +26,7 @@ SECONDS = {
     **dict.fromkeys(("milliseconds", "millisecond", "millis", "msec", "ms"), 1e-3),
     **dict.fromkeys(("seconds", "second", "secs", "sec", "s"), 1.0),
 }
-#: Units of the time column, which may end its name as well; of other columns, "min" is no unit.
+#: Units of the time column. At the end of other columns' names, "min" and "h" are no units.
 TIME_UNITS = {
     **SECONDS,
     **dict.fromkeys(("minutes", "minute", "mins", "min"), 60.0),
@@ -42,7 +42,7 @@ _NEWTON_METRES = {
     **dict.fromkeys(("nm", "n_m"), 1.0),
     **{f"newton{a}met{b}": 1.0 for a in ("_", "") for b in ("re", "res", "er", "ers")},
 }
-#: Units of angles and of angular speeds that a map can hold, and whether they are degrees.
+#: Units of angles and of angular speeds that a column map supports, and whether they are degrees.
 _PER_SECOND = ("", *(a + b for a in ("_", "_per_") for b in ("s", "sec", "second")))
 _ANGLES = {
     unit + per: unit.startswith("deg")
@@ -54,7 +54,7 @@ _OTHER_ANGLES = ("rpm", *(u + per for u in ("mrad", "turns", "rev") for per in _
 _NAMES = "|".join((*SECONDS, *AMPERE_UNITS, *_NEWTON_METRES, *_ANGLES, *_OTHER_ANGLES))
 WRITTEN = re.compile(f"(?<=[a-z0-9])_({_NAMES})$")
 TIME_WRITTEN = re.compile(f"(?<=[a-z0-9])_({'|'.join(TIME_UNITS)})$")
-#: Units in brackets that no map can hold, and units of another kind of signal.
+#: Units in brackets that no column map supports, and units of another kind of signal.
 _FOREIGN = re.compile(
     f"(?:^|_)(?:{'|'.join(name for name in _NAMES.split('|') if len(name) > 1)}|"
     r"(?:[kmcd]?n|k?gf?)_?[cmd]?m|kgf?|kn|kp|(?:lbf?|ozf?|ft|in)_?(?:ft|in|lbf?|ozf?)?|"
@@ -62,23 +62,11 @@ _FOREIGN = re.compile(
     r"gradian|minute|cycle|rev|revolution)s?|feet|inch(?:es)?|hz|hertz|rps|gon|arc\w*|percent|permille|pct|"
     r"(?:kilo|centi|deci|milli|micro)\w*)(?:_|$)"
 )
-#: Longest word in brackets that is taken for the symbol of a unit, and words that are none.
-_SYMBOL = 3
+_SYMBOL = 3  #: length of the longest word in brackets that is taken for the symbol of a unit
+#: Words of at most this length in brackets that are no units.
 _SHORT_WORDS = {
-    "act",
-    "est",
-    "arm",
-    "abs",
-    "avg",
-    "raw",
-    "rms",
-    "iq",
-    "dc",
-    "utc",
-    "gmt",
-    "ros",
-    "cpu",
-}
+    "act", "est", "arm", "abs", "avg", "raw", "rms", "iq", "dc", "utc", "gmt", "ros", "cpu",
+}  # fmt: skip
 
 
 def time_scale_of(name: str, t: Array) -> float:
@@ -93,12 +81,12 @@ def units_of(
     numbers: Callable[[Sequence[str]], Array],
     given: bool | None = None,
 ) -> tuple[bool, float, float]:
-    """Units by names, else by values: whether angles are degrees, unit of currents, of torques.
+    """Whether angles are degrees, and the units of currents [A] and of torques [N m].
 
     Args:
         groups: columns by signal.
         numbers: the values of some columns.
-        given: whether angles are degrees, if the user said so.
+        given: the user's statement whether angles are degrees; None: not stated.
 
     Raises:
         ValueError: columns in different or unknown units, or angles neither in radians nor in
@@ -140,9 +128,9 @@ def units_of(
 
 
 def _in_degrees(names: Sequence[str], q: Array, qd: Array) -> bool:
-    """Whether angles are degrees, by their values, shape (rows, n), and by speeds, if there are.
+    """Whether angles, (rows, n), are degrees, by their values and by speeds, if the log has any.
 
-    The last joint of some arms turns further than two turns: one joint alone is no proof. Such
+    The last joint of some arms turns by more than two turns, so one joint alone is no proof. Such
     angles are radians if half of the joints are faster than 1 and none is faster than ``FASTEST``.
 
     Raises:
@@ -159,7 +147,7 @@ def _in_degrees(names: Sequence[str], q: Array, qd: Array) -> bool:
     joint = int(np.argmax(far))
     raise ValueError(
         f"column {names[joint]} is beyond two turns ({np.nanmax(np.abs(q[:, joint])):.4g}) as the "
-        "only position: degrees, or radians of a joint that turns on? Say --mend deg or --mend rad"
+        "only position: if angles are in degrees, say --mend deg or --mend rad if in radians"
     )
 
 

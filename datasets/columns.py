@@ -30,7 +30,7 @@ ANGLES = {"deg": True, "rad": False}
 class ColumnMap:
     """Columns by name (of the header line) or by 0-based index; one column per joint, in order.
 
-    A map of indices alone reads files with and without a header line.
+    A map that has only indices reads files with and without a header line.
     """
 
     t: Column | None  #: time; None: there is none, see ``clock``
@@ -42,12 +42,12 @@ class ColumnMap:
     qd_des: tuple[Column, ...] = ()  #: commanded velocities
     qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
     degrees: bool | tuple[bool, ...] = False
-    """Angles, their speeds and accelerations are in degrees; also per joint: a linear axis is not,
-    its numbers are in m."""
+    """Whether angles, their speeds and accelerations are in degrees: one value, or one per joint (a
+    linear axis, in m: false)."""
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
-    current_scale: float | tuple[float, ...] = 1.0  #: amperes per logged unit, also per joint
+    current_scale: float | tuple[float, ...] = 1.0  #: amperes per logged unit; one or n values
     torque_scale: float | tuple[float, ...] = 1.0
-    """N m per logged unit, also per joint; negative if the log's sign is not that of the robot."""
+    """N m per logged unit, one or n values; negative if the log's sign is not the robot's."""
     clock: float = 0.0  #: sample rate if there is no time column [Hz]
     separator: str = ","
     decimal: str = "."  #: decimal mark

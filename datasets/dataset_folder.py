@@ -29,8 +29,8 @@ def read_head(folder: Path) -> dict[str, Any]:
     """The content of ``dataset.json``.
 
     Raises:
-        ValueError: the folder holds no dataset, a damaged one (also one whose numbers of shards
-            are not those of its configuration), or one of a newer format.
+        ValueError: the folder holds no dataset, one of a newer format, or a damaged one (also if
+            its numbers of shards are not those of its configuration).
         FileNotFoundError: no such folder.
     """
     path = folder / HEAD
@@ -192,7 +192,7 @@ def arm_xml(folder: Path, arm: str) -> str:
 def arm_checksums(head: dict[str, Any]) -> dict[str, str]:
     """SHA-256 of each file of ``arms``, by its name, as ``dataset.json`` states it."""
     wanted: dict[str, str] = head.get("arms_sha256", {})
-    if head["format"] == 1:  # names of arms without ending; no drive files
+    if head["format"] == 1:  # keys without extension; no drive files
         wanted = {f"{name}.xml": digest for name, digest in wanted.items()}
     return wanted
 

@@ -14,7 +14,7 @@ from tauguard.datasets.columns import ColumnMap
 from tauguard.detectors.faults.inputs import FASTEST
 from tauguard.traces.trace import Trace
 
-#: A pause is a gap if it is longer than this many sample intervals and than this many seconds.
+#: A pause is a gap if it is longer than GAP_SAMPLES sample intervals and than GAP_SECONDS seconds.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
 #: Largest joint position, two turns [rad]; larger numbers are probably degrees.
 FURTHEST = 4 * np.pi
@@ -22,12 +22,12 @@ FURTHEST = 4 * np.pi
 SPAN = 0.1
 #: Largest motor current [A]; larger numbers are probably milliamperes or torques.
 AMPERES = 100.0
-#: A current is saturated if its magnitude stays at the maximum for this many samples in a row, and
-#: the maximum is at least this multiple of the magnitude's median.
+#: A current is saturated if its magnitude stays at the maximum for PLATEAU samples in a row, and
+#: the maximum is at least ABOVE times the magnitude's median.
 PLATEAU, ABOVE = 5, 3.0
-#: The clock was set back if time steps back fewer times than this, and more rows than this follow.
+#: The clock was set back if time steps back fewer than FEW times, and more than FEW rows follow.
 FEW = 5
-#: If more than this fraction of the rows repeat a time, the time is rounded, not repeated.
+#: If more than this fraction of the rows repeat a time, the time has too few digits.
 COARSE = 0.95
 #: Rows that repeat the previous state are left out if they are at least this fraction of all rows:
 #: the recorder is then faster than its robot. A standing arm repeats some values by chance.
@@ -75,7 +75,7 @@ def _timing(trace: Trace, where: Where) -> list[str]:
         raise ValueError(
             f"{where(row + 1)}: no sample in the {steps[row]:.3g} s before it, but samples come "
             f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there; the "
-            f"rows up to {where(row)} and those from {where(row + 1)} on are logs of their own"
+            f"rows up to {where(row)} and those from {where(row + 1)} on are separate logs"
         )
     late = np.flatnonzero(steps > 2 * usual)
     if len(steps) < 20 or not len(late):

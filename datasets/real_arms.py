@@ -15,9 +15,9 @@ from tauguard.detectors.calibration.assessment import (
     OUTLYING_IN_DOUBT,
     UNEXPLAINED_LADEN,
     Unexplained,
-    explained,
     outlier,
     start_gains,
+    unexplained_notes,
 )
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.dynamics.robot import holding
@@ -51,7 +51,7 @@ def of_log(
     Args:
         numbers: those of the file ``robot``.
         given: joints of the log, in any order, or ``joint_1``, ...
-        robot: named in the note.
+        robot: the robot file, which the note names.
 
     Raises:
         ValueError: joints that the robot does not have.
@@ -236,8 +236,8 @@ def calibration_notes(
     laden = [one for n, one in left.items() if logs[n].load != Load()]
     notes: tuple[str, ...] = ()
     try:
-        notes = explained(joints, [left[names[k]] for k in bare])
-        notes += explained(joints, laden, limit=UNEXPLAINED_LADEN)
+        notes = unexplained_notes(joints, [left[names[k]] for k in bare])
+        notes += unexplained_notes(joints, laden, limit=UNEXPLAINED_LADEN)
     except ValueError as error:
         refused = str(error)
     doubtful = bool(notes or refused)

@@ -35,10 +35,10 @@ WORDS = {
     "current": ("i", "current", "currents", "cur", "amps", "joint_current", "actual_current"),
 }
 TIMES = ("t", "time", "timestamp", "time_stamp", "stamp", "seconds", "sec", "duration", "__time")
-#: Words in names of commands and estimates; ``_OTHER``: also of other signals that are not measured
-#: at the joints.
+#: Words in names of commands and estimates.
 _COMMANDS = "target|desired|des|command|commanded|cmd|goal|ref|reference|ext|external"
 _COMMANDED = re.compile(f"(^|_)({_COMMANDS})(_|$)")
+#: Words in names of signals that are not measured at the joints.
 _OTHER = re.compile(
     f"(^|_)({_COMMANDS}|control|gravity|coriolis|tcp|flange|tool|cartesian|raw|ipo)(_|$)"
 )
@@ -51,8 +51,7 @@ _FRI = "measured_torque"
 _NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
 #: A joint's number, followed by the kind of signal: "joint_1_position", "J1 angle (rad)".
 _WITHIN = re.compile(r"^(.*?)(\d{1,2})[\])]?[ _./]+([A-Za-z][A-Za-z_ ]*)$")
-#: Smallest and largest number of joints of an arm.
-FEWEST, MOST = 2, 16
+FEWEST, MOST = 2, 16  #: smallest and largest number of joints of an arm
 
 
 def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -102,7 +101,7 @@ def of_joints(header: Sequence[str], joints: Sequence[str]) -> dict[str, dict[st
 
     Args:
         header: names of all columns.
-        joints: the robot's joints; of two that a name holds, the longer one counts.
+        joints: the robot's joints; if a name contains two of them, the longer one counts.
     """
     words = {joint: _parted(joint) for joint in joints if _parted(joint)}
     found: dict[str, dict[str, str]] = {}

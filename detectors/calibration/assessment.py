@@ -173,7 +173,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
         )
 
 
-def explained(
+def unexplained_notes(
     joints: Sequence[str], logs: Sequence[Unexplained], limit: float = UNEXPLAINED
 ) -> tuple[str, ...]:
     """Notes on joints with much unexplained torque in motion.

@@ -29,8 +29,8 @@ def command(
     """Simulate a moving arm with collisions, train a detector on it, and record its alarms.
 
     The folder --out then contains demo.mcap (a run with collisions, truth and detection), demo.rrd
-    (the same for rerun), model.skops (the trained detector), summary.json and summary.png (metrics of
-    the detector on motions and collisions that it was not trained on).
+    (the same for rerun), model.skops (the trained detector), summary.json and summary.png
+    (metrics of the detector on motions and collisions that it was not trained on).
 
     Args:
         out: folder for the results; it is created if it does not exist.

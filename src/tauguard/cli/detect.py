@@ -223,7 +223,7 @@ def diagnosed(
     at_tool: bool = False,
     load_known: bool = False,
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Diagnoses of alarms (without links and forces if ``robot`` is no chain of links), and notes."""
+    """Diagnoses of alarms (torques only, if ``robot`` is no chain of links), and notes."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque

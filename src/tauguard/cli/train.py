@@ -278,8 +278,9 @@ def odd_notes(validation: CrossValidation) -> list[str]:
         )
         notes.append(
             f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {others}. Possible causes: {cause}, or a motion that the others lack. The log is "
-            f"left out of the training; if nothing touched the arm, keep it with --accept {log.name}"
+            f"have {others}. Possible causes: {cause}, or a motion that the others lack. The log "
+            "is left out of the training; if nothing touched the arm, keep it with --accept "
+            f"{log.name}"
         )
     notes += [
         f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "

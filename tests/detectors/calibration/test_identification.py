@@ -11,11 +11,11 @@ from tauguard.detectors.calibration.arm_file import load_arm, save_arm
 from tauguard.detectors.calibration.assessment import (
     SWINGS,
     check_bursts,
-    explained,
     left_out,
     residual_rms,
     start_gains,
     unexplained,
+    unexplained_notes,
 )
 from tauguard.detectors.calibration.identification import RATE, identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
@@ -71,7 +71,7 @@ def test_a_log_it_has_not_seen(found):
 
 def looked(arm, recordings):
     left = unexplained(arm, {str(k): r for k, r in enumerate(recordings)})
-    return explained(arm.robot.joint_names, list(left.values()))
+    return unexplained_notes(arm.robot.joint_names, list(left.values()))
 
 
 @pytest.mark.parametrize("load", [Load(), None])
