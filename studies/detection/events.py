@@ -17,10 +17,10 @@ from tauguard.traces import STRATA, Alarm, Collision, Trace
 END = 0.03
 #: Duration of a hand's push, half a sine of force [s].
 PUSH_SECONDS = (0.6, 1.4)
-#: Severity of pushes [N m]; payloads that are picked up and put down [g], unknown to detectors.
-PUSH_STRATA, PICKED = STRATA[:4], (500.0, 1000.0, 2000.0, 3500.0)
-#: Times at which the load of a payload episode is picked up and put down; its length [s].
-UP, DOWN, LONG = 4.0, 8.0, 10.0
+PUSH_STRATA = STRATA[:4]  #: severity of pushes [N m]
+PICKED = (500.0, 1000.0, 2000.0, 3500.0)  #: payloads that are unknown to detectors [g]
+UP, DOWN = 4.0, 8.0  #: times at which a payload is picked up and put down [s]
+LONG = 10.0  #: length of a payload episode [s]
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,8 @@ CONDITIONS: dict[str, tuple[float, Conditions]] = {
 }
 #: Payloads that are picked up half-way [g]; an alarm that they raise is false.
 TAKEN_UP = (1500.0, 2500.0, 3500.0)
-#: Collisions per stratum, and hours of free motion, for each condition.
-PER_CONDITION, HOURS = 5, 0.1
+PER_CONDITION = 5  #: collisions per stratum for each condition
+HOURS = 0.1  #: collision-free motion for each condition [h]
 
 
 def measure(

@@ -33,17 +33,17 @@ SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
 #: Contact force of a tested collision [N].
 FORCES = (20.0, 200.0)
-#: Strata below the evaluated ones [N m], to find the smallest detected torque; forces [N].
-FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
-#: Collisions per test episode, and largest number of rounds in which plans are drawn.
-GROUP, ROUNDS = 5, 8
+FAINT = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0))  #: strata below the evaluated ones [N m]
+FAINT_FORCES = (2.0, 200.0)  #: contact force of a collision in such a stratum [N]
+GROUP = 5  #: collisions per test episode
+ROUNDS = 8  #: largest number of rounds in which plans are drawn
 
 #: Streams of seeds: training, thresholds, test motions.
 TRAIN, CALIBRATE, TEST = 11, 12, 13
 
 Stratum = tuple[float, float]
 Wish = tuple[str, Stratum]
-#: Stratum of a collision that is in none.
+#: Stands for the stratum of a collision that is in no stratum.
 _NONE = (0.0, 0.0)
 
 

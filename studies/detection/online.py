@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 #: Fractions of the support vectors that reduced sets keep.
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
-#: Period of a controller at 1 kHz, and largest wanted median time of a sample [us].
-PERIOD, GOAL = 1000.0, 100.0
+PERIOD = 1000.0  #: period of a controller at 1 kHz [us]
+GOAL = 100.0  #: largest wanted median time of a sample [us]
 #: Methods of a quick run.
 QUICK = ("moving-thresholds", "residual-thresholds", "srq-svr")
 #: False alarms per hour that thresholds aim at.

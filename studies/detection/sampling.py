@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Sample rates [Hz]: the CURA6's, those of common controllers, and the simulation's.
 RATES = (23.8, 25.0, 50.0, 100.0, 125.0, 250.0, 1000.0)
-#: The shipped detector, and plain thresholds on the same residual.
+#: The shipped detector, and thresholds on the same residual.
 NAMES = ("srq-svr", "moving-thresholds")
 #: False alarms per hour that the thresholds aim at.
 ASKED = 1.0

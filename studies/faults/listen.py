@@ -42,12 +42,11 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: Sample rates [Hz] of UR's CB and e-Series; number of collisions in the log of a full and a quick
-#: run.
-RATES, COLLISIONS = (125.0, 500.0), (195, 3)
-#: Training: seconds and number of collision-free episodes, their speeds [%], wanted false alarms an
-#: hour.
-SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
+RATES = (125.0, 500.0)  #: sample rates of UR's CB and e-Series [Hz]
+COLLISIONS = (195, 3)  #: number of collisions in the log of a full run and of a quick run
+SECONDS, EPISODES = 20.0, 8  #: length [s] and number of the collision-free training episodes
+SPEEDS = (20.0, 40.0, 60.0)  #: speeds of the training episodes [%]
+PER_HOUR = 5.0  #: requested false alarms per hour
 #: The serving process must answer within this time [s].
 ANSWERS = 120.0
 

@@ -25,14 +25,12 @@ from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.report import Row, rate
 from tauguard.traces.trace import Trace
 
-#: How often each fault is tried on each arm at random moments, and again at collisions: full run,
-#: quick run.
+#: Trials of a fault per arm at random moments, and as many at collisions: full run, quick run.
 MOMENTS = (8, 3)
-#: A collision within a fault is missed if the answer stays "free" for this time after its alarm
-#: [s].
+#: A collision in a fault is missed if the answer stays "free" for this time after its alarm [s].
 MISSED = 0.15
-#: Length of a fault [s], and of the observation after the detector has settled again.
-LASTS, AFTER = 1.0, 2.5
+LASTS = 1.0  #: length of a fault [s]
+AFTER = 2.5  #: observed time after the detector has settled again [s]
 #: Faults that a sample and its neighbours show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {

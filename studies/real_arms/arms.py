@@ -19,8 +19,8 @@ from tauguard.traces.resample import resampled
 
 #: Shortest untouched beginning of a log that is used as a collision-free log [s].
 SHORTEST = 1.2
-#: A push begins above and ends below these forces of a sensor [N]; least time to the next [s].
-BEGINS, ENDS, APART = 4.0, 2.0, 0.3
+BEGINS, ENDS = 4.0, 2.0  #: a push begins above and ends below these forces of a sensor [N]
+APART = 0.3  #: least time between two pushes [s]
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,11 @@ from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.events import confirmation_samples, confirmed
 from tauguard.traces import Trace
 
-#: Bandwidth [1/s], threshold over the largest value in training, confirmation, settling [s].
-RATE, FACTOR, LASTS, SETTLE = 30.0, 1.5, 0.04, 0.5
-#: Sub-steps of the sliding mode, whose torque switches; largest slope that it follows [N m/s].
-SUBSTEPS, SLOPE = 8, 30.0
+RATE = 30.0  #: bandwidth [1/s]
+FACTOR = 1.5  #: threshold / largest value in training
+LASTS, SETTLE = 0.04, 0.5  #: time to confirm an alarm, and to settle after the start [s]
+SUBSTEPS = 8  #: sub-steps per sample of the sliding mode, whose torque switches
+SLOPE = 30.0  #: largest slope of the torque that the sliding mode follows [N m/s]
 
 
 def momentum(arm: ArmModel, trace: Trace, tau: Array) -> Array:

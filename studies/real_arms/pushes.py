@@ -3,8 +3,8 @@
 Each arm's collision-free logs are divided into folds. A detector judges each log after training on
 the other folds, and gets the log's load if it is known. For logs with pushes a detector is trained
 on all collision-free logs. For a Panda's touches it is trained on the untouched beginnings of the
-other logs. An alarm finds a push if it begins after 0.15 s before the start and before the peak of
-the force (or the end of a labelled touch, or the first half second of a push that lasts seconds).
+other logs. An alarm finds a push if it begins at most 0.15 s before the push and before the peak of
+the force (before the end of a labelled touch, or in the first 0.5 s of a push that lasts seconds).
 ``by chance`` is the number of pushes that the alarms find if a random time is added to all of them.
 
 Our detector is compared with the observers of :mod:`studies.real_arms.observers`, which use our
@@ -46,7 +46,7 @@ Alarms = Callable[[Recording], NDArray[np.bool_]]
 EARLY = 0.15
 #: Time after a push in which an alarm belongs to it [s].
 LATE = 0.5
-#: Random shifts of a log's alarms, for ``by chance``.
+#: Number of random shifts of a log's alarms, for ``by chance``.
 SHIFTS = 200
 #: Lower torque thresholds of libfranka's examples [N m].
 FRANKA = np.array([20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0])

@@ -28,8 +28,8 @@ PER_HOUR = 10.0
 OTHERS = ("model errors", "payloads")
 #: Loads with which a detector is judged [g].
 PAYLOADS = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
-#: Numbers of episodes: for training with 5 collisions each, and without (40 s); for the test with 8
-#: collisions each, and without (50 s).
+#: Numbers of episodes: training with 5 collisions each; training without collisions (40 s each);
+#: test with 8 collisions each; test without collisions (50 s each).
 FULL, QUICK = (12, 18, 9, 24), (2, 3, 1, 1)
 NOTES = {
     "needs": "srq-svr trained on simulations without a part for 10 false alarms per hour, and "

@@ -98,7 +98,9 @@ def command(
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
-        raise ValueError("--quiet and --gains are for training and cannot be combined with --model")
+        raise ValueError(
+            "--quiet and --gains cannot be combined with --model: they are for training"
+        )
     robot = bodies_file(robot)
     check_no_device(log)
     numbers = robot_numbers(robot)
