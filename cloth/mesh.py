@@ -102,7 +102,7 @@ class MeshCCD:
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Faces as rows of vertices, read-only; ``Frame.vf`` has row numbers. Shape (F, 3)."""
+        """Vertices of each face, read-only; ``Frame.vf`` names a face by its row. Shape (F, 3)."""
         return self._topology.faces
 
     @property

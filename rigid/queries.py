@@ -63,7 +63,7 @@ def refuse_hulls(a: Bodies, b: Bodies) -> None:
 
 
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
-    """Overlap of batched boxes, written to ``hit``; returns the number of rows decided exactly."""
+    """Write the overlap of boxes to ``hit``; returns how many rows exact arithmetic decided."""
     skew = max(a.skew, b.skew)
     return _rigid.overlap_boxes(a.native, a.blocks, b.native, b.blocks, skew, threads, hit)
 

@@ -14,15 +14,15 @@ struct Cubics {
   Double4 b[4];
 };
 
-// The lanes with certainly no root: all coefficients have the same sign.
+// The lanes that certainly have no root: all coefficients have the same sign.
 TAUGUARD_INLINE Mask4 one_sign(const Cubics& c, Double4 error) {
   const Double4 least = min(min(c.b[0], c.b[1]), min(c.b[2], c.b[3])),
                 most = max(max(c.b[0], c.b[1]), max(c.b[2], c.b[3]));
   return (least > error) | (most < -error);
 }
 
-// The lanes with certainly one root: the first and the last coefficient differ in sign, and the
-// sequence changes its sign once, whatever the sign of an uncertain coefficient.
+// The lanes that certainly have one root: the first and the last coefficient differ in sign, and
+// the sequence changes its sign once, whatever the sign of an uncertain coefficient.
 TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
   const Double4 *b = c.b, below = -error;
   const Mask4 falls = (b[0] > error) & (b[3] < below) & ((b[1] > error) | (b[2] < below)),
@@ -31,8 +31,8 @@ TAUGUARD_INLINE Mask4 one_root(const Cubics& c, Double4 error) {
 }
 
 // Where to cut a cubic into pieces with fewer roots. If both ends have the same sign, the cut is at
-// the extremum towards the other sign. Otherwise it is at the inflection point, which has at most
-// two roots on each side.
+// the minimum for positive ends and at the maximum for negative ones. Otherwise it is at the
+// inflection point, which has at most two roots on each side.
 TAUGUARD_INLINE Double4 cut_of(const Cubics& c) {
   const Double4 s = c.b[0] > 0 ? splat(1) : splat(-1), d0 = s * (c.b[1] - c.b[0]),
                 d1 = s * (c.b[2] - c.b[1]), d2 = s * (c.b[3] - c.b[2]), a = d0 - 2 * d1 + d2,

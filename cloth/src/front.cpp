@@ -16,7 +16,7 @@ constexpr int first_depth = 5;  // the first front has all pairs of nodes of thi
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
-// Number of entries of `cut` so far, over all chunks.
+// Number of entries written to the new front so far, over all chunks.
 struct Total {
   std::size_t limit;
   std::atomic<std::size_t> entries{0};
@@ -36,7 +36,7 @@ class Walk {
                            : node_test<float>(a.slots(), a.times())),
         total_(total) {}
 
-  // Splits each node that is not a leaf. If the depths differ, the node of less depth is a leaf.
+  // Splits each node that is not a leaf. If the depths differ, the shallower node is a leaf.
   int children(NodePair p, NodePair* child) const {
     const int gap = depth(p.a) - depth(p.b);
     const bool split_a = gap >= 0 && !a_.is_leaf(p.a), split_b = gap <= 0 && !b_.is_leaf(p.b);
@@ -50,7 +50,7 @@ class Walk {
   }
 
   // Processes `n` entries of the front, at most a chunk. If consecutive entries are all children of
-  // one pair, and neither they nor the pair overlap, the pair replaces them.
+  // one pair, and the nodes are apart in each entry and in that pair, the pair replaces them.
   void move(const NodePair* entry, int n) {
     bool meet[kept_grain];
     for (int i = 0; i < n; ++i) {

@@ -46,7 +46,7 @@ class MeshCcd {
 
   const Topology& topology() const { return topology_; }
   int threads() const { return threads_; }
-  // The volume of the last prepare.
+  // The kind of bounding volume in the last prepare.
   VolumeKind volume() const { return volume_; }
 
   // Updates trees, volumes and fronts for this step. The positions (n, 3) are copied. fresh: start

@@ -1,4 +1,5 @@
-// A query as differences of positions, and its coplanarity cubic, from which every method starts.
+// The differences of positions of a query (a vertex and a face, or two edges), and its coplanarity
+// cubic. Every method starts from them.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +18,7 @@ using geometry::Vec3;
 
 // Differences of positions at both ends of the step. The cubic is p . (q x r). A direction
 // separates the features if the projections of all differences in `gap` on it have the same sign.
-// `big` is the largest magnitude of a difference.
+// `big` is the largest magnitude of a component of a difference.
 struct Query {
   Vec3 p[2], q[2], r[2];
   Vec3 gap[2][4];
@@ -25,8 +26,8 @@ struct Query {
   double big, distance;
   // Bound on the error of a Bernstein coefficient, with M = big^3:
   // * A coefficient is the sum of up to three triple products. Each has 6 terms and is at most 6 M.
-  // * A triple product has 3 differences, 2 products and 3 sums: 8 u of 6 M. Three of them have
-  //   144 u M, and their sum adds 40 u M.
+  // * A triple product rounds in 3 differences, 2 products and 3 sums: an error of 8 u times 6 M.
+  //   For three of them this is 144 u M, and their sum adds 40 u M.
   // * A cut has 3 interpolations with 3 roundings of values up to 6 M: 54 u M. There are at most 70
   //   cuts in a row.
   // The total is (184 + 70 * 54) u M < 2^12 u M. make() prevents underflow by scaling.

@@ -9,9 +9,9 @@ namespace tauguard::cloth {
 
 enum class AtStart { apart, touching, unknown };
 
-// Sides of the hull of the differences in a plane, as rows (o, a, b) of vertices. Both corners of a
-// side are differences with the vertex o: of o and a, and of o and b. The cross product of the
-// corners is (a - o) x (b - o).
+// If all vertices are in one plane, the differences between points of the two features fill a
+// polygon. Each row (o, a, b) of vertices gives a side of it: one corner is the difference of o and
+// a, the other that of o and b. The cross product of the corners is (a - o) x (b - o).
 template <bool vf>
 inline constexpr int sides_of[3][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 template <>

@@ -239,7 +239,7 @@ def _identify_scale(
     found, _ = _fit(start, recordings, "gains", friction, None, 2)
     notes = tuple(
         f"{arm.robot.joint_names[j]}: the logs do not determine the scale of its torques (gain "
-        f"known to {100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept; give --gains"
+        f"uncertain by {100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept; give --gains"
         for j in np.flatnonzero(unsure)
     )
     return replace(found, scale=scale, gain_error=error, notes=notes)

@@ -1,6 +1,6 @@
-"""The momentum observer, and its rate [1/s] for each use.
+"""The momentum observer, and its gain [1/s] for each use.
 
-A higher rate detects an impact earlier and passes more noise. A rate far above a fifth of the
+A higher gain detects an impact earlier and passes more noise. A gain far above a fifth of the
 sample rate has no further benefit.
 """
 
@@ -22,7 +22,7 @@ DETECTION_GAIN = 200.0
 #: Environments: steps of the control signal must not raise an alarm.
 ENVIRONMENT_GAIN = 50.0
 
-#: Logs of real arms at 100 Hz or more without training: errors of friction allow no higher rate.
+#: Logs of real arms at 100 Hz or more without training: errors of friction allow no higher gain.
 LOG_GAIN = 20.0
 
 
@@ -105,7 +105,7 @@ def observe(
         q: positions [rad], shape (T, n).
         qd: velocities [rad/s], shape (T, n).
         tau: drive torques at the joints minus known friction [N m], shape (T, n).
-        gain: observer rate [1/s], a number or one per joint.
+        gain: observer gain [1/s], a number or one per joint.
         threads: 0 takes all processors; the result does not depend on it.
 
     Returns:
@@ -128,7 +128,7 @@ class MomentumObserver:
 
         Args:
             robot: the arm.
-            gain: observer rate [1/s], a number or one per joint.
+            gain: observer gain [1/s], a number or one per joint.
             dt: default sample interval of :meth:`step` [s].
         """
         self.robot = robot

@@ -1,7 +1,7 @@
 """The noise of positions and velocities, and the joint velocity estimated from both.
 
 At 1 kHz, most of a residual without a collision is velocity noise times inertia times the
-observer's rate. Positions are measured more precisely than velocities. A Kalman filter of both
+observer's gain. Positions are measured more precisely than velocities. A Kalman filter of both
 gives a velocity with less noise and, at constant acceleration, without lag.
 """
 

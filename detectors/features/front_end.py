@@ -221,7 +221,7 @@ def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
 
 
 def plain_residual(arm: ArmModel, trace: Trace) -> Array:
-    """The residual of the plain observer, without unknowns [N m], shape (T, n).
+    """The observer's residual if no unknowns are estimated [N m], shape (T, n).
 
     It is taken from the cached estimate of a front end of this arm if there is one.
     """

@@ -1,5 +1,5 @@
 // tauguard.detectors._network: feed-forward networks.
-// A result depends only on its row, so that one row or many give the same bits.
+// A row gives the same bits alone and among others.
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 using geometry::ThreadPool;
 
-// out = bias + sum_i x_i weight_i, with weight of shape (in, out); sums in the order of i.
+// y = sum_i x_i weight_i + bias, with weight of shape (in, out). The sum is in the order of i.
 TAUGUARD_CLONES void affine(const double* x, const double* weight, const double* bias,
                             std::size_t in, std::size_t out, double* y) {
   for (std::size_t j = 0; j < out; ++j) y[j] = 0.0;
@@ -45,7 +45,7 @@ void network(In2 x, Ids widths, In1 weights, In1 biases, In1 centre, In1 scale, 
   require(weights.shape(0) == all && biases.shape(0) == own && centre.shape(0) == w[0] &&
               scale.shape(0) == w[0] && x.shape(1) == w[0] && out.shape(0) == x.shape(0) &&
               out.shape(1) == w[layers],
-          "network: arrays differ in shape");
+          "network: the shapes of the arrays do not match");
   nb::gil_scoped_release release;
   ThreadPool::shared().parallel_for(x.shape(0), threads, 256, [&](auto begin, auto end, auto) {
     std::vector<double> now(widest), next(widest);

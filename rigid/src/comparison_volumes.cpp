@@ -6,7 +6,8 @@
 namespace tauguard::rigid {
 namespace {
 
-constexpr double up = 1 + 0x1p-46;  // exceeds the relative rounding error of each expression below
+// A factor that covers the relative rounding error of each expression below.
+constexpr double up = 1 + 0x1p-46;
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 

@@ -37,7 +37,7 @@ TAUGUARD_INLINE Entry cast_row(const Chunk& c, std::size_t i) {
   return cast(a, b, c.d + 3 * i);
 }
 
-// Whether there is a hit, by elimination.
+// Whether there is a hit, by eliminating the separating plane.
 template <class A, class B>
 TAUGUARD_INLINE Verdict eliminate_row(const Chunk& c, std::size_t i) {
   const double *pa = c.a.row(i), *pb = c.b.row(i), *d = c.d + 3 * i;

@@ -8,12 +8,12 @@
 namespace tauguard::rigid {
 namespace {
 
-// If the radii are below this fraction of the size, the normal does not give the touching features.
-// The normal is along the segment between the cores. The ends of this segment are accurate to 1e-9
-// of the size, so the direction of a short segment is not.
+// If the sum of the radii is below this fraction of the bodies' size, the normal is too inaccurate
+// for finding the touching features. It is the direction of the segment between the cores, whose
+// ends have errors of up to 1e-9 of the size: the shorter the segment, the less accurate it is.
 constexpr double small_radii = 1e-6;
 
-// A common point of overlapping grown bodies, on the segment between their cores.
+// A point that both rounded bodies contain, on the segment between their cores.
 Vec3 common_point(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
   const Vec3 way = near.b - near.a;

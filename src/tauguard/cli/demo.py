@@ -132,8 +132,8 @@ def false_alarm_text(summary: dict[str, Any]) -> str:
     return (
         f"  false alarms per hour: requested {wanted['per_hour']:g}, found {found['value']:.1f}, "
         f"95 % interval {other}, from {found['n']} alarms in {60 * found['hours']:.0f} min\n"
-        f"  (The threshold was set on {60 * wanted['hours']:.0f} min of training motion, with a "
-        f"95 % interval of {own} per hour. The test motions are different.)"
+        f"  (The threshold was set on {60 * wanted['hours']:.0f} min of training motion, so the "
+        f"95 % interval of its rate is {own} per hour. The test motions are different.)"
     )
 
 

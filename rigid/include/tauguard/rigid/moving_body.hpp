@@ -31,7 +31,7 @@ struct RigidMotion {
   Vec3 turn(const Vec3& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
 };
 
-// A vector that rotates with a body, as the sum of `along` and `swing` (formula above) at t = 0.
+// A vector that rotates with a body, in terms of the formula above. At t = 0 it is along + swing.
 struct Swing {
   Vec3 along, swing, side;
   Swing(const RigidMotion& m, const Vec3& w)
