@@ -85,13 +85,11 @@ class RigidChecker:
 
     def _rows(self, ids: Index, values: Array) -> Contacts:
         none = np.full((len(ids), 2), -1, dtype=np.int32)
-        feature = none.copy()
-        feature[:, 1] = ids[:, 2]
         return Contacts(
             time=values[:, 0],
             geom=self._geoms[ids[:, :2]],
             flex=none,
-            feature=feature,
+            feature=none.copy(),
             point=values[:, 2:5],
             normal=values[:, 5:8],
             distance=values[:, 1],
