@@ -236,7 +236,7 @@ def differences(reference: tuple[Any, Any], found: tuple[Any, Any]) -> tuple[int
 
 
 def lateness(reference: FrameAnswer, found: FrameAnswer) -> Row:
-    """Compare the times of the hits that both have.
+    """Compare the times of the hits that both results contain.
 
     Returns:
         Number of hits that are later in ``found``, and the largest delay as a fraction of the step.

@@ -31,10 +31,11 @@ from tauguard.detectors import (
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.report import Row
 
-#: The dataset, and the wanted rate of false alarms [1/h].
-NAME, PER_HOUR = "tauguard-collisions-v2", 10.0
-#: The quick run: its detector, the episodes of each split, and the length of each [s].
-QUICK, QUICK_EPISODES, QUICK_SECONDS = ("residual-thresholds",), {"train": 6, "test": 2}, 30.0
+NAME = "tauguard-collisions-v2"  #: name of the dataset
+PER_HOUR = 10.0  #: requested false alarms per hour
+QUICK = ("residual-thresholds",)  #: detector of a quick run
+QUICK_EPISODES = {"train": 6, "test": 2}  #: number of episodes per split of a quick run
+QUICK_SECONDS = 30.0  #: length of an episode of a quick run [s]
 
 NOTES = {
     "entries": "one detector per arm, trained on the train split for 10 false alarms per hour; "

@@ -25,8 +25,8 @@ from tauguard.models import pin_model
 from tauguard.report import Row
 
 NAME = "tauguard-collisions-v1"
-#: Parts of the work, in order; rates of rows [Hz] at which a dataset's size is measured.
-PARTS, RATES = ("prepare", "targets", "steps", "labels", "observer", "writing"), (1000, 500, 100)
+PARTS = ("prepare", "targets", "steps", "labels", "observer", "writing")  #: of the work, in order
+RATES = (1000, 500, 100)  #: sample rates at which a dataset's size is measured [Hz]
 NOTES = {
     "rate": "Episodes of tauguard-collisions-v1 under another seed; processor time of one core, 1 "
     "kHz, observer and writing included. us: each part, per sample; steps include the attempts at "

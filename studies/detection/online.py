@@ -36,7 +36,7 @@ PER_HOUR = 10.0
 NOTES = {
     "real time": "processor time of one core per sample at 1 kHz [us], of collision-free motion: "
     "simulation, the plain observer, and the rest of the shipped detector (tracking, features, "
-    "400 support vectors, threshold). times: speed of all together / real time. peer: "
+    "400 support vectors, threshold). times: real time / time of all together. peer: "
     "MuJoCo's own rollout of the bare arm in the same run. difference_to_online: largest "
     "difference of the scores.",
     "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "

@@ -108,7 +108,7 @@ def with_thresholds(
     """The alarms of each of :data:`PEERS`, with thresholds from the training logs.
 
     The returned functions take the model of a log's arm, which may include a load, and the log.
-    ``baseline`` subtracts each joint's mean from :data:`SETTLE` to twice that, for an untold load.
+    ``baseline`` subtracts each joint's mean from SETTLE to 2 SETTLE, due to an unknown load.
     """
     traces = [trace for trace in training if trace.t[-1] - trace.t[0] > 2 * SETTLE]
     torques = [drive_torque(arm, trace) for trace in traces]

@@ -38,8 +38,8 @@ NOTES = {
     "table 2.2 dynamic": "two copies, one of which moves. us_hit, us_miss: time for a pair that "
     "touches, and that stays apart. coal_us: the distance calls (OBBRSS) of conservative "
     "advancement, on some of the pairs. late: pairs that overlap 1e-10 before the time found; "
-    "not_touching: pairs apart 1e-7 after it, by the exact query. met_before: pairs that meet "
-    "before by coal's distance; distance_at_toi: coal's distance at the time found [m].",
+    "not_touching: pairs apart 1e-7 after it, by the exact query. met_before: pairs in contact "
+    "before that, by coal's distance; distance_at_toi: coal's distance at the time found [m].",
     "mesh and convex": "one mesh and convex bodies, us per body, coal's with its Python call; "
     "coal_differs_most: largest difference of the distances of separate pairs [m].",
     "mesh and convex in motion": "as table 2.2 dynamic; the body moves.",

@@ -26,8 +26,8 @@ NOTES = {
     "a turn. us_hit, us_miss: time for a pair that touches, and that stays apart; coal's are its "
     "distance calls alone. Errors are relative to a bracket of the first contact; undecided: "
     "pairs whose distance is below the bracket's resolution.",
-    "motion of bodies with radii": "both bodies turn; times as above. met_before: pairs that meet "
-    "before the time found by coal's distance; distance_at_toi: coal's largest distance at that "
+    "motion of bodies with radii": "both bodies turn; times as above. met_before: pairs in contact "
+    "before the time found, by coal's distance; distance_at_toi: coal's largest distance at that "
     "time [m]; coal_disagrees: hits that differ (coal's advancement stops at 1e-6 m).",
 }
 #: Least number of pairs in a timed call.

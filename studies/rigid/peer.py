@@ -17,7 +17,7 @@ from tauguard.rigid.shapes import Bodies
 
 
 def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], float]:
-    """coal's answers, time per pair [ns], and its median without loop and call.
+    """coal's answers, time per pair [ns], and median time without loop and call [ns].
 
     Loop and call are timed on two spheres far apart, the fastest query there is.
     """

@@ -88,7 +88,7 @@ def command(
             **detector_timing(detector, judged, detected - fitted),
         },
     }
-    leave(out, simulate(plan.showcase), detector)
+    write_results(out, simulate(plan.showcase), detector)
     draw(out / "summary.png", summary, matchings)
     summary["timing"]["total_s"] = time.perf_counter() - started
     for path in filter(None, (out / "summary.json", json)):
@@ -150,7 +150,7 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     print(f"in rerun's own window:  {run}rerun {recording}")
 
 
-def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
+def write_results(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
     """Write the recording, its replay and the detector into the folder."""
     from tauguard.detectors import diagnose, save_model
     from tauguard.replay import write_rrd

@@ -124,7 +124,7 @@ def command(
     if json is not None:
         write_json(json, result)
     if out is not None:
-        leave(out, trace, found, result, robot)
+        write_results(out, trace, found, result, robot)
 
 
 def refuse_touched(log: Path, read: Log, quiet: float) -> None:
@@ -358,7 +358,7 @@ def report(result: dict[str, Any]) -> None:
     print(f"{text}{false}{most}")
 
 
-def leave(
+def write_results(
     out: Path, trace: Trace, found: LogDetection, result: dict[str, Any], robot: Path
 ) -> None:
     """Write events.json, detect.mcap and detect.rrd into the folder ``out``."""

@@ -44,7 +44,7 @@ def command(
     if (mcap or robot) is not None and episode is None:
         raise ValueError("--mcap and --robot need --episode")
     if episode is not None:
-        again(folder, episode, mcap, robot)
+        simulate_again(folder, episode, mcap, robot)
         return
     damaged = dict(inspection.verified(folder)) if verify else None
     if damaged and HEAD in damaged:
@@ -134,7 +134,7 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> None:
+def simulate_again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> None:
     """Simulate one episode again and compare it with the stored one."""
     from tauguard.datasets.inspection import line_of, same_again
     from tauguard.traces import write_mcap

@@ -80,7 +80,7 @@ def command(
     run_check("order", accept, lambda: check_order(given.arm, given.logs))
     recordings, names = list(given.logs.values()), list(given.logs)
     limit = load_arm(str(robot)).torque_limit
-    twin = made(given, recordings, limit)
+    twin = twin_from(given, recordings, limit)
     apart = []
     if each_can_be_left_out(recordings):
         apart = left_out(given.arm, recordings, scale=given.scale)
@@ -128,7 +128,7 @@ def without_odd_logs(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
     return replace(given, logs={names[k]: recordings[k] for k in kept}), notes
 
 
-def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
+def twin_from(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     """A twin from some of the logs; ``limit`` are the arm's largest torques [N m], shape (n,)."""
     from tauguard.detectors.calibration.identification import identify
     from tauguard.twin import identify_twin
@@ -148,7 +148,7 @@ def with_jackknife(twin: Twin, given: FreeLogs, limit: Array) -> tuple[Twin, lis
 
     parts = pieces(list(given.logs.values()), PARTS)
     rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
-    others, lacking = _made_of_each(given, rest, limit)
+    others, lacking = _twin_from_each(given, rest, limit)
     twin = with_intervals(twin, others)
     return twin, [*twin.notes, *(f"a twin for the intervals is missing: {why}" for why in lacking)]
 
@@ -175,7 +175,7 @@ def judged(
         held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
         tried = {names[k]: recordings[k].trace for k in held}
     used = [r for k, r in enumerate(recordings) if k not in held]
-    twins, reasons = _made_of_each(given, [used], limit) if held else ([twin], [])
+    twins, reasons = _twin_from_each(given, [used], limit) if held else ([twin], [])
     if not twins or not tried:
         return None, list(tried), reasons
     bare, others = [r.trace for r in used if _unloaded(r)], list(tried.values())
@@ -183,14 +183,14 @@ def judged(
     return with_alarms(likeness, used, given.arm, others), list(tried), reasons
 
 
-def _made_of_each(
+def _twin_from_each(
     given: FreeLogs, groups: list[list[Recording]], limit: Array
 ) -> tuple[list[Twin], list[str]]:
     """A twin from each group of logs, and the different reasons why some groups give none."""
     found, reasons = [], list[str]()
     for used in groups:
         try:
-            found.append(made(given, used, limit))
+            found.append(twin_from(given, used, limit))
         except ValueError as error:
             reasons += [str(error)] if str(error) not in reasons else []
     return found, reasons
