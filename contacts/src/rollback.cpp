@@ -10,8 +10,9 @@ namespace {
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
 // If only an impact zone helps, short sub-steps are useless. So each impact zone multiplies the
-// length of the shortest sub-step by `longer`, up to the fraction `longest` of a step. A step after
-// one with an impact zone begins with sub-steps of this length.
+// length of the shortest sub-step by `longer`, up to the fraction `longest` of a step. After a step
+// with an impact zone, the next one that is rolled back begins with sub-steps of this length,
+// unless more than `watched` steps were accepted between them.
 constexpr double longer = 4, longest = 0.25;
 
 // Largest number of attempts to find all pairs of an impact zone.
