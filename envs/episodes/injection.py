@@ -278,31 +278,23 @@ class Aim:
         return np.asarray((reach >= CLAMP_TRAVEL[0]) & (reach <= CLAMP_TRAVEL[1]))
 
 
-def pulse_wrench(
-    target: Target, com: Array, force: float, duration: float, dt: float, rows: int, begin: int
-) -> Array:
-    """A half-sine force at the target's point as a wrench about ``com``.
+def pulse_wrench(target: Target, lever: Array, force: float, duration: float, dt: float) -> Array:
+    """A half-sine force along the target's direction, as a wrench about the centre of mass.
 
     Args:
-        target: point and direction of the force.
-        com: centre of mass of the link, shape (rows, 3) [m].
+        target: direction of the force.
+        lever: from the link's centre of mass to the point of the force, shape (T, 3) [m].
         force: peak of the force [N].
-        duration: duration of the force [s].
-        dt: time between two rows [s].
-        rows: number of rows of the table.
-        begin: the force is 0 up to this row.
+        duration: duration of the force [s], from the first sample on.
+        dt: time between two samples [s].
 
     Returns:
-        Force [N] and torque [N m], world frame, shape (rows, 6).
+        Force [N] and torque [N m], world frame, shape (T, 6).
     """
-    table = np.zeros((rows, 6))
-    steps = np.arange(rows) - begin
-    during = (steps > 0) & (steps * dt < duration)
-    size = np.where(during, np.sin(np.pi * np.clip(steps * dt / duration, 0, 1)), 0.0)
-    table[:, :3] = force * size[:, None] * target.direction
-    moved = target.point + np.outer(steps * dt, target.velocity)
-    table[:, 3:] = cross(moved - com, table[:, :3])
-    return table
+    t = np.arange(len(lever)) * dt
+    size = np.where((t > 0) & (t < duration), np.sin(np.pi * np.clip(t / duration, 0, 1)), 0.0)
+    pushes = force * size[:, None] * target.direction
+    return np.concatenate([pushes, cross(lever, pushes)], axis=1)
 
 
 def launch(target: Target, speed: float, radius: float) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from tauguard.envs.episodes.injection import (
     pulse_wrench,
 )
 from tauguard.envs.episodes.loop import AlongMotion, Rollout
-from tauguard.envs.episodes.poses import Poses, cross
+from tauguard.envs.episodes.poses import Poses
 from tauguard.models import Scene
 
 #: Where an obstacle waits while it is not used, far from the arm [m].
@@ -184,8 +184,9 @@ class Striking:
         if plan.kind != "pulse":
             self.loop.take(self._loop)
         if plan.kind == "pulse":
-            com = self._poses.points(self._motion.q[begin:end], target.body)
-            wrench = pulse_wrench(target, com, strength, plan.duration, dt, end - begin, 0)
+            moved = target.point + np.outer(np.arange(end - begin) * dt, target.velocity)
+            lever = moved - self._poses.points(self._motion.q[begin:end], target.body)
+            wrench = pulse_wrench(target, lever, strength, plan.duration, dt)
             body = target.body
         elif plan.kind == "strike":
             self._launch(target, strength)
@@ -201,7 +202,7 @@ class Striking:
             return None
         rollout = along.recorded.rows(begin, end)
         wrenches = (
-            self._pulse_truth(wrench, target, rollout, dt)
+            self._pulse_truth(wrench[:, :3], lever, target, rollout)
             if wrench is not None
             else labels.Wrenches.from_contacts(rollout.contact)
         )
@@ -238,16 +239,11 @@ class Striking:
             data.mocap_pos[model.body("clamp").mocapid[0]] = -PARKED
 
     def _pulse_truth(
-        self, wrench: Array, target: Target, rollout: Rollout, dt: float
+        self, force: Array, lever: Array, target: Target, rollout: Rollout
     ) -> labels.Wrenches:
-        """The pulse's wrench about the pushed point instead of the centre of mass."""
-        rows = len(wrench)
-        found = labels.Wrenches.empty(rows, len(self._scene.link_bodies))
+        """The pulse's force, where it acts on the simulated link."""
+        found = labels.Wrenches.empty(len(force), len(self._scene.link_bodies))
         link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])
-        force = wrench[:, :3]
-        point = target.point + np.outer(np.arange(rows) * dt, target.velocity)
-        com = self._poses.points(rollout.q, target.body)
         found.force[:, link] = force
-        found.torque[:, link] = wrench[:, 3:] - cross(point - com, force)
-        found.point[:, link] = point
+        found.point[:, link] = self._poses.points(rollout.q, target.body) + lever
         return found

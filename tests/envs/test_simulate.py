@@ -143,9 +143,11 @@ def test_pulse_truth_is_the_applied_generalised_force():
     k = int(np.argmax(np.linalg.norm(window.wrenches.force[:, 4], axis=1)))
     data.qpos[run.scene.qpos_adr] = window.rollout.q[k]
     mujoco.mj_forward(model, data)
-    force, torque = window.wrenches.force[k, 4], window.wrenches.torque[k, 4]
+    force, point = window.wrenches.force[k, 4], window.wrenches.point[k, 4]
+    assert not window.wrenches.torque.any()
+    assert np.linalg.norm(point - data.xipos[body]) < 0.2
     expected = np.zeros(model.nv)
-    mujoco.mj_applyFT(model, data, force, torque, window.wrenches.point[k, 4], body, expected)
+    mujoco.mj_applyFT(model, data, force, np.zeros(3), point, body, expected)
     got = trace.truth.tau_ext[window.begin + k]
     np.testing.assert_allclose(got, expected[run.scene.dof_adr], atol=1e-12)
 
