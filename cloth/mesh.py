@@ -128,6 +128,10 @@ class MeshCCD:
         """The narrow phase."""
         return self._method
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.faces)} faces, {len(self.edges)} edges, {len(self.points)} points"
+        return f"{type(self).__name__}({counts}, method={self.method!r})"
+
     @property
     def threads(self) -> int:
         """The number of threads, at least 1."""

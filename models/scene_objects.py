@@ -195,6 +195,8 @@ def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
         FileNotFoundError: no such file.
     """
     path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"objects {path}: no such file; expected a TOML file of objects")
     with reading(path):
         rows = tomllib.loads(read_text(path)).get("object", [])
         if not rows:

@@ -123,6 +123,10 @@ class MeshTree:
     def __len__(self) -> int:
         return len(self.faces)
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.vertices)} vertices, {len(self)} faces"
+        return f"{type(self).__name__}({counts}, volume={self.volume!r})"
+
     def _check(self, other: MeshTree) -> None:
         if not isinstance(other, MeshTree):
             raise ValueError(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
 
@@ -62,6 +63,8 @@ class Motion(Rebuilt):
     pose_t0: NDArray[np.float64]
     linear: NDArray[np.float64]
     angular: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
     def __init__(self, pose_t0: ArrayLike, linear: ArrayLike, angular: ArrayLike) -> None:
         """Check and copy the arrays."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
 from tauguard.rigid.shapes import (
     SHARP,
@@ -54,6 +55,8 @@ class Rounded(Rebuilt):
     core: Spatial
     radius: NDArray[np.float64]
 
+    __repr__ = in_a_line
+
     def __init__(self, core: Spatial, radius: ArrayLike) -> None:
         """Check the core, and copy the radii."""
         if not isinstance(core, Spatial):
@@ -79,6 +82,8 @@ class Spheres(Rebuilt):
 
     center: NDArray[np.float64]
     radius: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
     def __init__(self, center: ArrayLike, radius: ArrayLike) -> None:
         """Check and copy the arrays."""
@@ -110,6 +115,8 @@ class Capsules(Rebuilt):
     start: NDArray[np.float64]
     end: NDArray[np.float64]
     radius: NDArray[np.float64]
+
+    __repr__ = in_a_line
 
     def __init__(self, start: ArrayLike, end: ArrayLike, radius: ArrayLike) -> None:
         """Check and copy the arrays."""

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import in_a_line
 from tauguard.geometry import Rebuilt, frozen, frozen_finite, sealed
 from tauguard.rigid import _rigid
 
@@ -64,6 +65,8 @@ class Tetrahedra(_Batch):
     kind: ClassVar[int] = 0
     vertices: NDArray[np.float64]
 
+    __repr__ = in_a_line
+
     def __init__(self, vertices: ArrayLike) -> None:
         """Check and copy the array."""
         object.__setattr__(self, "vertices", frozen_finite("vertices", vertices, (None, 4, 3)))
@@ -100,6 +103,8 @@ class Boxes(_Batch):
     rotation: NDArray[np.float64]
     #: The largest entry of ``|R^T R - I|`` over the batch, rounded up.
     skew: float = field(init=False, repr=False)
+
+    __repr__ = in_a_line
 
     def __init__(self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike) -> None:
         """Check and copy the arrays."""
@@ -161,6 +166,8 @@ class Parallelepipeds(_Batch):
     origin: NDArray[np.float64]
     edges: NDArray[np.float64]
 
+    __repr__ = in_a_line
+
     def __init__(self, origin: ArrayLike, edges: ArrayLike) -> None:
         """Check and copy the arrays."""
         object.__setattr__(self, "origin", frozen_finite("origin", origin, (None, 3)))
@@ -185,8 +192,15 @@ class PointSets(_Batch):
 
     dimensions: ClassVar[int]
 
+    __repr__ = in_a_line
+
     def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
         """Check and copy the arrays."""
+        if isinstance(vertices, list | tuple) and any(_ndim(v) > 1 for v in vertices[:1]):
+            raise ValueError(
+                f"vertices: {len(vertices)} arrays, expected one (M, {self.dimensions}): "
+                "np.concatenate(arrays) and the offsets np.cumsum([0, *map(len, arrays)])"
+            )
         points = frozen_finite("vertices", vertices, (None, self.dimensions))
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "offsets", _partition(offsets, len(points)))
@@ -225,6 +239,10 @@ class Polygons(PointSets):
     """
 
     kind, dimensions = 4, 2
+
+
+def _ndim(value: ArrayLike) -> int:
+    return np.asarray(value, dtype=object).ndim  # without an error for rows of several lengths
 
 
 def _partition(given: ArrayLike, count: int) -> NDArray[np.int64]:

@@ -3,7 +3,7 @@
 import inspect
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import gymnasium
 import mujoco
@@ -103,6 +103,30 @@ def test_a_figure_has_a_panel_for_everything_and_shades_the_collisions(trace, tm
 def test_values_print_in_a_line(trace):
     assert repr(trace) == "Trace(6 joints, 2000 samples every 1 ms, 2.00 s, 1 collisions)"
     assert repr(trace.truth).startswith("Truth(2000 samples, 1 collisions, largest contact force 6")
+
+
+def test_bodies_and_meshes_print_in_a_line():
+    many = np.zeros((60, 3))
+    boxes = rigid.Boxes(many, many, np.tile(np.eye(3), (60, 1, 1)))
+    assert repr(boxes) == (
+        "Boxes(center=array(60, 3), half_extents=array(60, 3), rotation=array(60, 3, 3))"
+    )
+    assert repr(rigid.Rounded(boxes, 0.1)) == "Rounded(core=<Boxes>, radius=array(60,))"
+    assert repr(rigid.Hulls(many, [0, 60])) == "Hulls(vertices=array(60, 3), offsets=[0, 60])"
+    hit = rigid.overlap(boxes, boxes).hit[:2]
+    assert repr(rigid.Overlap(hit, lambda: None)) == "Overlap(hit=[True, True])"
+    faces = [[0, 1, 2], [1, 2, 3]]
+    ccd = cloth.MeshCCD(faces, points=[7])
+    assert repr(ccd) == "MeshCCD(2 faces, 5 edges, 1 points, method='ab2pf')"
+    tree = rigid.MeshTree(np.eye(4, 3), faces)
+    assert repr(tree) == "MeshTree(4 vertices, 2 faces, volume='obb')"
+
+
+def test_help_of_a_guards_report_explains_every_field():
+    said = inspect.getdoc(contacts.StepReport) + inspect.getdoc(contacts.Cut)
+    names = [field.name for kind in (contacts.StepReport, contacts.Cut) for field in fields(kind)]
+    for name in names:
+        assert name.startswith("_") or f"\n    {name}: " in said, name
 
 
 def test_every_value_that_one_meets_prints_in_a_few_lines(trace):

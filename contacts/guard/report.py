@@ -27,24 +27,44 @@ def partner_name(model: Any, partner: Partner) -> str:
 
 @dataclass(frozen=True)
 class Cut:
-    """One sub-step that was rolled back."""
+    """One sub-step that was rolled back.
 
-    time: float  #: time at which the next attempt ends [s]
-    pair: Pair  #: pair that passed through, got too deep, or touched without a listed contact
-    stiffened: bool  #: whether the pair's contact parameters are changed until it separates
+    Attributes:
+        time: Time at which the next attempt ends [s].
+        pair: Pair that passed through, got too deep, or touched without a listed contact.
+        stiffened: Whether the pair's contact parameters are changed until it separates.
+    """
+
+    time: float
+    pair: Pair
+    stiffened: bool
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """The report of one guarded step; ``guard.partners(pair)`` returns the names of a pair."""
+    """The report of one guarded step; ``guard.partners(pair)`` returns the names of a pair.
 
-    steps: int  #: calls of ``mj_step``, including those that were rolled back
-    contacts: int  #: largest number of contacts that MuJoCo listed in an accepted sub-step
+    Attributes:
+        steps: Calls of ``mj_step``, including those that were rolled back.
+        contacts: Largest number of contacts that MuJoCo listed in an accepted sub-step.
+        cuts: Sub-steps that were rolled back, in their order.
+        restored: Pairs that have separated and whose original contact parameters were restored.
+        passed: Pairs that may have passed through each other.
+        impact_zones: Pairs that moved rigidly together in a sub-step.
+        energy_added: Sum of the energy gains of accepted sub-steps [J]. The gain of a sub-step is
+            the change of kinetic, potential and elastic energy minus the work of drives, mocap
+            bodies and applied forces. Sub-steps that lose energy count as 0, so the sum can be
+            positive while the total energy falls: see ``balance``. It is 0 in a plain step, in
+            which the guard does not act.
+    """
+
+    steps: int
+    contacts: int
     cuts: tuple[Cut, ...] = ()
-    restored: tuple[Pair, ...] = ()  #: pairs whose original contact parameters were restored
-    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through
-    impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
-    energy_added: float = 0.0  #: by constraint forces, summed over sub-steps that gained energy [J]
+    restored: tuple[Pair, ...] = ()
+    passed: tuple[Pair, ...] = ()
+    impact_zones: tuple[Pair, ...] = ()
+    energy_added: float = 0.0
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property

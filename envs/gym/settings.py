@@ -33,6 +33,7 @@ _SEVERAL = "one, or a tuple of them"
 _KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("timestep", "control_rate", "payload_g"), (Real, "a number")),
     **dict.fromkeys(("max_speed", "contact_area"), (Real | None, "a number or None")),
+    "robot": (str | os.PathLike | Robot, "a name, a file or a Robot, also for two arms"),
     "table": (Table | None, "a tauguard.models.Table or None"),
     "cloth": (Cloth | None, "a tauguard.models.Cloth or None"),
     "checkers": (Iterable, _SEVERAL),

@@ -31,7 +31,8 @@ def in_a_line(value: Any) -> str:
 def _brief(value: Any) -> str:
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= FEW and value.dtype.kind in "fiub":
-            return f"[{', '.join(f'{x:.4g}' for x in value)}]"
+            flags = value.dtype.kind == "b"
+            return f"[{', '.join(str(x) if flags else f'{x:.4g}' for x in value)}]"
         return f"array{value.shape}"
     if isinstance(value, str):
         return repr(value) if len(value) <= SHORT else f"<text of {len(value)} characters>"

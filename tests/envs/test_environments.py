@@ -74,6 +74,7 @@ def test_info_has_the_same_keys_types_and_shapes_at_every_step():
     ("keywords", "words"),
     [
         ({"contrl": "torque"}, "did you mean control"),
+        ({"robot": ("ur5e", "panda")}, "expected a name, a file or a Robot, also for two arms"),
         ({"zzz": 1}, "payload_g"),
         ({"control": "fly"}, "joint_velocity"),
         ({"control_rate": 333}, "whole number"),

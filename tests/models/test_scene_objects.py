@@ -141,6 +141,8 @@ def test_a_toml_file_gives_the_same_objects_and_names_what_is_wrong(tmp_path):
     path.write_text('[[object]]\nname = "block"\nshape = []\n')
     with pytest.raises(ValueError, match=r"cell\.toml: no key 'shape'; expected some of name, sh"):
         load_objects(path)
+    with pytest.raises(FileNotFoundError, match=r"objects none\.toml: no such file; expected a TO"):
+        load_objects("none.toml")
 
 
 @pytest.mark.parametrize(

@@ -66,3 +66,13 @@ def test_flat_and_nearly_orthonormal_boxes_are_legal():
 def test_offsets_must_partition_the_vertices(offsets, message):
     with pytest.raises(ValueError, match=message):
         Hulls(np.zeros((6, 3)), offsets)
+
+
+@pytest.mark.parametrize("form", [np.array, np.ndarray.tolist], ids=["arrays", "lists"])
+def test_hulls_of_several_arrays_say_how_to_join_them(form):
+    clouds = [np.eye(3), np.concatenate([np.eye(3), np.zeros((1, 3))])]
+    arrays = [form(cloud) for cloud in clouds]
+    with pytest.raises(ValueError, match=r"vertices: 2 arrays, expected one \(M, 3\)"):
+        Hulls(arrays, [0, 3, 7])
+    joined = Hulls(np.concatenate(arrays), np.cumsum([0, *map(len, arrays)]))  # as it says
+    assert len(joined) == 2
