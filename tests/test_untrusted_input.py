@@ -77,8 +77,8 @@ def test_any_exception_of_a_reader_is_one_line():
 
 
 def test_a_text_file_without_an_end(tmp_path):
-    with pytest.raises(ValueError, match="more than 1 MiB"):
-        read_text("/dev/zero", 1 << 20)
+    with pytest.raises(ValueError, match=r"/dev/zero: more than \d+ MiB"):
+        read_text("/dev/zero")
 
 
 @pytest.mark.parametrize("text", ['t,q\n"1,2\n3,4\n', "t," + "9" * 300_000 + "\n1,2\n"])

@@ -50,7 +50,7 @@ def test_an_arm_with_such_a_link_loads_and_says_so(tmp_path, bad):
     path.write_text(ARM.format(GOOD))
     assert "inertia" not in load_arm(str(path)).facts.sources
     path.write_text(ARM.format(bad))
-    assert "no body can have the file's of tip" in load_arm(str(path)).facts.sources["inertia"]
+    assert "impossible for tip" in load_arm(str(path)).facts.sources["inertia"]
     path.write_text(ARM.format(bad.replace('izz="', 'izz="x')))
     with pytest.raises(ValueError, match=r"link 'tip': inertia izz 'x.*': expected a number"):
         load_arm(str(path))

@@ -71,10 +71,13 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.mul_m = reinterpret_cast<decltype(e.mul_m)::Function>(&mj_mulM);
   e.jac_com = reinterpret_cast<decltype(e.jac_com)::Function>(&mj_jacBodyCom);
   e.mul_jac = reinterpret_cast<decltype(e.mul_jac)::Function>(&mj_mulJacVec);
+  e.jac = reinterpret_cast<decltype(e.jac)::Function>(&mj_jac);
+  e.solve_m = reinterpret_cast<decltype(e.solve_m)::Function>(&mj_solveM);
   e.integrate = reinterpret_cast<decltype(e.integrate)::Function>(&mj_integratePos);
   e.nq = m->nq, e.nv = m->nv, e.nbody = m->nbody, e.ngeom = m->ngeom, e.nflex = m->nflex;
   e.nmocap = m->nmocap, e.geom_bodyid = m->geom_bodyid, e.body_rootid = m->body_rootid;
   e.body_mocapid = m->body_mocapid, e.mocap_pos = d->mocap_pos, e.mocap_quat = d->mocap_quat;
+  e.body_dofnum = m->body_dofnum, e.body_weldid = m->body_weldid;
   e.nflexvert = m->nflexvert, e.ntendon = m->ntendon;
   e.signature = {mjSTATE_INTEGRATION, mjSTATE_QPOS | mjSTATE_MOCAP_POS | mjSTATE_MOCAP_QUAT};
   e.state_size = mj_stateSize(m, mjSTATE_INTEGRATION);
@@ -94,22 +97,23 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.pair_geom1 = m->pair_geom1, e.pair_geom2 = m->pair_geom2;
   e.flex_vertbodyid = m->flex_vertbodyid, e.flex_vert = m->flex_vert;
   e.time = &d->time, e.qpos = d->qpos, e.qvel = d->qvel, e.energy = d->energy;
-  e.actuator = d->qfrc_actuator, e.applied = d->qfrc_applied, e.wrench = d->xfrc_applied;
-  e.xpos = d->xpos, e.xmat = d->xmat, e.flexvert = d->flexvert_xpos;
+  e.qfrc_actuator = d->qfrc_actuator, e.qfrc_applied = d->qfrc_applied;
+  e.xfrc_applied = d->xfrc_applied, e.xipos = d->xipos;
+  e.xpos = d->xpos, e.xmat = d->xmat, e.flexvert_xpos = d->flexvert_xpos;
   e.ncon = &d->ncon, e.nefc = &d->nefc;
-  e.contacts = reinterpret_cast<char* const*>(&d->contact), e.contact_size = sizeof(mjContact);
+  e.contact = reinterpret_cast<char* const*>(&d->contact), e.contact_size = sizeof(mjContact);
   e.at_dist = offsetof(mjContact, dist), e.at_dim = offsetof(mjContact, dim);
   e.at_geom = offsetof(mjContact, geom), e.at_flex = offsetof(mjContact, flex);
-  e.at_row = offsetof(mjContact, efc_address);
+  e.at_efc_address = offsetof(mjContact, efc_address);
   e.efc_aref = &d->efc_aref, e.efc_margin = &d->efc_margin;
   e.at_pos = offsetof(mjContact, pos), e.at_frame = offsetof(mjContact, frame);
   e.efc_vel = &d->efc_vel, e.efc_pos = &d->efc_pos, e.efc_force = &d->efc_force;
   e.efc_type = &d->efc_type, e.efc_id = &d->efc_id;
   e.end_qvel = end->qvel, e.end_energy = end->energy, e.end_xpos = end->xpos;
-  e.end_xmat = end->xmat, e.end_flexvert = end->flexvert_xpos, e.end_cvel = end->cvel;
+  e.end_xmat = end->xmat, e.end_flexvert_xpos = end->flexvert_xpos, e.end_cvel = end->cvel;
   e.other_energy = other->energy, e.other_xpos = other->xpos, e.other_xmat = other->xmat;
   e.other_mocap_pos = other->mocap_pos, e.other_mocap_quat = other->mocap_quat;
-  e.other_flexvert = other->flexvert_xpos;
+  e.other_flexvert_xpos = other->flexvert_xpos;
   e.discrete = mjINT_DISCRETE, e.pyramidal = mjCONE_PYRAMIDAL;
   e.elliptic = mjCONE_ELLIPTIC;
   e.refsafe = mjDSBL_REFSAFE, e.newton = mjSOL_NEWTON, e.equality = mjCNSTR_EQUALITY;
@@ -169,14 +173,10 @@ struct Guarded {
     for (int j = 0; j < m->njnt; ++j)
       if (m->jnt_type[j] == mjJNT_FREE)
         for (int k = 3; k < 6; ++k) spins.push_back(m->jnt_dofadr[j] + k);
-    const Settings settings{true, 40, 1e-5, 1.25, 1.0 / 64, 0.2, 10, 16, 1.0 / 8, 0.5, 1.0};
-    stepper.reset(new Stepper(engine_of(scene, end, other), std::move(verdict), std::move(pairs),
-                              std::move(last), {}, std::move(spins), {}, settings, 0.01));
-    stepper->set_callbacks(nullptr, [](const std::vector<PairHit>& hits, const double*, double) {
-      Stepper::Stopped out{};  // nothing is stopped here: it is reported as an impact zone
-      for (const PairHit& hit : hits) out.pairs.push_back(hit.pair);
-      return out;
-    });
+    const Settings settings{true, 40, 1e-5, 1.25, 1.0 / 64, 0.2, 10, 16, 1.0 / 8, 0.5, 1.0, 0.01};
+    Coverage covered{
+        std::move(verdict), std::move(pairs), std::move(last), {}, std::move(spins), {}};
+    stepper.reset(new Stepper(engine_of(scene, end, other), std::move(covered), settings));
     mj_forward(m, scene.data);
   }
   ~Guarded() { mj_deleteData(end), mj_deleteData(other); }
