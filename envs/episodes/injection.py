@@ -23,6 +23,12 @@ STRIDE = 0.02  #: interval at which targets are searched for along a motion [s]
 CASTS = 8  #: number of rays at each of these times
 CHUNK = 64  #: number of these times for which a clamp's travel is bounded at once
 ROUNDING = 1e-9  #: more than the rounding errors of these bounds [m]
+#: Geoms of which ``size[1]`` is half the length of the axis, or 0; a point drawn on it is inside.
+AXIAL = (
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_CYLINDER,
+)
 #: A striker starts this time before it reaches its target [s].
 LEAD = 0.15
 
@@ -142,9 +148,10 @@ class Aim:
     ) -> NDArray[np.bool_]:
         """Whether a ray that :meth:`_cast` would draw at these successive rows may give a clamp.
 
-        The ray of push p through the point x of the link meets its surface at x - m p with m from 0
-        to M. While the link turns by R, this point travels -p.dx - m (1 - p.R p) against p: at most
-        the travel of x, and at least that less M (1 - p.R p).
+        The ray of push p through the point x of a geom meets the link's surface at x - m p. There m
+        is at most the distance M from x to the link's farthest point, and at least 0 if x is in
+        the link, otherwise -M. While the link turns by R, this point travels -p.dx - m (1 - p.R p)
+        against p, which falls with m.
         """
         before, model, size = rng.bit_generator.state, self._scene.model, (len(rows), CASTS, -1)
         geoms, places, _ = self._draw(plan, rng, len(rows) * CASTS)
@@ -158,6 +165,7 @@ class Aim:
         own = np.flatnonzero(model.geom_bodyid == path.body)
         away = np.linalg.norm(local[:, :, None] - model.geom_pos[own], axis=3)
         depth = (away + model.geom_rbound[own]).max(axis=2)
+        within = np.isin(model.geom_type[geoms], AXIAL).reshape(depth.shape)
         later = rows[:, None] + np.arange(len(range(0, self._standing(plan), self._stride)))
         later = np.minimum(later, len(path.position) - 1)
         turned = path.rotation[later].reshape(*later.shape, 9)
@@ -171,7 +179,7 @@ class Aim:
             return np.asarray(end + (push * inside).sum(axis=2) - deep)
 
         possible = speed >= CLAMP_SPEED - ROUNDING
-        possible &= travel(np.zeros_like(depth)) >= CLAMP_TRAVEL[0] - ROUNDING
+        possible &= travel(np.where(within, 0.0, -depth)) >= CLAMP_TRAVEL[0] - ROUNDING
         possible &= travel(depth) <= CLAMP_TRAVEL[1] + ROUNDING
         return np.asarray(possible.any(axis=1))
 

@@ -1,5 +1,6 @@
 """Episodes: the same bytes from the same seed, and truth that agrees with MuJoCo's own forces."""
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -14,7 +15,7 @@ from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, simul
 from tauguard.envs.episodes import labels
 from tauguard.envs.episodes.injection import Aim
 from tauguard.envs.episodes.poses import Poses
-from tauguard.models import Mismatch, SceneSpec, compose
+from tauguard.models import Mismatch, SceneSpec, compose, cura6
 from tauguard.traces import STRATA, read_mcap
 
 KINDS = ("strike", "pulse", "clamp")
@@ -107,8 +108,21 @@ def test_an_arm_apart_from_its_obstacles_moves_as_in_the_whole_scene(episode, tr
                 assert np.array_equal(values, vars(other)[name], equal_nan=True), name
 
 
-@pytest.mark.parametrize("arm", ["cura6", "ur5e"])
-def test_bounds_of_a_clamps_travel_exclude_no_target(arm, monkeypatch):
+@pytest.fixture
+def slabs(tmp_path):
+    """An arm of flat boxes: points drawn at 0.8 of ``size[1]`` along z lie outside of them."""
+    shape = 'class="collision" type="box" size="0.05 0.3 0.04"'
+    text = re.sub(
+        r'class="collision" type="\w+" fromto="[^"]*" size="[^"]*"', shape, cura6.arm_xml()
+    )
+    (tmp_path / "slabs.xml").write_text(text)
+    return str(tmp_path / "slabs.xml")
+
+
+@pytest.mark.parametrize("arm", ["cura6", "ur5e", "slabs"])
+def test_bounds_of_a_clamps_travel_exclude_no_target(arm, monkeypatch, request):
+    if arm == "slabs":
+        arm = request.getfixturevalue("slabs")
     aims = [Simulation(Episode(seed, 30.0, 60.0, arm=arm)).striking._aim for seed in range(7, 10)]
     plans = [CollisionPlan("clamp", 0.5, link, duration=0.6) for link in range(2, 6)]
     cases = [(n, plan) for n in range(len(aims)) for plan in plans]
