@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.cloth.mesh import MeshCCD
 from tauguard.cloth.topology import Groups, Isolated
+from tauguard.findings import ArgumentError
 
 #: Narrow phases of earlier work by name, with their numbers in the native module.
 COMPARATORS = {"naive": 2, "iccd": 3, "dnf": 4, "scd": 5, "vcd": 6}
@@ -22,8 +23,8 @@ class ComparedMeshCCD(MeshCCD):
     """A :class:`MeshCCD` whose ``method`` may be any of :data:`METHODS`.
 
     Raises:
-        ValueError: as :class:`MeshCCD`; isolated vertices or a minimum distance with a comparator,
-            which supports neither.
+        ArgumentError: as :class:`MeshCCD`; isolated vertices or a minimum distance with a
+            comparator, which supports neither.
     """
 
     methods = METHODS
@@ -33,7 +34,7 @@ class ComparedMeshCCD(MeshCCD):
     ) -> tuple[NDArray[np.int32], Isolated]:
         checked, isolated = super()._checked_parts(faces, edges, points, groups)
         if isolated.points.size and self.method in COMPARATORS:
-            raise ValueError(
+            raise ArgumentError(
                 f"points: not available with method {self.method!r}; expected ab2pf or exact"
             )
         return checked, isolated

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
 from tauguard.cloth import _mesh
+from tauguard.findings import ArgumentError
 from tauguard.geometry import finite
 
 #: Methods of the narrow phase by name; both are correct for all finite doubles. "exact" uses only
@@ -79,8 +80,8 @@ def vertex_face(
             result is conservative, and the method must be ``ab2pf``.
 
     Raises:
-        ValueError: wrong shapes, entries that are not finite, an unknown method, or a distance that
-            is negative or not available with the method.
+        ArgumentError: wrong shapes, entries that are not finite, an unknown method, or a distance
+            that is negative or not available with the method.
     """
     return _solve(True, x_t0, x_t1, method, min_distance)
 
@@ -108,7 +109,7 @@ def point_edge(
         Impacts with weights of the point and the ends, shape (N, 3). Normals are zero.
 
     Raises:
-        ValueError: as :func:`vertex_face`.
+        ArgumentError: as :func:`vertex_face`.
     """
     found = _solve_points([0, 1, 2, 2], x_t0, x_t1, method, min_distance)
     weights = np.concatenate(
@@ -136,9 +137,9 @@ def _solve_points(
 
 
 def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
-    """The number of a method; an unknown name raises a ``ValueError`` with the known ones."""
+    """The number of a method; an unknown name raises an ``ArgumentError`` with the known ones."""
     if not isinstance(method, str) or method not in methods:
-        raise ValueError(
+        raise ArgumentError(
             f"method {method!r}: expected one of {', '.join(methods)}; more methods, for "
             "comparison only, are in tauguard.cloth.comparators"
         )
@@ -146,7 +147,7 @@ def method_number(method: str, methods: Mapping[str, int] = METHODS) -> int:
 
 
 def checked_distance(min_distance: float, method: str) -> float:
-    """Return the distance; ``ValueError`` if it is negative, not finite or not supported."""
+    """Return the distance; ``ArgumentError`` if it is negative, not finite or not supported."""
     distance = np.nan
     try:
         array = np.asarray(min_distance)
@@ -156,11 +157,11 @@ def checked_distance(min_distance: float, method: str) -> float:
     except (ValueError, OverflowError):  # a ragged list, or an integer too large for a double
         pass
     if distance > 0 and method != "ab2pf":
-        raise ValueError(
+        raise ArgumentError(
             f"min_distance: {min_distance} with method {method!r}; expected 0, or method ab2pf"
         )
     if not (np.isfinite(distance) and distance >= 0):
-        raise ValueError(f"min_distance: {min_distance!r:.40}, expected a finite number >= 0")
+        raise ArgumentError(f"min_distance: {min_distance!r:.40}, expected a finite number >= 0")
     return distance
 
 
@@ -170,7 +171,7 @@ def _solve(
     start = finite("x_t0", x_t0, (None, 4, 3))
     end = finite("x_t1", x_t1, (None, 4, 3))
     if len(start) != len(end):
-        raise ValueError(f"x_t1: {len(end)} queries, but x_t0 has {len(start)}")
+        raise ArgumentError(f"x_t1: {len(end)} queries, but x_t0 has {len(start)}")
     n = len(start)
     hit = np.zeros(n, dtype=np.uint8)
     toi = np.full(n, np.inf)

@@ -25,6 +25,7 @@ from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.impacts import METHODS, Impacts, checked_distance, method_number
 from tauguard.cloth.topology import Groups, Isolated, Topology
+from tauguard.findings import ArgumentError
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether the volume is moving (two intervals per axis, one at
@@ -70,9 +71,9 @@ class MeshCCD:
     :meth:`update_topology` changes faces and groups.
 
     Raises:
-        ValueError: a face repeats a vertex, an index is negative, a face mixes groups, ``groups``
-            is not a :class:`Groups`, ``threads`` is not an integer from 0 to 1024, or the method or
-            volume is unknown.
+        ArgumentError: a face repeats a vertex, an index is negative, a face mixes groups,
+            ``groups`` is not a :class:`Groups`, ``threads`` is not an integer from 0 to 1024, or
+            the method or volume is unknown.
     """
 
     #: Values of ``method``, with the numbers of the native module.
@@ -91,7 +92,7 @@ class MeshCCD:
         """Check the faces and number the edges; the first frame builds the hierarchy."""
         self._method_number = method_number(method, self.methods)
         if not isinstance(volume, str) or volume not in VOLUMES:
-            raise ValueError(f"volume {volume!r}: expected one of {', '.join(VOLUMES)}")
+            raise ArgumentError(f"volume {volume!r}: expected one of {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
         self._method, self._volume, self._threads = method, volume, thread_count(threads)
         faces, isolated = self._checked_parts(faces, edges, points, groups)
@@ -164,7 +165,7 @@ class MeshCCD:
                 number.
 
         Raises:
-            ValueError: as :meth:`candidates`.
+            ArgumentError: as :meth:`candidates`.
         """
         start = time.perf_counter()
         vf, ee, stats = self._mesh.find(
@@ -212,10 +213,10 @@ class MeshCCD:
             sorted.
 
         Raises:
-            ValueError: positions that are not finite or not of shape (V, 3); a number of vertices
-                that differs between the ends of the step, from earlier frames or from ``groups``,
-                or that is too small for the faces; a distance that is not a number or negative; a
-                ``fresh`` that is not a bool; or more candidates than ``limit``.
+            ArgumentError: positions that are not finite or not of shape (V, 3); a number of
+                vertices that differs between the ends of the step, from earlier frames or from
+                ``groups``, or that is too small for the faces; a distance that is not a number or
+                negative; a ``fresh`` that is not a bool; or more candidates than ``limit``.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
             *self._checked_step(x_t0, x_t1),
@@ -251,10 +252,12 @@ class MeshCCD:
             positive fraction is found.
 
         Raises:
-            ValueError: as :meth:`find`, or a ``fraction`` outside (0, 1).
+            ArgumentError: as :meth:`find`, or a ``fraction`` outside (0, 1).
         """
         if not (isinstance(fraction, Real) and 0 < fraction < 1):
-            raise ValueError(f"fraction: {fraction!r:.40}, expected a number above 0 and below 1")
+            raise ArgumentError(
+                f"fraction: {fraction!r:.40}, expected a number above 0 and below 1"
+            )
         start, end = self._checked_step(x_t0, x_t1)
         scale, reach = 1.0, end
         while scale > 0:
@@ -294,7 +297,7 @@ class MeshCCD:
             the next frame because they had no free slots left.
 
         Raises:
-            ValueError: as the constructor.
+            ArgumentError: as the constructor.
         """
         before = self._topology
         groups = before.groups if groups is None else groups
@@ -323,14 +326,14 @@ class MeshCCD:
 
 def _checked_flag(fresh: bool) -> bool:
     if not isinstance(fresh, bool | np.bool_):
-        raise ValueError(f"fresh: {fresh!r:.40}, expected True or False")
+        raise ArgumentError(f"fresh: {fresh!r:.40}, expected True or False")
     return bool(fresh)
 
 
 def _checked_limit(limit: int) -> int:
     number = isinstance(limit, int | np.integer) and not isinstance(limit, bool)
     if not number or not 0 <= limit <= 2**40:
-        raise ValueError(f"limit: {limit!r:.40}, expected an int from 0 to {2**40}")
+        raise ArgumentError(f"limit: {limit!r:.40}, expected an int from 0 to {2**40}")
     return int(limit)
 
 
@@ -345,7 +348,7 @@ def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.
 
 def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]:
     if groups is not None and not isinstance(groups, Groups):
-        raise ValueError(
+        raise ArgumentError(
             f"groups: {type(groups).__name__}, expected Groups(ids, meets): a group for every "
             "vertex and a table of the groups that meet"
         )
@@ -357,7 +360,7 @@ def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]
     repeats = (a == b) | (b == c) | (c == a)
     if repeats.any():
         row = int(np.argmax(repeats))
-        raise ValueError(f"faces: row {row} is {checked[row].tolist()}: it repeats a vertex")
+        raise ArgumentError(f"faces: row {row} is {checked[row].tolist()}: it repeats a vertex")
     if groups is not None:
         groups.check("faces", checked)
     return checked

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth.impacts import Impacts
+from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen, frozen_indices
 
 
@@ -23,7 +24,7 @@ class Groups(Rebuilt):
             are not tested; ``meets[a, a]`` is False for a body that is not tested against itself.
 
     Raises:
-        ValueError: the table is not square, not symmetric or not of bools (or 0 and 1), or an id
+        ArgumentError: the table is not square, not symmetric or not of bools (or 0 and 1), or an id
             has no row in the table.
 
     Example:
@@ -40,33 +41,37 @@ class Groups(Rebuilt):
         table = frozen(_table(meets))
         if (table != table.T).any():
             a, b = np.argwhere(table != table.T)[0]
-            raise ValueError(f"meets: [{a}, {b}] is {table[a, b]} but [{b}, {a}] is {table[b, a]}")
+            raise ArgumentError(
+                f"meets: [{a}, {b}] is {table[a, b]} but [{b}, {a}] is {table[b, a]}"
+            )
         object.__setattr__(self, "ids", frozen_indices("ids", ids, (None,), len(table)))
         object.__setattr__(self, "meets", table)
 
     def check(self, name: str, rows: NDArray[np.int32]) -> None:
-        """Raise a ``ValueError`` for a row with a vertex outside ``ids`` or with several groups."""
+        """Raise ``ArgumentError`` for a row with a vertex outside ``ids``, or of several groups."""
         if rows.size and int(rows.max()) >= len(self.ids):
             row = int(np.argmax((rows >= len(self.ids)).any(axis=1)))
-            raise ValueError(
+            raise ArgumentError(
                 f"{name}: row {row} is {rows[row].tolist()}, but groups has {len(self.ids)} ids"
             )
         of_row = self.ids[rows]
         mixed = (of_row != of_row[:, :1]).any(axis=1)
         if mixed.any():
             row = int(np.argmax(mixed))
-            raise ValueError(f"{name}: row {row} has vertices of groups {of_row[row].tolist()}")
+            raise ArgumentError(f"{name}: row {row} has vertices of groups {of_row[row].tolist()}")
 
 
 def _table(meets: ArrayLike) -> NDArray[np.bool_]:
     try:
         array = np.asarray(meets)
     except ValueError as error:
-        raise ValueError(f"meets: rows of different lengths, expected (G, G) ({error})") from None
+        raise ArgumentError(
+            f"meets: rows of different lengths, expected (G, G) ({error})"
+        ) from None
     if array.ndim != 2 or array.shape[0] != array.shape[1]:
-        raise ValueError(f"meets: shape {array.shape}, expected (G, G)")
+        raise ArgumentError(f"meets: shape {array.shape}, expected (G, G)")
     if array.dtype.kind not in "biuf" or not ((array == 0) | (array == 1)).all():
-        raise ValueError(f"meets: dtype {array.dtype}, expected bools, or only 0 and 1")
+        raise ArgumentError(f"meets: dtype {array.dtype}, expected bools, or only 0 and 1")
     return np.ascontiguousarray(array, dtype=bool)
 
 
@@ -92,14 +97,14 @@ class Isolated:
         """Check both lists; remove edges of faces, and vertices of faces or edges.
 
         Raises:
-            ValueError: arrays that are not (L, 2) or (P,) integers >= 0, an edge between equal
+            ArgumentError: arrays that are not (L, 2) or (P,) integers >= 0, an edge between equal
                 vertices or between two groups, a vertex without a group.
         """
         rows = _rows("edges", edges, (None, 2))
         spots = _rows("points", points, (None,))
         if (rows[:, 0] == rows[:, 1]).any():
             row = int(np.argmax(rows[:, 0] == rows[:, 1]))
-            raise ValueError(f"edges: row {row} is {rows[row].tolist()}: it repeats a vertex")
+            raise ArgumentError(f"edges: row {row} is {rows[row].tolist()}: it repeats a vertex")
         if groups is not None:
             groups.check("edges", rows)
             groups.check("points", spots[:, None])
@@ -137,21 +142,21 @@ class Topology:
         self._row_of_isolated = np.searchsorted(keys, wanted).astype(np.int32)
 
     def check(self, start: int, end: int) -> None:
-        """Raise a ``ValueError`` if the numbers of vertices of a step do not fit the mesh."""
+        """Raise an ``ArgumentError`` if the numbers of vertices of a step do not fit the mesh."""
         if start != end:
-            raise ValueError(f"x_t1: {end} vertices, but x_t0 has {start}")
+            raise ArgumentError(f"x_t1: {end} vertices, but x_t0 has {start}")
         if self._vertices is not None and start != self._vertices:
-            raise ValueError(
+            raise ArgumentError(
                 f"x_t0: {start} vertices, but the frames before had {self._vertices}; "
                 "call update_topology first if the mesh has changed"
             )
         if self.groups is not None and start != len(self.groups.ids):
-            raise ValueError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")
+            raise ArgumentError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")
         if start < self._rows:
             parts = (("faces", self.faces), ("edges", self.edges), ("points", self.isolated.points))
             name, rows = next((n, r) for n, r in parts if r.size and int(r.max()) >= start)
             row = int(np.argmax((rows >= start).reshape(len(rows), -1).any(axis=1)))
-            raise ValueError(
+            raise ArgumentError(
                 f"{name}: row {row} is {rows[row].tolist()}, but x_t0 has {start} vertices"
             )
         self._vertices = start

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
 from tauguard.contacts._contacts import all_finite, carried
+from tauguard.findings import ArgumentError
 
 Index = NDArray[np.int32]
 
@@ -111,8 +112,8 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
     """Check that the poses of ``state`` are finite and of the model's size, and return it.
 
     Raises:
-        ValueError: a wrong shape, or an entry that is not finite; the message names the field and
-            the first bad row.
+        ArgumentError: a wrong shape, or an entry that is not finite; the message names the field
+            and the first bad row.
     """
     xpos, xmat, x = state.xpos, state.xmat, state.flexvert_xpos
     if (
@@ -128,10 +129,12 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
     for field_name, shape in shapes.items():
         value = getattr(state, field_name)
         if value.shape != shape:
-            raise ValueError(f"{name}.{field_name}: shape {value.shape}, the model has {shape}")
+            raise ArgumentError(f"{name}.{field_name}: shape {value.shape}, the model has {shape}")
         if not np.isfinite(value).all():
             row = int(np.argmin(np.isfinite(value).all(axis=1)))
-            raise ValueError(f"{name}.{field_name}: row {row} is {value[row].tolist()}, not finite")
+            raise ArgumentError(
+                f"{name}.{field_name}: row {row} is {value[row].tolist()}, not finite"
+            )
     return state
 
 
@@ -162,13 +165,13 @@ class Contacts:
     __repr__ = in_a_line
 
     def __post_init__(self) -> None:
-        """Check the shapes; a ``ValueError`` names the field with the error."""
+        """Check the shapes; an ``ArgumentError`` names the field with the error."""
         count = np.shape(self.time)[0] if np.ndim(self.time) == 1 else -1
         for name, dtype, tail in _COLUMNS:
             given = getattr(self, name)
             value = np.asarray(given, dtype=dtype)
             if value.shape != (count, *tail):
-                raise ValueError(f"{name}: shape {value.shape}, expected {('K', *tail)}")
+                raise ArgumentError(f"{name}: shape {value.shape}, expected {('K', *tail)}")
             if value is not given:
                 object.__setattr__(self, name, value)
 
@@ -253,14 +256,14 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
         replace: Whether to replace an existing factory of this name.
 
     Raises:
-        ValueError: an empty name, a name that is in use, or a factory that is not callable.
+        ArgumentError: an empty name, a name that is in use, or a factory that is not callable.
     """
     if not name:
-        raise ValueError("name: empty, expected the name of a checker")
+        raise ArgumentError("name: empty, expected the name of a checker")
     if not callable(factory):
-        raise ValueError(f"factory: {factory!r} cannot be called; expected factory(model, ...)")
+        raise ArgumentError(f"factory: {factory!r} cannot be called; expected factory(model, ...)")
     if not replace and _FACTORIES.get(name, factory) is not factory:
-        raise ValueError(
+        raise ArgumentError(
             f"checker {name!r}: already registered; choose another name, or pass replace=True"
         )
     _FACTORIES[name] = factory
@@ -275,27 +278,29 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
     """The checker ``name`` for ``model``.
 
     Raises:
-        ValueError: an unknown checker or option (the message lists the known ones), a geom that
+        ArgumentError: an unknown checker or option (the message lists the known ones), a geom that
             this checker cannot handle, a checker without ``name``, ``covers`` or ``check``, or an
             item of ``covers`` that is no pair of kinds in the order of :func:`pair_kind`.
     """
     if name not in _FACTORIES:
-        raise ValueError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")
+        raise ArgumentError(f"checker {name!r}: expected one of {', '.join(_FACTORIES) or 'none'}")
     factory = _FACTORIES[name]
     try:
         inspect.signature(factory).bind(model, **options)
     except TypeError as error:
         known = list(inspect.signature(factory).parameters)[1:]
-        raise ValueError(
+        raise ArgumentError(
             f"checker {name!r}: {error}; its options are {', '.join(known) or 'none'}"
         ) from None
     made = factory(model, **options)
     for needed in ("name", "covers", "check"):
         if not hasattr(made, needed):
-            raise ValueError(f"checker {name!r}: it has no {needed}; see tauguard.contacts.Checker")
+            raise ArgumentError(
+                f"checker {name!r}: it has no {needed}; see tauguard.contacts.Checker"
+            )
     for pair in made.covers:
         if len(pair) != 2 or pair_kind(*pair) != tuple(pair):
-            raise ValueError(
+            raise ArgumentError(
                 f"checker {name!r}: covers {pair!r}; expected pairs of kinds as "
                 "tauguard.contacts.pair_kind gives them"
             )
@@ -306,11 +311,11 @@ def pair_kind(a: str, b: str) -> tuple[str, str]:
     """Two kinds in the order of :data:`KINDS`.
 
     Raises:
-        ValueError: an unknown kind.
+        ArgumentError: an unknown kind.
     """
     for kind in (a, b):
         if kind not in KINDS:
-            raise ValueError(f"kind {kind!r}: expected one of {', '.join(KINDS)}")
+            raise ArgumentError(f"kind {kind!r}: expected one of {', '.join(KINDS)}")
     return (a, b) if KINDS.index(a) <= KINDS.index(b) else (b, a)
 
 

@@ -12,6 +12,7 @@ from tauguard.contacts._contacts import simplices
 from tauguard.contacts.checker import Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs
+from tauguard.findings import ArgumentError
 from tauguard.models.cloth import flex_elements
 
 
@@ -31,7 +32,7 @@ class ClothChecker:
         self_collision: Whether to test cloth against cloth (the pairs that MuJoCo would test).
 
     Raises:
-        ValueError: a flex that can collide but is not two-dimensional, a geom of an unsupported
+        ArgumentError: a flex that can collide but is not two-dimensional, a geom of an unsupported
             kind that can touch a flex (the message names it), or an unknown threshold.
     """
 
@@ -76,7 +77,7 @@ class ClothChecker:
         """The contacts on the path, at most one per pair of a triangle with a geom or triangle.
 
         Raises:
-            ValueError: a state of another model, or that is not finite.
+            ArgumentError: a state of another model, or that is not finite.
         """
         if not self._against and self._cloths is None:
             return Contacts.empty()
@@ -126,7 +127,7 @@ class _Flex:
         dim = int(model.flex_dim[number])
         if dim != 2:
             name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, number)
-            raise ValueError(
+            raise ArgumentError(
                 f"cloth: flex {name!r} has dimension {dim}; this checker handles 2 "
                 '(contype="0" conaffinity="0" excludes the flex)'
             )

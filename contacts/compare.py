@@ -23,6 +23,7 @@ from tauguard.contacts.report import Report, Score
 from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
 from tauguard.contacts.scoring import judge, score
+from tauguard.findings import ArgumentError
 
 #: Largest allowed difference of a normal's length from 1.
 UNIT = 1e-6
@@ -57,7 +58,7 @@ def compare(
         keep: Whether the report keeps the states for a recording.
 
     Raises:
-        ValueError: an unknown scene or checker; a geom that a checker or the ground truth cannot
+        ArgumentError: an unknown scene or checker; a geom that a checker or the ground truth cannot
             handle; a reported contact with an unknown geom or flex, a time outside the step, a
             distance that is not finite or a normal without unit length; options for a checker that
             is not used; a timestep or duration that is not above 0; a ``fine`` below 1.
@@ -65,14 +66,14 @@ def compare(
     scene = _scene(scene)
     duration = scene.seconds if seconds is None else seconds
     if not 0 < duration < np.inf:
-        raise ValueError(f"seconds {duration}: expected a time above 0")
+        raise ArgumentError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
-        raise ValueError(f"fine {fine}: expected 1 or more fine steps per step")
+        raise ArgumentError(f"fine {fine}: expected 1 or more fine steps per step")
     if isinstance(checkers, str | mujoco.MjData):
-        raise ValueError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
+        raise ArgumentError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
     for name in options or {}:
         if name not in checkers:
-            raise ValueError(
+            raise ArgumentError(
                 f"options of {name!r}: expected one of the checkers {', '.join(checkers)}"
             )
     model, data = scene.start(timestep)
@@ -95,7 +96,7 @@ def _scene(scene: ContactScene | mujoco.MjModel | str) -> ContactScene:
     """The scene for a name or a model."""
     if isinstance(scene, str):
         if scene not in SCENES:
-            raise ValueError(f"scene {scene!r}: expected one of {', '.join(SCENES)}")
+            raise ArgumentError(f"scene {scene!r}: expected one of {', '.join(SCENES)}")
         return SCENES[scene]()
     if isinstance(scene, mujoco.MjModel):
         return ContactScene("model", scene, scene.qpos0.copy(), np.zeros(scene.nv))
@@ -159,27 +160,27 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
     """Return the contacts ``found`` by checker ``name`` if they are valid for the model.
 
     Raises:
-        ValueError: a geom or flex that does not exist, a time outside the step, a distance that is
-            not finite, or a normal that is neither NaN nor of length 1.
+        ArgumentError: a geom or flex that does not exist, a time outside the step, a distance that
+            is not finite, or a normal that is neither NaN nor of length 1.
     """
     limits = (("geom", found.geom, -1, model.ngeom - 1), ("flex", found.flex, -1, model.nflex - 1))
     for field, value, low, high in (*limits, ("time", found.time, 0, 1)):
         good = (value >= low) & (value <= high)
         if not good.all():
             said = value[~good][0]
-            raise ValueError(f"checker {name!r}: {field} {said}, expected {low} to {high}")
+            raise ArgumentError(f"checker {name!r}: {field} {said}, expected {low} to {high}")
     if not np.isfinite(found.distance).all():
         said = found.distance[~np.isfinite(found.distance)][0]
-        raise ValueError(f"checker {name!r}: distance {said}, expected a finite number [m]")
+        raise ArgumentError(f"checker {name!r}: distance {said}, expected a finite number [m]")
     length = np.linalg.norm(found.normal, axis=1)
     bad = ~(np.abs(length - 1) <= UNIT) & ~np.isnan(found.normal).all(axis=1)
     if bad.any():
-        raise ValueError(
+        raise ArgumentError(
             f"checker {name!r}: normal {found.normal[bad][0].tolist()}, expected length 1, or NaN "
             "in all entries if it is unknown"
         )
     if ((found.geom < 0) == (found.flex < 0)).any():
-        raise ValueError(
+        raise ArgumentError(
             f"checker {name!r}: a partner with a geom and a flex, or neither; expected exactly one"
         )
     return found

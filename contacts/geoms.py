@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import geom_kinds
+from tauguard.findings import ArgumentError
 
 #: Native numbers of shapes, by kind of geom.
 _CORES = {"plane": 0, "sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 4, "box": 5, "mesh": 6}
@@ -27,14 +28,14 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
         checker: Name of the checker, for error messages.
 
     Raises:
-        ValueError: a geom of a kind that has no convex shape (the message names the geom).
+        ArgumentError: a geom of a kind that has no convex shape (the message names the geom).
     """
     scene = Scene()
     kinds = geom_kinds(model)
     for geom in geoms:
         kind = kinds[int(geom)]
         if kind not in _CORES:
-            raise ValueError(
+            raise ArgumentError(
                 f"{checker}: geom {geom_name(model, int(geom))} is a {kind}; this checker handles "
                 f"{', '.join(CONVEX)} (skip=({kind!r},) excludes this kind)"
             )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import Index, geom_kinds
+from tauguard.findings import ArgumentError
 
 #: Kinds that MuJoCo never tests against each other.
 _NEVER = ({"plane"}, {"plane", "hfield"}, {"hfield"})
@@ -50,7 +51,7 @@ class Pairs:
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:
-            raise ValueError(f"threshold {threshold!r}: expected one of {', '.join(reach)}")
+            raise ArgumentError(f"threshold {threshold!r}: expected one of {', '.join(reach)}")
         return np.asarray(np.maximum(reach[threshold], 0.0), dtype=np.float64)
 
 

@@ -9,6 +9,7 @@ import mujoco
 
 from tauguard.contacts.ground_truth import Pair
 from tauguard.contacts.run import Run
+from tauguard.findings import ArgumentError
 
 
 @dataclass(frozen=True)
@@ -134,10 +135,10 @@ class Report:
         """Keyword arguments of :func:`tauguard.replay.contacts.write_contacts_rrd`.
 
         Raises:
-            ValueError: the states were not kept.
+            ArgumentError: the states were not kept.
         """
         if self.run is None:
-            raise ValueError("the states were not kept; call compare(..., keep=True)")
+            raise ArgumentError("the states were not kept; call compare(..., keep=True)")
         return {**self.run.recording(), "notes": [(d.time, str(d)) for d in self.disagreements]}
 
     def __getitem__(self, checker: str) -> Score:

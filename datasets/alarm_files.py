@@ -14,6 +14,7 @@ from tauguard.datasets.plans import BEGIN
 from tauguard.datasets.reader import read, splits_of
 from tauguard.detectors.evaluation.matching import Matching, match
 from tauguard.detectors.events import MERGE_GAP
+from tauguard.findings import FileError
 from tauguard.traces import Alarm
 
 COLUMNS = ("episode", "start", "end")
@@ -23,7 +24,7 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
     """The alarms of each episode, in order; alarms less than 0.5 s apart are merged.
 
     Raises:
-        ValueError: other columns, or a line with a wrong value; the message names file and line.
+        FileError: other columns, or a line with a wrong value; the message names file and line.
         OSError: no such file.
     """
     found: dict[str, list[Alarm]] = {}
@@ -31,7 +32,7 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
         with path.open(encoding="utf-8", newline="") as stream:
             rows = csv.DictReader(stream)
             if tuple(rows.fieldnames or ()) != COLUMNS:
-                raise ValueError(
+                raise FileError(
                     f"{path}: columns {', '.join(rows.fieldnames or ('none',))}; expected "
                     f"{', '.join(COLUMNS)}"
                 )
@@ -39,7 +40,7 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
                 alarm = _alarm(row, f"{path}, line {rows.line_num}")
                 found.setdefault(row["episode"].strip(), []).append(alarm)
     except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path}: not a CSV file ({error})") from None
+        raise FileError(f"{path}: not a CSV file ({error})") from None
     return {name: _merged(alarms) for name, alarms in found.items()}
 
 
@@ -56,7 +57,7 @@ def judged_alarms(
         splits: names of splits (default: all whose name begins with "test").
 
     Raises:
-        ValueError: not a CSV file of alarms, or an episode that is in none of the splits.
+        FileError: not a CSV file of alarms, or an episode that is in none of the splits.
         OSError: no such file or folder.
     """
     alarms = read_alarm_file(path)
@@ -67,7 +68,7 @@ def judged_alarms(
         split, _, number = name.partition("/")
         if not (number.isdecimal() and int(number) < episodes.get(split, 0)):
             there = ", ".join(f"{s}/0 to {s}/{n - 1}" for s, n in episodes.items())
-            raise ValueError(f"{path}: no episode {name!r} among those that are judged: {there}")
+            raise FileError(f"{path}: no episode {name!r} among those that are judged: {there}")
     for split in chosen:
         yield (
             split,
@@ -89,7 +90,7 @@ def _alarm(row: dict[str, str], where: str) -> Alarm:
     except (TypeError, ValueError):
         start = end = math.nan
     if not (0 <= start <= end < math.inf) or None in row:
-        raise ValueError(f"{where}: expected an episode and two times in seconds, start <= end")
+        raise FileError(f"{where}: expected an episode and two times in seconds, start <= end")
     return Alarm(start, end)
 
 

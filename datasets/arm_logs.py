@@ -17,6 +17,7 @@ from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
 from tauguard.detectors.features.motion_regimes import SEEN, unseen, unseen_text
+from tauguard.findings import LogError
 from tauguard.traces import Trace
 from tauguard.traces.resample import averaged
 
@@ -42,19 +43,19 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     """The given files; a folder stands for all ``.csv`` and ``.mcap`` files below it.
 
     Raises:
-        ValueError: there are no files, or two have the same name.
+        LogError: there are no files, or two have the same name.
     """
     files: list[Path] = []
     for path in logs:
         inside = sorted([*path.rglob("*.csv"), *path.rglob("*.mcap")]) if path.is_dir() else [path]
         if not inside:
-            raise ValueError(f"{path}: no .csv or .mcap files in it")
+            raise LogError(f"{path}: no .csv or .mcap files in it")
         files += inside
     names = [path.name for path in files]
     if not files:
-        raise ValueError("no logs: give .csv or .mcap files, or a folder of them")
+        raise LogError("no logs: give .csv or .mcap files, or a folder of them")
     if len(set(names)) < len(names):
-        raise ValueError(f"logs: {', '.join(names)}; expected files of different names")
+        raise LogError(f"logs: {', '.join(names)}; expected files of different names")
     return files
 
 
@@ -75,7 +76,7 @@ def read_one(
         joints: the robot's joints, after which columns may be named.
 
     Raises:
-        ValueError: as :func:`~tauguard.datasets.logs.read_log`.
+        LogError: as :func:`~tauguard.datasets.logs.read_log`.
     """
     reading = reading or AS_IS
     read = read_log(log, column_map(columns), None, reading.mend, joints)
@@ -93,13 +94,13 @@ def reduced(log: Log, hz: float) -> Log:
     """Average the log down to ``hz`` samples per second, and note the delay.
 
     Raises:
-        ValueError: a rate above the log's own.
+        LogError: a rate above the log's own.
     """
     own = log.trace.dt
     try:
         trace = averaged(log.trace, hz)
     except ValueError as error:
-        raise ValueError(f"--resample {hz:g}: {error}") from None
+        raise LogError(f"--resample {hz:g}: {error}") from None
     note = (
         f"{1 / own:.3g} Hz averaged down to {hz:g} Hz: alarms come {500 / hz - 500 * own:.3g} ms "
         f"later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
@@ -124,7 +125,7 @@ def read_logs(
         reading: repairs and sample rate (default: the logs unchanged).
 
     Raises:
-        ValueError: labelled contacts, a saturated current, currents in one log and torques in
+        LogError: labelled contacts, a saturated current, currents in one log and torques in
             another, joints that the robot does not have, or an error of :func:`read_one`.
     """
     files, reading = log_files(logs), reading or AS_IS
@@ -146,7 +147,7 @@ def read_logs(
     for name, trace in traces.items():
         _refuse_saturated(name, trace)
     if len({is_torque(trace) for trace in traces.values()}) > 1:
-        raise ValueError("some logs hold currents, others torques: give logs of one kind")
+        raise LogError("some logs hold currents, others torques: give logs of one kind")
     return ArmLogs(traces, numbers, (*notes, *held))
 
 
@@ -161,7 +162,7 @@ def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log
         one: reads a log, also in the unit ``("deg",)`` or ``("rad",)``.
 
     Raises:
-        ValueError: a log whose angles fit those of the others as radians, but not as degrees.
+        LogError: a log whose angles fit those of the others as radians, but not as degrees.
     """
     read, doubts = {}, {}
     for path in files:
@@ -185,7 +186,7 @@ def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log
 
 
 def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
-    """Raise ``ValueError`` if positions [rad] fit those of other logs, but not as degrees.
+    """Raise ``LogError`` if positions [rad] fit those of other logs, but not as degrees.
 
     They do not fit as degrees if at least two joints, and more than as radians, were where the
     other logs never are, or if half of the joints as radians travel as far as in the other logs.
@@ -200,7 +201,7 @@ def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
     ratio = (high - low) / np.maximum((most - least).max(axis=0), 1e-9)
     alike = int(((ratio > 1 / ALIKE) & (ratio < ALIKE)).sum())
     if (far_in[1] >= 2 and far_in[0] < far_in[1]) or 2 * alike >= q.shape[1]:
-        raise ValueError(
+        raise LogError(
             f"{name}: its positions are like those of {', '.join(degrees)} if they are radians, "
             f"but these are degrees, by their values: convert one of them, or say --mend deg or "
             "--mend rad for all"
@@ -215,14 +216,14 @@ def linear_axes(numbers: RobotNumbers, read: Mapping[str, Log]) -> tuple[str, ..
         read: logs by file name.
 
     Raises:
-        ValueError: the columns of these axes are read in degrees.
+        LogError: the columns of these axes are read in degrees.
     """
     pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
     if not (linear := ", ".join(name for name, is_linear in pairs if is_linear)):
         return ()
     for name, log in read.items():
         if log.columns is not None and log.columns.degrees is True:
-            raise ValueError(
+            raise LogError(
                 f"{name}: {linear} is a linear axis, but is read in degrees as the others: "
                 'give a column map in which "degrees" is a list, false for this axis [m]'
             )
@@ -246,7 +247,7 @@ def _refuse_touched(name: str, log: Log) -> None:
     if log.touched:
         begin = float(log.trace.t[0])
         times = ", ".join(f"{a - begin:.1f} to {b - begin:.1f} s" for a, b in log.touched[:3])
-        raise ValueError(
+        raise LogError(
             f"{name}: a column labels {len(log.touched)} contact"
             f"{'' if len(log.touched) == 1 else 's'} ({times}"
             f"{', ...' if len(log.touched) > 3 else ''} after the beginning); expected free "
@@ -257,7 +258,7 @@ def _refuse_touched(name: str, log: Log) -> None:
 def _refuse_saturated(log: str, trace: Trace) -> None:
     for joint, row, count, peak in saturated(trace):
         what, unit = ("torque", "N m") if is_torque(trace) else ("current", "A")
-        raise ValueError(
+        raise LogError(
             f"{log}: the {what} of {joint} stays at {peak:g} {unit} for {count} samples, "
             f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, so the torque is "
             "not known; leave this log out or cut it there"
@@ -268,18 +269,18 @@ def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
     """The trace with its joints in the robot's order.
 
     Raises:
-        ValueError: joints that do not match.
+        LogError: joints that do not match.
     """
     given = trace.joint_names
     if len(given) != len(names):
-        raise ValueError(
+        raise LogError(
             f"the log has {len(given)} joints ({', '.join(given)}), "
             f"the robot {len(names)} ({', '.join(names)})"
         )
     if given == unnamed(len(given)) or given == names:
         return dataclasses.replace(trace, joint_names=names)
     if set(given) != set(names):
-        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+        raise LogError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
     order = [given.index(name) for name in names]
     moved: dict[str, Any] = {name: values[:, order] for name, values in trace.signals.items()}
     return dataclasses.replace(trace, joint_names=names, **moved)
@@ -299,12 +300,12 @@ def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
     """The log whose file name, with or without extension, is ``name``; errors name ``flag``.
 
     Raises:
-        ValueError: no log or several logs have this name.
+        LogError: no log or several logs have this name.
     """
     found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
     if len(found) != 1:
         there = f"two are called {name!r}" if found else f"no log {name!r}"
-        raise ValueError(f"{flag}: {there}; expected one of {', '.join(logs)}")
+        raise LogError(f"{flag}: {there}; expected one of {', '.join(logs)}")
     return found[0]
 
 
@@ -316,7 +317,7 @@ def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recordi
         payload: one of LOG=KG, LOG=KG,X,Y,Z and LOG=unknown per log; other logs have no load.
 
     Raises:
-        ValueError: a payload that cannot be read or belongs to no log.
+        LogError: a payload that cannot be read or belongs to no log.
     """
     loads: dict[str, Load | None] = {}
     for text in payload:
@@ -331,10 +332,10 @@ def parse_load(text: str) -> Load:
     """The load in ``--payload KG`` or ``--payload KG,X,Y,Z``.
 
     Raises:
-        ValueError: the text has another form.
+        LogError: the text has another form.
     """
     if text == "unknown":
-        raise ValueError("--payload unknown: for an unknown load, do not give this flag")
+        raise LogError("--payload unknown: for an unknown load, do not give this flag")
     return _load(text, text, "KG or KG,X,Y,Z, 0 for nothing")
 
 
@@ -344,9 +345,9 @@ def _load(text: str, value: str, form: str) -> Load:
     except ValueError:
         parts = []
     if len(parts) not in (1, 4):
-        raise ValueError(f"--payload {text}: expected {form}")
+        raise LogError(f"--payload {text}: expected {form}")
     if parts[0] > HEAVIEST:
-        raise ValueError(
+        raise LogError(
             f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
             "loads are given in kg"
         )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterable
 from typing import Any, TypeVar
 
 from tauguard.extras import extra
+from tauguard.findings import ArgumentError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -28,13 +29,13 @@ def on_cluster(
         address: of the cluster; "auto": the cluster of this machine; "local": start one here.
 
     Raises:
-        ValueError: Ray is not installed.
+        ArgumentError: Ray is not installed.
         OSError: no cluster answers at the address, or the cluster gave up on a task.
     """
     try:
         import ray
     except ImportError:
-        raise ValueError(f"--ray needs {extra('distributed')}") from None
+        raise ArgumentError(f"--ray needs {extra('distributed')}") from None
     own = not ray.is_initialized()
     if own:
         _connect(ray, address)

@@ -14,6 +14,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.datasets.log_checks import AMPERES, FURTHEST
 from tauguard.detectors.faults.inputs import FASTEST
+from tauguard.findings import LogError
 
 #: Units of a time column: smallest median step in the unit, and the unit [s].
 CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
@@ -89,7 +90,7 @@ def units_of(
         given: the user's statement whether angles are degrees; None: not stated.
 
     Raises:
-        ValueError: columns in different or unknown units, or angles neither in radians nor in
+        LogError: columns in different or unknown units, or angles neither in radians nor in
             degrees, or angles that may be either.
     """
     angles = [*groups["q"], *groups.get("qd", ())]
@@ -98,7 +99,7 @@ def units_of(
         refuse_unknown(names, kinds.get(field, {**_ANGLES, **dict.fromkeys(_OTHER_ANGLES)}))
     for name in angles:
         if unit_of(name, dict.fromkeys(_OTHER_ANGLES, True)):
-            raise ValueError(
+            raise LogError(
                 f"column {name}: expected radians or degrees, per second for a speed: convert it, "
                 "or give a column map without qd if only the velocities differ"
             )
@@ -134,7 +135,7 @@ def _in_degrees(names: Sequence[str], q: Array, qd: Array) -> bool:
     angles are radians if half of the joints are faster than 1 and none is faster than ``FASTEST``.
 
     Raises:
-        ValueError: one joint is beyond two turns, and the speeds do not decide.
+        LogError: one joint is beyond two turns, and the speeds do not decide.
     """
     far = (np.abs(q) > FURTHEST).any(axis=0)
     if far.sum() != 1:
@@ -145,14 +146,14 @@ def _in_degrees(names: Sequence[str], q: Array, qd: Array) -> bool:
     if qd.shape[1] and 2 * (speeds > 1.0).any(axis=0).sum() >= q.shape[1]:
         return False
     joint = int(np.argmax(far))
-    raise ValueError(
+    raise LogError(
         f"column {names[joint]} is beyond two turns ({np.nanmax(np.abs(q[:, joint])):.4g}) as the "
         "only position: if angles are in degrees, say --mend deg or --mend rad if in radians"
     )
 
 
 def refuse_unknown(names: Sequence[str], units: Mapping[str, Any]) -> None:
-    """Raise ``ValueError`` for a unit in brackets that is none of ``units``.
+    """Raise ``LogError`` for a unit in brackets that is none of ``units``.
 
     Words that are no unit, and words that differ from joint to joint, are part of the name.
     """
@@ -169,7 +170,7 @@ def refuse_unknown(names: Sequence[str], units: Mapping[str, Any]) -> None:
             short = all(len(w) <= _SYMBOL and w not in _SHORT_WORDS for w in words.split("_"))
             if odd or _FOREIGN.search(words) or (words and short and not differ):
                 short_forms = [u for u in units if len(u) < 6 and units[u] is not None]
-                raise ValueError(
+                raise LogError(
                     f"column {name}: unit {text} is not known, expected one of "
                     f"{', '.join(short_forms).replace('_', ' ')}; convert it, or give a column map "
                     "with the scale"
@@ -182,7 +183,7 @@ def _one(said: Mapping[str, Any], remedy: str) -> Any:
     first = next(iter(named), "")
     for name, value in named.items():
         if value != named[first]:
-            raise ValueError(
+            raise LogError(
                 f"columns {first} and {name} are in different units, but auto needs the same for "
                 f"both: {remedy}"
             )

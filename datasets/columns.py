@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from tauguard.findings import LogError
 from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
@@ -64,49 +65,49 @@ class ColumnMap:
         """Check that all joints have their columns.
 
         Raises:
-            ValueError: different numbers of columns, an unknown kind of repair.
+            LogError: different numbers of columns, an unknown kind of repair.
         """
         self._check_types()
         joints = len(self.q)
         if joints == 0:
-            raise ValueError("columns.q: name at least one joint's column")
+            raise LogError("columns.q: name at least one joint's column")
         for name, group in self.groups().items():
             if len(group) != joints:
-                raise ValueError(f"columns.{name}: {len(group)} columns for {joints} joints")
+                raise LogError(f"columns.{name}: {len(group)} columns for {joints} joints")
         for name in ("current_scale", "torque_scale", "degrees"):
             scale = getattr(self, name)
             if not isinstance(scale, float | int) and len(scale) != joints:
-                raise ValueError(f"columns.{name}: one value or {joints}")
+                raise LogError(f"columns.{name}: one value or {joints}")
         if bool(self.current) == bool(self.torque):
-            raise ValueError("columns: give either current [A] or torque [N m]")
+            raise LogError("columns: give either current [A] or torque [N m]")
         unknown = self.repair - set(REPAIRS)
         if unknown:
-            raise ValueError(f"columns.repair: {sorted(unknown)}; known: {', '.join(REPAIRS)}")
+            raise LogError(f"columns.repair: {sorted(unknown)}; known: {', '.join(REPAIRS)}")
 
     def _check_types(self) -> None:
         """Refuse wrong types: the text "false" would count as true."""
         columns = [c for name in SIGNALS for c in getattr(self, name)]
         columns += [] if self.t is None else [self.t]
         if (self.t is None) != (self.clock > 0):
-            raise ValueError(
+            raise LogError(
                 "columns: give t (the time's column) or clock (rows per second), not both"
             )
         for column in columns:
             if isinstance(column, bool) or not isinstance(column, str | int):
-                raise ValueError(f"column {column!r}: expected a name or a number from 0")
+                raise LogError(f"column {column!r}: expected a name or a number from 0")
         told = self.degrees if isinstance(self.degrees, tuple) else (self.degrees,)
         if not all(isinstance(one, bool) for one in told):
-            raise ValueError(f"columns.degrees: {self.degrees!r}, expected true or false")
+            raise LogError(f"columns.degrees: {self.degrees!r}, expected true or false")
         scales: list[object] = [self.time_scale]
         for one in (self.current_scale, self.torque_scale):
             scales += one if isinstance(one, tuple | list) else (one,)
         for scale in scales:
             if isinstance(scale, bool) or not (isinstance(scale, float | int) and abs(scale) > 0):
-                raise ValueError(f"columns: scale {scale!r}, expected a number other than 0")
+                raise LogError(f"columns: scale {scale!r}, expected a number other than 0")
         if not (isinstance(self.separator, str) and len(self.separator) == 1):
-            raise ValueError(f"columns.separator: {self.separator!r}, expected one character")
+            raise LogError(f"columns.separator: {self.separator!r}, expected one character")
         if self.decimal not in (".", ",") or self.decimal == self.separator:
-            raise ValueError(
+            raise LogError(
                 f"columns.decimal: {self.decimal!r}, expected . or , and not the separator"
             )
 
@@ -127,7 +128,7 @@ class ColumnMap:
                 or "clock=HZ".
 
         Raises:
-            ValueError: an unknown word.
+            LogError: an unknown word.
         """
         changed: dict[str, Any] = {"repair": self.repair | (set(words) & set(REPAIRS))}
         for word in words:
@@ -142,7 +143,7 @@ class ColumnMap:
                 changed |= {"t": None, "clock": float(value)}
             elif word not in REPAIRS:
                 known = ", ".join((*ANGLES, "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
-                raise ValueError(f"--mend {word}: expected some of {known}")
+                raise LogError(f"--mend {word}: expected some of {known}")
         return dataclasses.replace(self, **changed)
 
 
@@ -208,21 +209,21 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
     """The map in the JSON file ``columns``; the name of a preset is returned unchanged.
 
     Raises:
-        ValueError: no such file, or not the fields of a :class:`ColumnMap`.
+        LogError: no such file, or not the fields of a :class:`ColumnMap`.
     """
     if columns is None or not columns.endswith(".json"):
         return columns  # "auto" is recognised from the file itself
     if not Path(columns).is_file():
-        raise ValueError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
+        raise LogError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
     fields = read_json(columns)
     known = [field.name for field in dataclasses.fields(ColumnMap)]
     fields_are = f"its fields are {', '.join(known)}"
     if not isinstance(fields, dict):
-        raise ValueError(f"{columns}: expected an object; {fields_are}")
+        raise LogError(f"{columns}: expected an object; {fields_are}")
     if strange := sorted(set(fields) - set(known)):
-        raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
+        raise LogError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
     fields.setdefault("t", None) if "clock" in fields else None
     if missing := [name for name in ("t", "q") if name not in fields]:
-        raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
+        raise LogError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
     with reading(columns, fields_are):
         return _map_of(fields)

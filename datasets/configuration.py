@@ -21,6 +21,7 @@ from tauguard.datasets.configuration_checks import (
 )
 from tauguard.datasets.plans import CLAMP_SECONDS, SLOT
 from tauguard.datasets.robots import RobotSource, find_robot
+from tauguard.findings import FileError
 from tauguard.models import ROBOTS, SceneObject, cura6, load_objects
 
 #: Names of this package's configurations.
@@ -141,7 +142,7 @@ def load(source: str | Path) -> Configuration:
     """The configuration in a TOML file, or this package's configuration of that name.
 
     Raises:
-        ValueError: not TOML, an unknown key, a value out of range, or an ``unseen`` value that the
+        FileError: not TOML, an unknown key, a value out of range, or an ``unseen`` value that the
             first split has; the message names key, value and what would work.
         OSError: no such file.
     """
@@ -153,7 +154,7 @@ def load(source: str | Path) -> Configuration:
         try:
             text, where = path.read_text(encoding="utf-8"), f"{path}: "
         except UnicodeDecodeError:
-            raise ValueError(f"{path}: not a text file; expected TOML") from None
+            raise FileError(f"{path}: not a text file; expected TOML") from None
     else:
         raise FileNotFoundError(
             f"configuration {str(source)!r}: no such file{closest(str(source), NAMED)}; named "
@@ -162,11 +163,11 @@ def load(source: str | Path) -> Configuration:
     try:
         return parse(tomllib.loads(text), path.parent)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where}not TOML ({error})") from None
+        raise FileError(f"{where}not TOML ({error})") from None
     except RecursionError:
-        raise ValueError(f"{where}not TOML of a dataset (nested too deep)") from None
+        raise FileError(f"{where}not TOML of a dataset (nested too deep)") from None
     except ValueError as error:
-        raise ValueError(f"{where}{error}") from None
+        raise FileError(f"{where}{error}") from None
 
 
 def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
@@ -221,7 +222,7 @@ def _named_arms(
             found = find_robot(arm, folder)
         except ValueError as error:
             hint = closest(arm, (*cura6.NAMES, *ROBOTS))
-            raise ValueError(f"{where}.arms: {error}{hint}") from None
+            raise FileError(f"{where}.arms: {error}{hint}") from None
         if robots.setdefault(found.name, found) != found or found.name in names:
             refuse(f"{where}.arms", arm, f"another file name: two arms would be {found.name}")
         names.append(found.name)
@@ -251,7 +252,7 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
         )
     if values["paired"]:
         if values["struck"] != 0.5 or values["picks"] > 0:
-            raise ValueError(
+            raise FileError(
                 f"{where}.paired: one episode of each pair has collisions, none picks up a load; "
                 f"expected struck = 0.5 and picks = 0, found {values['struck']:g} and "
                 f"{values['picks']:g}"
@@ -275,7 +276,7 @@ def _check_splits(splits: list[Split]) -> None:
         for what in split.unseen:
             shared = values_of(first, what) & values_of(split, what)
             if shared:
-                raise ValueError(
+                raise FileError(
                     f"{where}: {split.name} shares {what} {sorted(shared)[0]!r} with {first.name}; "
                     f"expected no {what} of {first.name}"
                 )

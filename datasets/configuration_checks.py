@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, NoReturn
 
 from tauguard.datasets.plans import CLAMP_SECONDS, OFFSET, SLOT, SPREAD
+from tauguard.findings import FileError
 from tauguard.models import Mismatch, cura6
 from tauguard.traces import KINDS, STRATA
 
@@ -18,16 +19,16 @@ Read = Callable[[Any], Any]
 class Key:
     """The values that a key accepts."""
 
-    read: Read  #: converts the value; ``ValueError`` if out of range
+    read: Read  #: converts the value; ``FileError`` if out of range
     expected: str  #: accepted values, for messages and documentation
     default: Any = REQUIRED
 
 
 def refuse(key: str, value: Any, expected: str) -> NoReturn:
-    """Raise ``ValueError`` with the key, its value and the expected values."""
+    """Raise ``FileError`` with the key, its value and the expected values."""
     shown = repr(value)
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-    raise ValueError(f"{key} = {shown}: expected {expected}")
+    raise FileError(f"{key} = {shown}: expected {expected}")
 
 
 def closest(word: str, known: Iterable[str]) -> str:
@@ -48,12 +49,12 @@ def checked_table(
         partial: required keys may be missing.
 
     Raises:
-        ValueError: an unknown or missing key, or a value out of range.
+        FileError: an unknown or missing key, or a value out of range.
     """
     dot = f"{where}." if where else ""
     for name in values:
         if name not in keys:
-            raise ValueError(
+            raise FileError(
                 f"{dot}{name}: unknown key{closest(name, keys)}; expected one of {', '.join(keys)}"
             )
     found = {}
@@ -66,7 +67,7 @@ def checked_table(
         elif key.default is not REQUIRED:
             found[name] = key.default
         elif not partial:
-            raise ValueError(f"{dot}{name}: missing; expected {key.expected}")
+            raise FileError(f"{dot}{name}: missing; expected {key.expected}")
     return found
 
 
@@ -76,7 +77,7 @@ def number(low: float, high: float, above: bool = False) -> Read:
     def read(value: Any) -> float:
         checked = float(of_type(int, float)(value))
         if not low <= checked <= high or (above and checked == low):
-            raise ValueError
+            raise FileError
         return checked
 
     return read
@@ -87,7 +88,7 @@ def integer(low: int, high: int) -> Read:
 
     def read(value: Any) -> int:
         if not low <= of_type(int)(value) <= high:
-            raise ValueError
+            raise FileError
         return int(value)
 
     return read
@@ -98,7 +99,7 @@ def of_type(*kinds: type) -> Read:
 
     def read(value: Any) -> Any:
         if type(value) not in kinds:
-            raise ValueError
+            raise FileError
         return value
 
     return read
@@ -109,7 +110,7 @@ def matching(pattern: str) -> Read:
 
     def read(value: Any) -> str:
         if not re.fullmatch(pattern, value):
-            raise ValueError
+            raise FileError
         return str(value)
 
     return read
@@ -121,7 +122,7 @@ def several(read: Read, least: int = 1, distinct: bool = False) -> Read:
     def read_all(value: Any) -> tuple[Any, ...]:
         items = tuple(read(item) for item in of_type(list, tuple)(value))
         if len(items) < least or (distinct and len(set(items)) < len(items)):
-            raise ValueError
+            raise FileError
         return items
 
     return read_all
@@ -134,7 +135,7 @@ def span(low: float, high: float, equal: bool) -> Read:
     def read(value: Any) -> tuple[float, float]:
         a, b = (inner(v) for v in value)
         if not (a < b or (equal and a == b)):
-            raise ValueError
+            raise FileError
         return a, b
 
     return read
@@ -144,7 +145,7 @@ def rows_a_second(value: Any) -> int:
     """Read a sample rate that divides the 1000 Hz of the physics."""
     rate = int(integer(1, 1000)(value))
     if 1000 % rate:
-        raise ValueError
+        raise FileError
     return rate
 
 

@@ -14,6 +14,7 @@ from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.robots import check_unchanged, nominal_texts
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import digest, fault, manifest_path, read_lines
+from tauguard.findings import FileError
 
 #: Version of the folder's layout; readers refuse newer ones.
 FORMAT = 2
@@ -29,7 +30,7 @@ def read_head(folder: Path) -> dict[str, Any]:
     """The content of ``dataset.json``.
 
     Raises:
-        ValueError: the folder holds no dataset, one of a newer format, or a damaged one (also if
+        FileError: the folder holds no dataset, one of a newer format, or a damaged one (also if
             its numbers of shards are not those of its configuration).
         FileNotFoundError: no such folder.
     """
@@ -39,12 +40,12 @@ def read_head(folder: Path) -> dict[str, Any]:
             f"{folder}: no folder of that name; `tauguard generate` makes datasets"
         )
     if not path.is_file():
-        raise ValueError(f"{folder}: no {HEAD} in it; `tauguard generate` makes datasets")
+        raise FileError(f"{folder}: no {HEAD} in it; `tauguard generate` makes datasets")
     try:
         head = json.loads(path.read_text(encoding="utf-8"))
         version = head["format"]
         if isinstance(version, int) and version > FORMAT:
-            raise ValueError(
+            raise FileError(
                 f"{folder}: a dataset of format {version}; this tauguard reads up to {FORMAT}: "
                 "install a newer version"
             )
@@ -61,7 +62,7 @@ def read_head(folder: Path) -> dict[str, Any]:
         UnicodeDecodeError,
         RecursionError,
     ):
-        raise ValueError(
+        raise FileError(
             f"{path}: damaged; `tauguard generate` with the same configuration into another "
             "folder makes the same bytes"
         ) from None
@@ -90,7 +91,7 @@ def lines(folder: Path) -> Iterator[dict[str, Any]]:
     """The manifest's lines, one per episode, split by split; missing shards are skipped.
 
     Raises:
-        ValueError: a damaged file of the manifest.
+        FileError: a damaged file of the manifest.
     """
     for split, number in shards(configuration_in(folder)):
         path = folder / manifest_path(split, number)
@@ -137,7 +138,7 @@ def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
     Missing subfolders, arm files and the head file are written on entry.
 
     Raises:
-        ValueError: the folder holds something else.
+        FileError: the folder holds something else.
         OSError: another process is writing into the folder, or it cannot be made.
     """
     made = not folder.exists()
@@ -151,7 +152,7 @@ def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
                 not (entry.name.startswith(".") and entry.name.endswith(PART))
                 for entry in folder.iterdir()
             ):
-                raise ValueError(
+                raise FileError(
                     f"{folder}: not empty, and no dataset; name a new or an empty folder"
                 )
             remove_parts(folder)
@@ -201,7 +202,7 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
     """The attachments of every trace of an arm (``Scene.nominal_texts``), read from the folder.
 
     Raises:
-        ValueError: a file is missing or not the one that was written.
+        FileError: a file is missing or not the one that was written.
     """
     head = read_head(folder)
     wanted, found = arm_checksums(head), {}
@@ -214,7 +215,7 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
         except UnicodeDecodeError:
             text = ""
         if not text or wanted.get(path.name, _sha256(text)) != _sha256(text):
-            raise ValueError(
+            raise FileError(
                 f"{path}: missing or damaged; the same `tauguard generate` that made the dataset "
                 "writes it again"
             )
@@ -254,7 +255,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
 def _check_same(folder: Path, head: dict[str, Any]) -> None:
     there = read_head(folder)
     if there["configuration_sha256"] != head["configuration_sha256"]:
-        raise ValueError(
+        raise FileError(
             f"{folder}: holds another dataset ({there['name']}, configuration "
             f"{there['configuration_sha256'][:12]}, not {head['configuration_sha256'][:12]}); "
             "name another folder"
@@ -263,7 +264,7 @@ def _check_same(folder: Path, head: dict[str, Any]) -> None:
         differ = [k for k in head["code"] if there["code"].get(k) != head["code"][k]]
         named = [f"{k} {there['code'].get(k)}" for k in differ if k in versions()]
         why = ", ".join(named) or "other sources, or a machine that rounds differently"
-        raise ValueError(
+        raise FileError(
             f"{folder}: was begun with {why}: new shards would not have the same bytes; "
             "name another folder"
         )

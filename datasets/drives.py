@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Joint torque per motor current [N m/A], one number per joint, by the name of the preset.
@@ -20,11 +21,11 @@ def preset_gains(logs: Sequence[Trace]) -> tuple[float, ...]:
     """Drive gains of the preset of the logs' columns; empty: not known.
 
     Raises:
-        ValueError: the logs have columns of different presets, and the drive of one is known.
+        ArgumentError: the logs have columns of different presets, and the drive of one is known.
     """
     names = sorted({log.meta.get("columns", "no preset") for log in logs})
     if len(names) > 1 and not DRIVES.keys().isdisjoint(names):
-        raise ValueError(
+        raise ArgumentError(
             f"logs of {', '.join(names)}, whose drive gains differ: give logs of one preset, "
             "or --gains"
         )

@@ -30,6 +30,7 @@ from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Balance, Planned
 from tauguard.datasets.shard import PHYSICS_RATE, data_path, manifest_path, simulated
 from tauguard.envs import Episode
+from tauguard.findings import FileError
 from tauguard.traces import Trace, stratum
 
 #: Properties of collisions that are counted from the labels.
@@ -67,7 +68,7 @@ def summarised(folder: Path) -> dict[str, SplitSummary]:
     """Counts from the manifest, split by split; planned counts cover only existing episodes.
 
     Raises:
-        ValueError: no dataset, one of a newer version, or a damaged manifest.
+        FileError: no dataset, one of a newer version, or a damaged manifest.
     """
     found = {split.name: SplitSummary() for split in configuration_in(folder).splits}
     last = ""
@@ -160,7 +161,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
     """Names and faults of damaged, missing and foreign files; reads every byte.
 
     Raises:
-        ValueError: ``dataset.json`` is so damaged that the other files are not known.
+        FileError: ``dataset.json`` is so damaged that the other files are not known.
     """
     found = changed(folder)
     found += [
@@ -239,12 +240,12 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
     """The manifest's line of an episode, ``split/number``.
 
     Raises:
-        ValueError: no such episode.
+        FileError: no such episode.
     """
     for line in lines(folder):
         if f"{line['split']}/{line['number']}" == name:
             return line
-    raise ValueError(f"{folder}: no episode {name!r}; expected split/number, such as train/0")
+    raise FileError(f"{folder}: no episode {name!r}; expected split/number, such as train/0")
 
 
 def same_again(
@@ -258,14 +259,14 @@ def same_again(
         robot: the file of the episode's arm, if the arm is not part of the package.
 
     Raises:
-        ValueError: the arm's file is missing or not the one the dataset was made with, or a file
+        FileError: the arm's file is missing or not the one the dataset was made with, or a file
             was given for an arm of the package.
     """
     episode = Episode.from_json(json.dumps(line["episode"]))
     configuration = configuration_in(folder)
     if robot is not None:
         if line["arm"] not in {one.name for one in configuration.robots}:
-            raise ValueError(f"arm {line['arm']} comes with the package: leave --robot out")
+            raise FileError(f"arm {line['arm']} comes with the package: leave --robot out")
         configuration = configuration.with_source(line["arm"], str(robot))
     check_unchanged(line["arm"], configuration.robots)
     source = configuration.source_of(line["arm"])

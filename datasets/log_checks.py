@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array, runs
 from tauguard.datasets.columns import ColumnMap
 from tauguard.detectors.faults.inputs import FASTEST
+from tauguard.findings import LogError
 from tauguard.traces.trace import Trace
 
 #: A pause is a gap if it is longer than GAP_SAMPLES sample intervals and than GAP_SECONDS seconds.
@@ -47,7 +48,7 @@ def checked(trace: Trace, where: Where) -> tuple[str, ...]:
         where: text for a row's number, such as "line 12".
 
     Raises:
-        ValueError: a gap, angles in degrees, or velocities that do not fit the positions.
+        LogError: a gap, angles in degrees, or velocities that do not fit the positions.
     """
     _refuse_degrees(trace, where)
     notes = _timing(trace, where)
@@ -72,7 +73,7 @@ def _timing(trace: Trace, where: Where) -> list[str]:
     gaps = np.flatnonzero(steps > max(GAP_SAMPLES * usual, GAP_SECONDS))
     if len(steps) >= 20 and len(gaps):
         row = int(gaps[0])
-        raise ValueError(
+        raise LogError(
             f"{where(row + 1)}: no sample in the {steps[row]:.3g} s before it, but samples come "
             f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there; the "
             f"rows up to {where(row)} and those from {where(row + 1)} on are separate logs"
@@ -94,7 +95,7 @@ def _refuse_degrees(trace: Trace, where: Where) -> None:
         beyond = np.abs(x) > most
         if beyond.any(axis=0).sum() >= needed:
             row, joint = (int(v) for v in np.argwhere(beyond)[0])
-            raise ValueError(
+            raise LogError(
                 f"{where(row)}: the {what} of {trace.joint_names[joint]} is {x[row, joint]:g} "
                 f'{unit}: if these are degrees, say --mend deg ("degrees" in a column map)'
             )
@@ -119,13 +120,13 @@ def _refuse_strange_velocities(trace: Trace) -> None:
         if abs(alike[j]) < 0.7:  # a wrong sign is reported below
             best = int(np.argmax(alike))
             other = trace.joint_names[best]
-            raise ValueError(
+            raise LogError(
                 f"the velocity of {name} does not follow its position"
                 + (f" but that of {other}: columns in another order?" if alike[best] > 0.9 else "")
             )
         ratio = float(change[:, j] @ summed[:, j] / (summed[:, j] @ summed[:, j]))
         if not 0.7 < ratio < 1.4:
-            raise ValueError(
+            raise LogError(
                 f"{_meaning(ratio, name)}: change of position is {ratio:.3g} times the velocity"
             )
 
@@ -171,7 +172,7 @@ def refuse_set_back(t: Array, lines: NDArray[np.int64]) -> None:
     for begin, row, end in zip([0, *back[:-1]], back, [*back[1:], len(t)], strict=True):
         over = float(min(t[row - 1], t[end - 1]) - max(t[row], t[begin]))
         if len(back) < FEW and end - row > FEW and over > max(5 * np.median(np.diff(t)), 0.05):
-            raise ValueError(
+            raise LogError(
                 f"line {lines[row]}: the clock was set back by {over:.3g} s: cut the log there "
                 "into two"
             )
@@ -185,18 +186,18 @@ def increasing(
     back = np.flatnonzero(step < 0)
     if back.size:
         row = back[0] + 1
-        raise ValueError(
+        raise LogError(
             f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
             "say --mend order"
         )
     same = np.flatnonzero(step == 0)
     if same.size and "repeat" not in columns.repair:
-        raise ValueError(
+        raise LogError(
             f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
             "--mend repeat"
         )
     if same.size > COARSE * len(t):
-        raise ValueError(
+        raise LogError(
             f"{same.size} of {len(t)} rows repeat the time before: the time has too few digits; "
             "write more of them, or say --mend clock=HZ (rows per second) instead"
         )

@@ -24,6 +24,7 @@ from tauguard.datasets.columns import (
 )
 from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
 from tauguard.datasets.recognition import described, in_units_of, lacking, recognised
+from tauguard.findings import LogError
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
@@ -67,7 +68,7 @@ def read_log(
         that the map's ``repair`` names are repaired. ``meta["columns"]`` is the preset, if any.
 
     Raises:
-        ValueError: a missing column, a bad number, a cut-off row, time that does not increase, a
+        LogError: a missing column, a bad number, a cut-off row, time that does not increase, a
             gap, angles in degrees, or velocities that do not fit the positions. The message names
             file, row or line, and what would work.
         OSError: the file is missing or cannot be read.
@@ -85,9 +86,9 @@ def read_log(
                 names = own.joint_names or joint_names if told else joint_names
                 log = read_csv(path, own, names, columns == "auto")
             except UnicodeDecodeError as error:
-                raise ValueError("not a text file; expected CSV or MCAP") from error
+                raise LogError("not a text file; expected CSV or MCAP") from error
             except csv.Error as error:
-                raise ValueError(f"not CSV ({error})") from error
+                raise LogError(f"not CSV ({error})") from error
     preset = preset_of(own) if own else None
     if isinstance(columns, str) and columns in PRESETS:
         preset = columns
@@ -108,11 +109,11 @@ def chosen(
     form: dict[str, Any] = _form(path)
     if columns is not None and columns != "auto":
         if columns not in PRESETS:
-            raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
+            raise LogError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
         return replace(PRESETS[columns], **form)
     header, table = _beginning(path, **form)
     if not header:
-        raise ValueError("the file is empty")
+        raise LogError("the file is empty")
     preset = next((replace(PRESETS[name], **form) for name in presets_of(header)), None)
     if preset is not None and columns is None:
         return preset
@@ -125,13 +126,13 @@ def chosen(
         return found
     known = f"give a column map, or a preset: {', '.join(PRESETS)}"
     if found is None and not header_of(header):
-        raise ValueError(
+        raise LogError(
             f"no names of columns in the first line: {known}; a map may count columns from 0"
         )
     if found is None:
         lead = "" if columns == "auto" else "no column map; "
-        raise ValueError(f"{lead}among the columns, {lacking(header, joints)}; {known}")
-    raise ValueError(
+        raise LogError(f"{lead}among the columns, {lacking(header, joints)}; {known}")
+    raise LogError(
         f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
     )
 
@@ -171,17 +172,17 @@ def read_csv(
     """A CSV file as a trace, see :func:`read_log`; with ``auto``, a note describes the columns."""
     rows = list(_rows(path, columns.separator, columns.decimal))
     if not rows:
-        raise ValueError("empty file")
+        raise LogError("empty file")
     header, where = _located(rows[0][1], columns)
     rows = rows[1:] if header else rows
     if not rows:
-        raise ValueError("a header line without rows of numbers")
+        raise LogError("a header line without rows of numbers")
     width = columns.width or len(header) or len(rows[0][1])
     table, lines, notes = parse(
         rows, [i for group in where.values() for i in group], width, columns, header
     )
     if len(table) < 2:
-        raise ValueError(f"{len(table)} rows of numbers, expected at least 2")
+        raise LogError(f"{len(table)} rows of numbers, expected at least 2")
     ends = np.cumsum([len(group) for group in where.values()])[:-1]
     parts = dict(zip(where, np.split(table, ends, axis=1), strict=True))
     times = parts.pop("t")
@@ -217,12 +218,12 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     """The header (empty if the first line has numbers) and the column indices of each signal.
 
     Raises:
-        ValueError: columns that this file does not have; the message names presets that fit it.
+        LogError: columns that this file does not have; the message names presets that fit it.
     """
     header = header_of(first)
     if header and columns.headerless:
         fitting = presets_of(header)
-        raise ValueError(
+        raise LogError(
             f"the first line names columns ({listed(header, 60)}), but files of this column map "
             "have no header line: "
             + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
@@ -235,7 +236,7 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     except ValueError as error:
         better = presets_of(header) if header else presets_of_width(len(first))
         hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
-        raise ValueError(f"{error}{hint}") from None
+        raise LogError(f"{error}{hint}") from None
 
 
 def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array]:
@@ -271,20 +272,20 @@ def header_of(first: Sequence[str]) -> list[str]:
     """The names in a first line, empty if it is a line of numbers.
 
     Raises:
-        ValueError: most cells are numbers, but not all: the line is damaged.
+        LogError: most cells are numbers, but not all: the line is damaged.
     """
     cells = [cell.strip() for cell in first]
     names = [cell for cell in cells if cell and number(cell) is None]
     if names and 2 * len(names) < len([cell for cell in cells if cell]):
         at = cells.index(names[0])
-        raise ValueError(f"line 1, column {at}: {names[0][:40]!r} is not a number")
+        raise LogError(f"line 1, column {at}: {names[0][:40]!r} is not a number")
     return cells if names else []
 
 
 def named(names: Sequence[str], joints: int) -> tuple[str, ...]:
     """Joint names, or ``joint_1``, ... if there are none."""
     if names and len(names) != joints:
-        raise ValueError(f"{len(names)} joint names for {joints} joints in the log")
+        raise LogError(f"{len(names)} joint names for {joints} joints in the log")
     return tuple(names) or tuple(f"joint_{i}" for i in range(1, joints + 1))
 
 
@@ -300,11 +301,11 @@ def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
     """Index of a column."""
     if isinstance(column, int):
         if column < 0:
-            raise ValueError(f"column {column}: indices begin at 0")
+            raise LogError(f"column {column}: indices begin at 0")
         return column
     if column not in header:
         have = listed(header, 200) if header else "no header line"
-        raise ValueError(f"no column {column!r}; the file has: {have}")
+        raise LogError(f"no column {column!r}; the file has: {have}")
     return header.index(column)
 
 
@@ -327,7 +328,7 @@ def parse(
 ) -> tuple[Array, NDArray[np.int64], list[str]]:
     """The wanted columns of all rows that are kept, shape (R, columns), line numbers, and notes."""
     if max(wanted) >= width:
-        raise ValueError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
+        raise LogError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
     values: list[list[float]] = []
     lines: list[int] = []
     dropped: list[int] = []
@@ -339,7 +340,7 @@ def parse(
                 continue
             cut = len(row) < width and index == len(rows) - 1
             more = "; to leave the last row out, say --mend tail" if cut else ""
-            raise ValueError(f"line {line}: {len(row)} columns, expected {width}{more}")
+            raise LogError(f"line {line}: {len(row)} columns, expected {width}{more}")
         try:
             cells = [float(row[i]) for i in wanted]
             if all(map(isfinite, cells)):
@@ -368,9 +369,9 @@ def _lacking(
             continue
         said = f"{row[i]!r} is not a number" if value is None else f"{cell}, not finite"
         if cell and value is None:
-            raise ValueError(f"line {line}, {column_text(i, header)}: {said}")
+            raise LogError(f"line {line}, {column_text(i, header)}: {said}")
         if "nan" not in columns.repair:
-            raise ValueError(
+            raise LogError(
                 f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
                 "--mend nan (where they last longer than 0.05 s, cut the log in two instead)"
             )

@@ -12,6 +12,7 @@ from mcap.exceptions import McapError
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import LogError
 from tauguard.traces.mcap import decode
 from tauguard.traces.mcap_container import Contents
 from tauguard.traces.trace import Trace
@@ -26,7 +27,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
     """A trace from the first topic of type JointState; its ``effort`` is taken as current.
 
     Raises:
-        ValueError: no such topic, messages without velocity or effort, or a message that lacks a
+        LogError: no such topic, messages without velocity or effort, or a message that lacks a
             joint of the first one.
     """
     from tauguard.datasets.log_checks import checked
@@ -36,7 +37,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
         contents = Contents(path.read_bytes())
         contents.check_sum()
     except (McapError, struct.error) as error:
-        raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
+        raise LogError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
     if "tauguard.trace" in contents.metadata:
         own = decode(contents)
         return Log(own, checked(own, lambda row: f"sample {row}"))
@@ -53,7 +54,7 @@ def _messages(contents: Contents) -> tuple[str, list[tuple[int, bytes]]]:
     topic = next((name for name, kind in types.items() if kind == TYPE), None)
     if topic is None:
         have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
-        raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
+        raise LogError(f"no topic of type {TYPE}; topics: {have or 'none'}")
     own = {c.id for c in channels if c.topic == topic}
     messages = [
         (int(time), row.tobytes())
@@ -63,7 +64,7 @@ def _messages(contents: Contents) -> tuple[str, list[tuple[int, bytes]]]:
     ]
     counted = sum(contents.counts.get(number, 0) for number in own)
     if contents.counts and counted != len(messages):
-        raise ValueError(
+        raise LogError(
             f"{topic}: {len(messages)} messages, but the file's summary counts {counted}: "
             "damaged, or cut"
         )
@@ -75,7 +76,7 @@ def assemble(
 ) -> Trace:
     """Make a trace of the messages; times are header stamps, or log times where a stamp is 0."""
     if len(messages) < 2:
-        raise ValueError(f"{topic}: {len(messages)} messages, expected at least 2")
+        raise LogError(f"{topic}: {len(messages)} messages, expected at least 2")
     rows = [joint_state(f"{topic}, message {k}", data) for k, (_, data) in enumerate(messages)]
     names = list(joint_names or rows[0]["name"])
     signals: dict[str, list[Any]] = {"position": [], "velocity": [], "effort": []}
@@ -83,13 +84,13 @@ def assemble(
     for k, ((log_time, _), row) in enumerate(zip(messages, rows, strict=True)):
         missing = [name for name in names if name not in row["name"]]
         if missing:
-            raise ValueError(
+            raise LogError(
                 f"{topic}, message {k}: no joint {missing[0]!r}; it has {', '.join(row['name'])}"
             )
         order = [row["name"].index(name) for name in names]
         for key, values in signals.items():
             if len(row[key]) != len(row["name"]):
-                raise ValueError(f"{topic}, message {k}: {key} holds {len(row[key])} numbers")
+                raise LogError(f"{topic}, message {k}: {key} holds {len(row[key])} numbers")
             values.append(row[key][order])
         times[k] = 1e-9 * (row["stamp"] or log_time)
     return Trace(
@@ -106,10 +107,10 @@ def joint_state(where: str, data: bytes) -> dict[str, Any]:
     """The fields of one CDR-encoded JointState.
 
     Raises:
-        ValueError: a message that ends too early or is not CDR version 1.
+        LogError: a message that ends too early or is not CDR version 1.
     """
     if len(data) < 4 or data[:2] not in (b"\0\1", b"\0\0"):
-        raise ValueError(f"{where}: not plain CDR")
+        raise LogError(f"{where}: not plain CDR")
     order = "<" if data[1] == 1 else ">"
     body, at = data[4:], 0
 
@@ -135,7 +136,7 @@ def joint_state(where: str, data: bytes) -> dict[str, Any]:
         names = [text() for _ in range(scalar())]
         position, velocity, effort = doubles(), doubles(), doubles()
     except ValueError as error:
-        raise ValueError(f"{where}: cut off ({len(data)} bytes)") from error
+        raise LogError(f"{where}: cut off ({len(data)} bytes)") from error
     return {
         "stamp": stamp,
         "name": names,

@@ -14,6 +14,7 @@ from tauguard.datasets.dataset_folder import HEAD, arm_texts, arm_xml, configura
 from tauguard.datasets.dataset_folder import arms_of as arms_in
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.shard import data_path, manifest_path, read_lines
+from tauguard.findings import FileError
 from tauguard.traces import Trace
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def read(
             needed.
 
     Raises:
-        ValueError: nothing to read at ``path``, a damaged shard (the message names it), an unknown
+        FileError: nothing to read at ``path``, a damaged shard (the message names it), an unknown
             split or arm, or a dataset of a newer version.
         OSError: no such file or folder.
     """
@@ -56,22 +57,22 @@ def read(
         yield from _of_dataset(path, splits, arm)
         return
     if splits or arm:
-        raise ValueError(f"{path}: no dataset (no {HEAD}), so it has no splits and no named arms")
+        raise FileError(f"{path}: no dataset (no {HEAD}), so it has no splits and no named arms")
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file or folder")
     files = sorted(f for f in path.iterdir() if f.suffix in ENDINGS) if path.is_dir() else [path]
     if not files:
-        raise ValueError(f"{path}: no dataset and no recordings ({', '.join(ENDINGS)}) in it")
+        raise FileError(f"{path}: no dataset and no recordings ({', '.join(ENDINGS)}) in it")
     for file in files:
         yield read_log(file).trace
 
 
 def splits_of(folder: Path, wanted: Sequence[str] | None) -> tuple[str, ...]:
-    """The wanted splits of a dataset, all by default; ``ValueError`` for one it does not have."""
+    """The wanted splits of a dataset, all by default; ``FileError`` for one it does not have."""
     there = [split.name for split in configuration_in(folder).splits]
     for name in wanted or ():
         if name not in there:
-            raise ValueError(f"{folder}: no split {name!r}; it has {', '.join(there)}")
+            raise FileError(f"{folder}: no split {name!r}; it has {', '.join(there)}")
     return tuple(wanted or there)
 
 
@@ -84,7 +85,7 @@ def arms_of(folder: Path, splits: Sequence[str] | None = None) -> tuple[str, ...
 def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> Iterator[Trace]:
     chosen = splits_of(folder, splits)
     if arm is not None and arm not in arms_of(folder, chosen):
-        raise ValueError(
+        raise FileError(
             f"{folder}: no arm {arm!r} in {', '.join(chosen)}; "
             f"there are {', '.join(arms_of(folder, chosen))}"
         )
@@ -93,7 +94,7 @@ def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> 
             continue
         listed = folder / manifest_path(split, number)
         if not listed.is_file():
-            raise ValueError(
+            raise FileError(
                 f"{folder}: {data_path(split, number)} is missing; the same `tauguard generate` "
                 "that began the dataset completes it"
             )
@@ -116,7 +117,7 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
             f"{path}: missing; the same `tauguard generate` that made the dataset makes it again"
         ) from None
     except (OSError, ValueError, KeyError) as error:
-        raise ValueError(
+        raise FileError(
             f"{path}: damaged ({' '.join(str(error).split())[:120]}); the same `tauguard generate` "
             "that made the dataset makes this shard again"
         ) from None
@@ -126,12 +127,12 @@ def training_episodes(folder: Path, arm: str | None) -> list[Trace]:
     """One arm's episodes of the first split, which is the training split.
 
     Raises:
-        ValueError: the split has several arms and ``arm`` is None, or it has no such arm.
+        FileError: the split has several arms and ``arm`` is None, or it has no such arm.
     """
     first = (configuration_in(folder).splits[0].name,)
     arms = arms_of(folder, first)
     if arm is None and len(arms) > 1:
-        raise ValueError(
+        raise FileError(
             f"{folder}: its split {first[0]!r} has {len(arms)} arms, and a detector is trained for "
             f"one: choose with --arm {{{','.join(arms)}}}"
         )
@@ -149,14 +150,14 @@ def episodes_of_splits(
         splits: names of splits (default: all whose name begins with "test").
 
     Raises:
-        ValueError: no split has that arm.
+        FileError: no split has that arm.
     """
     every = [split.name for split in configuration_in(folder).splits]
     chosen = splits_of(folder, splits or [s for s in every if s.startswith("test")])
     arm = same_arm(folder, robot)
     there = [split for split in chosen if arm in arms_of(folder, [split])]
     if not there:
-        raise ValueError(
+        raise FileError(
             f"{folder}: the model was trained for {arm or 'no arm of this dataset'}; the arms of "
             f"{', '.join(chosen)} are {', '.join(arms_of(folder, chosen))}"
         )

@@ -21,6 +21,7 @@ from tauguard.detectors.calibration.assessment import (
 )
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.dynamics.robot import holding
+from tauguard.findings import ArgumentError
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 from tauguard.untrusted_input import read_text
@@ -34,13 +35,13 @@ def robot_numbers(robot: Path) -> RobotNumbers:
     """The numbers of a robot file (URDF or MJCF).
 
     Raises:
-        ValueError: the file cannot be read; the message names it.
+        ArgumentError: the file cannot be read; the message names it.
     """
     try:
         return RobotNumbers.from_pin(pin_model(robot))
     except ValueError as error:
         name = "" if str(robot) in str(error) else f"{robot}: "
-        raise ValueError(f"{name}{error}") from None
+        raise ArgumentError(f"{name}{error}") from None
 
 
 def of_log(
@@ -54,14 +55,16 @@ def of_log(
         robot: the robot file, which the note names.
 
     Raises:
-        ValueError: joints that the robot does not have.
+        ArgumentError: joints that the robot does not have.
     """
     names = numbers.joint_names
     if len(given) >= len(names):
         return numbers, ()
     kept = names[: len(given)] if given == unnamed(len(given)) else given
     if not set(kept) <= set(names):
-        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+        raise ArgumentError(
+            f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}"
+        )
     lacking = [name for name in names if name not in kept]
     note = f"the log lacks {', '.join(lacking)} of {robot.name}: held fixed at 0"
     return holding(numbers, lacking), (note,)
@@ -86,11 +89,11 @@ def check_robot(numbers: RobotNumbers, robot: Path, trained: RobotNumbers, model
     Names and placements of the joints must agree. Masses may differ: calibration changes them.
 
     Raises:
-        ValueError: one line that names both files.
+        ArgumentError: one line that names both files.
     """
     own, names = numbers.joint_names, trained.joint_names
     if not set(names) <= set(own):
-        raise ValueError(
+        raise ArgumentError(
             f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(names)}"
         )
     held = holding(numbers, [name for name in own if name not in names])
@@ -99,7 +102,7 @@ def check_robot(numbers: RobotNumbers, robot: Path, trained: RobotNumbers, model
     turned = np.abs(held.rotation[order] - trained.rotation).max(axis=(1, 2))
     if (moved > SAME_PLACE).any() or (turned > SAME_PLACE).any():
         joint = int(np.argmax(np.maximum(moved, turned)))
-        raise ValueError(
+        raise ArgumentError(
             f"{robot} is not the arm that {model} was trained on: {names[joint]} is "
             f"{1e3 * moved[joint]:.0f} mm from its place there; give the robot file that the model "
             "was trained with"
@@ -113,7 +116,7 @@ def check_named(robot: Path, traces: Sequence[Trace]) -> None:
     accepted.
 
     Raises:
-        ValueError: one line that names both models.
+        ArgumentError: one line that names both models.
     """
     known = r"ur(?:3|5|10|16|20|30)e?"
     name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', read_text(robot))
@@ -122,7 +125,7 @@ def check_named(robot: Path, traces: Sequence[Trace]) -> None:
     presets = {trace.meta.get("columns", "") for trace in traces}
     others = sorted(p for p in presets if re.fullmatch(known, p) and arms and p not in arms)
     if others:
-        raise ValueError(
+        raise ArgumentError(
             f"{robot.name} is the file of a {arms[0]}, the columns are those of a {others[0]}: "
             f"give the {others[0]}'s file; if the log is of a {arms[0]}, give its own --gains or a "
             "column map with its torques"
@@ -151,11 +154,11 @@ def initial_arm(
         The arm, and "torques", "gains", "preset", "payload" or "masses".
 
     Raises:
-        ValueError: not one gain per joint, or logs of different presets.
+        ArgumentError: not one gain per joint, or logs of different presets.
     """
     if is_torque(recordings[0].trace):
         if gains:
-            raise ValueError(
+            raise ArgumentError(
                 "--gains: the logs hold joint torques, by the names of their columns, and torques "
                 "need no gains; if they are motor currents, give --columns a JSON file whose "
                 "`current` lists these columns"
@@ -172,7 +175,7 @@ def initial_arm(
         scale = "preset" if scale == "gains" else scale
     _check_count(gains, numbers)
     if not gains and scale == "gains":
-        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
+        raise ArgumentError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
     begin = np.array(gains) if gains else start_gains(numbers, traces)
     return ArmModel(numbers, begin), scale
 
@@ -189,12 +192,13 @@ def known_arm(
     :func:`initial_arm`.
 
     Raises:
-        ValueError: as for :func:`initial_arm`, or torque logs with an arm calibrated on currents.
+        ArgumentError: as for :func:`initial_arm`, or torque logs with an arm calibrated on
+            currents.
     """
     arm = None if gains else load_arm(robot)
     if arm is not None:
         if is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
-            raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
+            raise ArgumentError(f"{robot.name} was calibrated on currents, the logs hold torques")
         return arm, f"those of the calibration in {robot.name}"
     if not gains:
         check_named(robot, [r.trace for r in recordings])
@@ -206,9 +210,9 @@ def known_arm(
 
 def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
     if gains and len(gains) != numbers.joints:
-        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+        raise ArgumentError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
     if gains and not (np.isfinite(gains).all() and np.all(gains)):
-        raise ValueError(f"--gains {gains}: every number must be finite and not 0")
+        raise ArgumentError(f"--gains {gains}: every number must be finite and not 0")
 
 
 # -- notes on unexplained torque -------------------------------------------------------------------
@@ -229,7 +233,7 @@ def calibration_notes(
         held: held-out residual of each log in ``logs`` [N m], (n,) each; empty: not known.
 
     Raises:
-        ValueError: so much torque is unexplained that arm, loads or logs do not fit together.
+        ArgumentError: so much torque is unexplained that arm, loads or logs do not fit together.
     """
     names, refused = list(logs), ""
     bare = [k for k, n in enumerate(names) if n in left and logs[n].load == Load()]
@@ -259,5 +263,5 @@ def calibration_notes(
     if given and doubtful:
         asked.append(f"loads given: {', '.join(given)}; are these right, and in kg?")
     if refused:
-        raise ValueError("; ".join([refused, *asked]))
+        raise ArgumentError("; ".join([refused, *asked]))
     return [*notes, *asked]

@@ -26,6 +26,7 @@ from tauguard.datasets.column_units import (
     words_of,
 )
 from tauguard.datasets.columns import ColumnMap
+from tauguard.findings import LogError
 
 #: Last words of a group's name, by the field of the map.
 WORDS = {
@@ -205,7 +206,7 @@ def recognised(
         joints: the robot's joints: columns that are named after them are theirs, in this order.
 
     Raises:
-        ValueError: columns of one kind in different units, or a time in two columns.
+        LogError: columns of one kind in different units, or a time in two columns.
     """
     found = _found(header, joints)
     times, groups, effort = found.times, found.groups, found.effort
@@ -250,11 +251,11 @@ def recognised(
 
 
 def _refuse_parts(time: str, t: Array, header: Sequence[str]) -> None:
-    """Raise ``ValueError`` if the time has whole seconds, and another column their fractions."""
+    """Raise ``LogError`` if the time has whole seconds, and another column their fractions."""
     rest = [name for name in header if (unit_of(name, SECONDS) or 1.0) < 1e-3 and name != time]
     known = t[np.isfinite(t)]
     if rest and (known == np.floor(known)).all() and (np.diff(known) == 0).any():
-        raise ValueError(
+        raise LogError(
             f"columns {time} and {rest[0]}: parts of one time, but auto reads one column; write "
             "their sum into one column of the file"
         )

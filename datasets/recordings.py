@@ -14,6 +14,7 @@ from tauguard.datasets.log_checks import checked
 from tauguard.datasets.reader import is_dataset, training_episodes
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
+from tauguard.findings import FileError
 from tauguard.traces import Trace, read_mcap, write_mcap
 from tauguard.untrusted_input import reading
 
@@ -69,14 +70,14 @@ def write_dataset(
 
     Raises:
         OSError: the folder cannot be created or written, or a worker died.
-        ValueError: an unknown checker, or a file of the episode with contacts of other checkers
+        FileError: an unknown checker, or a file of the episode with contacts of other checkers
             (nothing is overwritten).
     """
     from tauguard.contacts import registered  # here, as it takes long to import
 
     for name in checkers:
         if name not in registered():
-            raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")
+            raise FileError(f"checkers {name!r}: expected some of {', '.join(registered())}")
     folder.mkdir(parents=True, exist_ok=True)
     paths = [_place(folder, i, episode) for i, episode in enumerate(episodes)]
     missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i], checkers)]
@@ -103,7 +104,7 @@ def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
     trace = read_mcap(path)
     seen = [one.checker for one in trace.contacts]
     if seen != list(checkers):
-        raise ValueError(
+        raise FileError(
             f"{path}: holds contacts of {', '.join(seen) or 'no checker'}, not of "
             f"{', '.join(checkers) or 'no checker'}; choose another folder or remove it"
         )
@@ -122,7 +123,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         Traces with truth; ``meta["log"]`` is the file's path below the folder.
 
     Raises:
-        ValueError: no recordings there, or one without truth; the message names it.
+        FileError: no recordings there, or one without truth; the message names it.
         FileNotFoundError: no such folder.
     """
     if not folder.is_dir():
@@ -130,15 +131,15 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
     if is_dataset(folder):
         return training_episodes(folder, arm)
     if arm is not None:
-        raise ValueError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
+        raise FileError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
     paths = sorted(folder.rglob("*.mcap"))
     if not paths:
-        raise ValueError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
+        raise FileError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
     traces = []
     for path in tqdm(paths, desc="read", unit="file", disable=None, leave=False):
         trace = read_mcap(path)
         if trace.truth is None:
-            raise ValueError(f"{path}: no truth in it; only simulated recordings have it")
+            raise FileError(f"{path}: no truth in it; only simulated recordings have it")
         with reading(path):  # refuses gaps, which would count as time without an alarm
             checked(trace, lambda row: f"sample {row}")
         traces.append(replace(trace, meta={**trace.meta, "log": str(path.relative_to(folder))}))

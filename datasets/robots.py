@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tauguard.findings import FileError
 from tauguard.models import Robot, Scene, SceneSpec, compose, cura6
 
 #: Form of an arm's name in a dataset, where it is part of file names.
@@ -38,20 +39,20 @@ def find_robot(asked: str, folder: Path) -> RobotSource:
     """The arm ``asked`` (name or file) of a configuration in ``folder``.
 
     Raises:
-        ValueError: no such arm, one that cannot be used, or a file name that is not allowed.
+        FileError: no such arm, one that cannot be used, or a file name that is not allowed.
     """
     file = next((p.resolve() for p in (folder / asked, Path(asked)) if p.is_file()), None)
     source, name = (str(file), file.stem) if file else (asked, asked)
     try:
         scene = _scene(source)
     except FileNotFoundError as error:
-        raise ValueError(str(error)) from None
+        raise FileError(str(error)) from None
     if not _NAME.fullmatch(name):
-        raise ValueError(
+        raise FileError(
             f"{asked}: expected a file name of letters, digits, -, _ and dots, up to 40"
         )
     if file and name in cura6.NAMES:
-        raise ValueError(f"{asked}: expected another file name, {name} is an arm of the package")
+        raise FileError(f"{asked}: expected another file name, {name} is an arm of the package")
     return RobotSource(name, source, scene.joint_names, _digest(scene))
 
 
@@ -67,7 +68,7 @@ def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
     """Check that an arm's file has not changed since the dataset was described.
 
     Raises:
-        ValueError: the file has changed or does not exist.
+        FileError: the file has changed or does not exist.
     """
     for robot in robots:
         if robot.name != name:
@@ -75,12 +76,12 @@ def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
         try:
             same = _digest(_scene(robot.source)) == robot.sha256
         except FileNotFoundError:
-            raise ValueError(
+            raise FileError(
                 f"arm {name}: its file {robot.source} is not here; give the file that the dataset "
                 "was begun with to `tauguard inspect --episode` by --robot"
             ) from None
         if not same:
-            raise ValueError(
+            raise FileError(
                 f"arm {name}: {robot.source} is not what the dataset was begun with; restore the "
                 "file, or name another folder"
             )

@@ -29,6 +29,7 @@ from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.detectors import RobotNumbers, observe
 from tauguard.envs import Simulation, SimulationDiverged
+from tauguard.findings import FileError
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 
@@ -76,12 +77,12 @@ def make_shard(task: ShardTask) -> Done:
     """Simulate and write a shard, unless it exists and is intact.
 
     Raises:
-        ValueError: this installation or machine computes other bytes than the one that started the
+        FileError: this installation or machine computes other bytes than the one that started the
             command, or an arm's file has changed.
         OSError: the shard cannot be written.
     """
     if code() != task.code:
-        raise ValueError(
+        raise FileError(
             "a worker has other code, or rounds differently, than the command that started it: "
             "install the same versions on all machines, and use one kind of processor"
         )
@@ -119,7 +120,7 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     """The lines of one file of the manifest.
 
     Raises:
-        ValueError: the file is damaged.
+        FileError: the file is damaged.
     """
     *lines, last, end = [b""] * 2 + path.read_bytes().split(b"\n")  # at least three
     lines = lines[2:]
@@ -130,7 +131,7 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
         with contextlib.suppress(ValueError, RecursionError):
             found = [json.loads(line) for line in lines]
     if not found:
-        raise ValueError(
+        raise FileError(
             f"{path}: damaged, its checksum does not fit; the same `tauguard generate` that made "
             "the dataset makes it again"
         )

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.findings import ModelFileError
+
 #: Largest depth of nesting of a file's content.
 DEEPEST = 20
 #: Largest absolute value of a number in a file, because products of larger ones could overflow.
@@ -20,7 +22,7 @@ def encode(value: object) -> Any:
     """``value`` as dictionaries, lists, arrays, numbers and text.
 
     Raises:
-        ValueError: it contains an object of another type, which the message names.
+        ModelFileError: it contains an object of another type, which the message names.
     """
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -33,7 +35,7 @@ def encode(value: object) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         own = {field.name: encode(getattr(value, field.name)) for field in fields(value)}
         return {_TYPE: type_name(type(value)), _FIELDS: own}
-    raise ValueError(
+    raise ModelFileError(
         f"a {type(value).__name__} cannot be in a model file: expected numbers, text, arrays, "
         "tuples and frozen dataclasses of these"
     )
@@ -52,11 +54,11 @@ def decode(
         depth: depth of nesting of this content.
 
     Raises:
-        ValueError: unknown classes, missing or additional fields, numbers that are not finite or
-            out of range, or too deep nesting.
+        ModelFileError: unknown classes, missing or additional fields, numbers that are not finite
+            or out of range, or too deep nesting.
     """
     if depth > DEEPEST:
-        raise ValueError("nested too deeply")
+        raise ModelFileError("nested too deeply")
     if isinstance(content, dict) and set(content) == {_TUPLE}:
         return tuple(decode(item, known, depth + 1) for item in content[_TUPLE])
     if isinstance(content, dict):
@@ -65,17 +67,19 @@ def decode(
         given = content.get(_FIELDS, {})
         if set(given) != expected:
             different = ", ".join(sorted(set(given) ^ expected))
-            raise ValueError(f"{kind.__name__} with missing or additional fields: {different}")
+            raise ModelFileError(f"{kind.__name__} with missing or additional fields: {different}")
         return kind(**{name: decode(own, known, depth + 1) for name, own in given.items()})
     if isinstance(content, np.ndarray):
         if content.dtype.kind not in "fiub" or not (np.abs(content) <= LARGEST).all():
-            raise ValueError(f"an array with numbers that are not finite, or beyond {LARGEST:g}")
+            raise ModelFileError(
+                f"an array with numbers that are not finite, or beyond {LARGEST:g}"
+            )
         return content
     if content is None or isinstance(content, bool | int | str):
         return content
     if isinstance(content, float) and abs(content) <= LARGEST:
         return content
-    raise ValueError(f"unexpected {content!r:.40}")
+    raise ModelFileError(f"unexpected {content!r:.40}")
 
 
 def type_name(kind: type) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array, Bools, runs
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Alarm, Collision, Trace
 
 #: Default t_c [s] (Park et al. 2021; the dissertation's value).
@@ -26,17 +27,17 @@ def confirmation_samples(confirmation: float, dt: float) -> int:
     A sample stands for the interval that ends with it, so n samples last n dt. At least one.
     """
     if not (np.isfinite(confirmation) and confirmation >= 0 and dt > 0):
-        raise ValueError(f"confirmation {confirmation} s and dt {dt} s: expected >= 0 and > 0")
+        raise ArgumentError(f"confirmation {confirmation} s and dt {dt} s: expected >= 0 and > 0")
     return max(1, round(confirmation / dt))
 
 
 def confirmed(raw: ArrayLike, samples: int) -> Bools:
     """True where the last ``samples`` entries of ``raw`` are all True, shape (T,)."""
     if samples < 1:
-        raise ValueError(f"samples: {samples}, expected 1 or more")
+        raise ArgumentError(f"samples: {samples}, expected 1 or more")
     truth = np.asarray(raw, dtype=np.bool_)
     if truth.ndim != 1:
-        raise ValueError(f"raw: shape {truth.shape}, expected (T,)")
+        raise ArgumentError(f"raw: shape {truth.shape}, expected (T,)")
     index = np.arange(len(truth))
     last_false = np.maximum.accumulate(np.where(truth, -1, index))
     return np.asarray(index - last_false >= samples)
@@ -77,7 +78,9 @@ def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) ->
     """
     times, up = np.asarray(t, dtype=np.float64), np.asarray(alarm, dtype=np.bool_)
     if times.shape != up.shape or times.ndim != 1:
-        raise ValueError(f"t and alarm: shapes {times.shape} and {up.shape}, expected (T,) twice")
+        raise ArgumentError(
+            f"t and alarm: shapes {times.shape} and {up.shape}, expected (T,) twice"
+        )
     starts, after = runs(up).T
     if not len(starts):
         return ()

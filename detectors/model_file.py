@@ -25,6 +25,7 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.codec import checksum, decode, encode
 from tauguard.detectors.registry import file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
+from tauguard.findings import ModelFileError
 from tauguard.untrusted_input import check_no_device, reading
 
 #: Environment variable with the path of the key file, whose bytes are the key. A signature detects
@@ -38,7 +39,7 @@ def key_of_user() -> bytes | None:
     """The key in the file that the environment variable ``TAUGUARD_MODEL_KEY`` names.
 
     Raises:
-        ValueError: the file cannot be read, or is shorter than 16 bytes.
+        ModelFileError: the file cannot be read, or is shorter than 16 bytes.
     """
     path = os.environ.get(KEY_FILE)
     if not path:
@@ -46,9 +47,9 @@ def key_of_user() -> bytes | None:
     try:
         key = Path(path).read_bytes()
     except OSError as error:
-        raise ValueError(f"{path}: the key cannot be read ({error.strerror})") from None
+        raise ModelFileError(f"{path}: the key cannot be read ({error.strerror})") from None
     if len(key) < SHORTEST:
-        raise ValueError(f"{path}: a key of {len(key)} bytes, expected {SHORTEST} or more")
+        raise ModelFileError(f"{path}: a key of {len(key)} bytes, expected {SHORTEST} or more")
     return key
 
 
@@ -61,12 +62,12 @@ def check_signature(checksum: str, signature: object, key: bytes) -> None:
     """Refuse a content that was not signed with this key.
 
     Raises:
-        ValueError: no signature, or one with another key.
+        ModelFileError: no signature, or one with another key.
     """
     if not isinstance(signature, str):
-        raise ValueError("not signed, and a key is set: sign it by writing it with the key")
+        raise ModelFileError("not signed, and a key is set: sign it by writing it with the key")
     if not hmac.compare_digest(signed(checksum, key), signature):
-        raise ValueError("signed with another key, or changed since")
+        raise ModelFileError("signed with another key, or changed since")
 
 
 #: The version also changes if a detector computes other scores from the same content, because a
@@ -98,11 +99,11 @@ def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:
     """Write a fitted detector with its threshold; after an error, ``path`` is unchanged.
 
     Raises:
-        ValueError: a threshold that is not finite, a detector with other fields than numbers, text,
-            arrays and dataclasses of these, or a folder that cannot be written.
+        ModelFileError: a threshold that is not finite, a detector with other fields than numbers,
+            text, arrays and dataclasses of these, or a folder that cannot be written.
     """
     if not np.isfinite(alarm.threshold):
-        raise ValueError(f"threshold {alarm.threshold}: expected a finite one in a model file")
+        raise ModelFileError(f"threshold {alarm.threshold}: expected a finite one in a model file")
     write_model(path, ALARM, alarm)
 
 
@@ -110,13 +111,13 @@ def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
     """Read a file of :func:`save_model`.
 
     Raises:
-        ValueError: the file is missing, damaged, or of another kind or version (the message says
-            what to do), has numbers that no arm can have, or contains a detector that raises no
-            alarm at any impact or alarms all the time.
+        ModelFileError: the file is missing, damaged, or of another kind or version (the message
+            says what to do), has numbers that no arm can have, or contains a detector that raises
+            no alarm at any impact or alarms all the time.
     """
     alarm = read_model(path, ALARM)
     if not isinstance(alarm, CollisionAlarm):
-        raise ValueError(f"{path}: contains a {type(alarm).__name__}, not a detector; {ANEW}")
+        raise ModelFileError(f"{path}: contains a {type(alarm).__name__}, not a detector; {ANEW}")
     with reading(Path(path), ANEW), np.errstate(all="ignore"):
         check_ranges(alarm)
         check_alarms(alarm)
@@ -130,7 +131,7 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     :func:`key_of_user`.
 
     Raises:
-        ValueError: the value cannot be encoded, or the folder cannot be written.
+        ModelFileError: the value cannot be encoded, or the folder cannot be written.
     """
     content, key = encode(value), key_of_user()
     own = checksum(content)
@@ -146,32 +147,32 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     try:
         write_atomic(Path(path), _archive(container))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be written ({error.strerror})") from None
+        raise ModelFileError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def read_model(path: str | os.PathLike[str], kind: str) -> Any:
     """The value in a file of this kind.
 
     Raises:
-        ValueError: the file is missing, damaged, of another kind, format or version, or has values
-            out of range; one line that names the file.
+        ModelFileError: the file is missing, damaged, of another kind, format or version, or has
+            values out of range; one line that names the file.
     """
     container = _container(Path(path))
     version, own = container.get("version"), container.get("kind")
     if version != VERSION:
-        raise ValueError(f"{path}: version {version} of the format, expected {VERSION}; {ANEW}")
+        raise ModelFileError(f"{path}: version {version} of the format, expected {VERSION}; {ANEW}")
     if own != kind or own not in READERS:
-        raise ValueError(f"{path}: a file of the kind {own!r}, expected {kind!r}")
+        raise ModelFileError(f"{path}: a file of the kind {own!r}, expected {kind!r}")
     content, key = container.get("content"), key_of_user()
     try:
         own = checksum(content)
         if own != container.get("checksum"):
-            raise ValueError("its content does not fit its checksum: it was damaged or changed")
+            raise ModelFileError("its content does not fit its checksum: it was damaged or changed")
         if key is not None:
             check_signature(own, container.get("signature"), key)
         return READERS[kind](content)
     except (ValueError, TypeError, KeyError, AttributeError, IndexError, RecursionError) as error:
-        raise ValueError(f"{path}: {_line(error)}") from None
+        raise ModelFileError(f"{path}: {_line(error)}") from None
 
 
 def _archive(container: Mapping[str, Any]) -> bytes:
@@ -209,7 +210,7 @@ def _container(path: Path) -> Mapping[str, Any]:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+        raise ModelFileError(f"{path}: cannot be read ({error.strerror})") from None
     unknown: set[str] = set()
     try:
         with zipfile.ZipFile(path) as archive:
@@ -223,15 +224,17 @@ def _container(path: Path) -> Mapping[str, Any]:
     except Exception as error:  # a damaged archive can raise any exception
         earlier = _json_format(data)
         if earlier:
-            raise ValueError(f"{path}: of the earlier format {earlier!r}; {ANEW}") from None
-        raise ValueError(f"{path}: not a model file, or a damaged one ({_line(error)})") from None
+            raise ModelFileError(f"{path}: of the earlier format {earlier!r}; {ANEW}") from None
+        raise ModelFileError(
+            f"{path}: not a model file, or a damaged one ({_line(error)})"
+        ) from None
     if unknown:
-        raise ValueError(f"{path}: holds types that no detector needs: {', '.join(unknown)}")
+        raise ModelFileError(f"{path}: holds types that no detector needs: {', '.join(unknown)}")
     name = found.get("format") if isinstance(found, dict) else None
     if isinstance(name, str) and name.startswith(EARLIER):
-        raise ValueError(f"{path}: of the earlier format {name!r}; {ANEW}")
+        raise ModelFileError(f"{path}: of the earlier format {name!r}; {ANEW}")
     if not isinstance(found, dict) or name != FORMAT:
-        raise ValueError(f"{path}: not a model file of tauguard; {ANEW}")
+        raise ModelFileError(f"{path}: not a model file of tauguard; {ANEW}")
     return found
 
 
@@ -263,11 +266,11 @@ def _bounded(archive: zipfile.ZipFile) -> None:
     """Refuse an archive larger than :data:`LARGEST`, or an array that declares a wrong size.
 
     Raises:
-        ValueError: says which.
+        ModelFileError: says which.
     """
     total = sum(member.file_size for member in archive.infolist())
     if total > LARGEST:
-        raise ValueError(f"unpacks to {total / 2**20:.0f} MB, expected {LARGEST >> 20} at most")
+        raise ModelFileError(f"unpacks to {total / 2**20:.0f} MB, expected {LARGEST >> 20} at most")
     for member in archive.infolist():
         if member.filename.endswith(".npy"):
             with archive.open(member) as file:
@@ -284,7 +287,7 @@ def _check_array(file: Any, size: int) -> None:
     for length in shape:
         count *= int(length)
     if dtype.hasobject or count * dtype.itemsize > size:
-        raise ValueError(f"an array that declares a shape of {shape} in {size} bytes")
+        raise ModelFileError(f"an array that declares a shape of {shape} in {size} bytes")
 
 
 def _json_format(data: bytes) -> str:

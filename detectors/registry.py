@@ -13,6 +13,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.detectors.scores.detector import Detector
 
@@ -71,14 +73,14 @@ def make_detector(name: str) -> Detector:
     are also allowed in model files.
 
     Raises:
-        ValueError: no such name or class; the message lists the existing names.
+        ArgumentError: no such name or class; the message lists the existing names.
     """
     if ":" in name:
         return _of_another(name)
     if name not in DETECTORS:
         near = difflib.get_close_matches(name, DETECTORS, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ValueError(
+        raise ArgumentError(
             f"no detector {name!r}: {hint}there are {', '.join(DETECTORS)}, and module:Class"
         )
     return DETECTORS[name]()
@@ -90,11 +92,15 @@ def _of_another(name: str) -> Detector:
     try:
         made: Any = getattr(importlib.import_module(module), attribute)()
     except AttributeError:
-        raise ValueError(f"detector {name!r}: {module} has no {attribute}") from None
+        raise ArgumentError(f"detector {name!r}: {module} has no {attribute}") from None
     except TypeError as error:
-        raise ValueError(f"detector {name!r}: cannot be made without arguments ({error})") from None
+        raise ArgumentError(
+            f"detector {name!r}: cannot be made without arguments ({error})"
+        ) from None
     if not (callable(getattr(made, "fit", None)) and isinstance(getattr(made, "name", None), str)):
-        raise ValueError(f"detector {name!r}: expected a class with `name` and `fit(traces, arm)`")
+        raise ArgumentError(
+            f"detector {name!r}: expected a class with `name` and `fit(traces, arm)`"
+        )
     found: Detector = made
     return found
 
@@ -103,12 +109,12 @@ def admit(module: str) -> None:
     """Allow classes of a user's module in model files.
 
     Raises:
-        ValueError: it cannot be imported.
+        ArgumentError: it cannot be imported.
     """
     try:
         importlib.import_module(module)
     except ImportError as error:
-        raise ValueError(
+        raise ArgumentError(
             f"detector of {module!r}: it cannot be imported ({error}); install it, or name its "
             "folder in PYTHONPATH"
         ) from None
@@ -119,7 +125,7 @@ def file_type(name: str) -> type:
     """The class with this name in a model file.
 
     Raises:
-        ValueError: neither a class of tauguard nor of a module that the user has named.
+        ArgumentError: neither a class of tauguard nor of a module that the user has named.
     """
     if name in FILE_TYPES:
         ours: type = getattr(importlib.import_module(FILE_TYPES[name]), name)
@@ -128,11 +134,11 @@ def file_type(name: str) -> type:
     if module in os.environ.get(MODULES, "").split(","):
         admit(module)
     if module not in _NAMED:
-        raise ValueError(
+        raise ArgumentError(
             f"holds a {name}, which is not of tauguard: if you trust its module, name it in the "
             f"environment, export {MODULES}={module}"
         )
     kind = getattr(importlib.import_module(module), own, None)
     if not isinstance(kind, type):
-        raise ValueError(f"holds a {name}, which {module} does not have")
+        raise ArgumentError(f"holds a {name}, which {module} does not have")
     return kind

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 
@@ -13,7 +14,7 @@ def common_interval(traces: Sequence[Trace], joint_names: Sequence[str]) -> floa
     """The sample interval of training traces [s].
 
     Raises:
-        ValueError: no traces, another number of joints than the arm's, or different rates.
+        ArgumentError: no traces, another number of joints than the arm's, or different rates.
     """
     check_joints(traces, joint_names)
     dt = float(np.median([trace.dt for trace in traces]))
@@ -26,28 +27,30 @@ def check_joints(traces: Sequence[Trace], joint_names: Sequence[str]) -> None:
     """Refuse an empty list, traces of another arm and traces of fewer than two samples.
 
     Raises:
-        ValueError: says which.
+        ArgumentError: says which.
     """
     if not traces:
-        raise ValueError("no traces to train on")
+        raise ArgumentError("no traces to train on")
     for k, trace in enumerate(traces):
         if len(trace.joint_names) != len(joint_names):
-            raise ValueError(
+            raise ArgumentError(
                 f"trace {k} has {len(trace.joint_names)} joints, the robot {len(joint_names)}: "
                 f"{', '.join(joint_names)}"
             )
         if len(trace.t) < 2:
-            raise ValueError(f"trace {k} has {len(trace.t)} samples: expected 2 or more")
+            raise ArgumentError(f"trace {k} has {len(trace.t)} samples: expected 2 or more")
 
 
 def check_trace(trace: Trace, joints: int, dt: float) -> None:
     """Refuse a trace with another number of joints or another rate than the training's.
 
     Raises:
-        ValueError: names the value of the trace and that of the detector.
+        ArgumentError: names the value of the trace and that of the detector.
     """
     if len(trace.joint_names) != joints:
-        raise ValueError(f"the trace has {len(trace.joint_names)} joints, this detector {joints}")
+        raise ArgumentError(
+            f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
+        )
     check_interval("the trace", trace, dt)
 
 
@@ -55,10 +58,10 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
     """Refuse a trace whose sample interval differs from ``dt`` by a quarter or more.
 
     Raises:
-        ValueError: names ``what`` and both intervals.
+        ArgumentError: names ``what`` and both intervals.
     """
     if len(trace.t) > 1 and not same_rate(trace.dt, dt):
-        raise ValueError(
+        raise ArgumentError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
             f"{1e3 * dt:g} ms: "
             + (f"resample it to that (--resample {plain_rate(dt):g}), or " if trace.dt < dt else "")

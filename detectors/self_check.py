@@ -13,6 +13,7 @@ import numpy as np
 from tauguard.detectors.alarms.alarm import CollisionAlarm, floor_of
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Sample intervals [s] and settling times [s] that a recording of an arm can have.
@@ -30,26 +31,26 @@ def check_ranges(alarm: CollisionAlarm) -> None:
     """Refuse numbers that no arm and no recording can have.
 
     Raises:
-        ValueError: says which.
+        ArgumentError: says which.
     """
     detector, arm = alarm.detector, alarm.detector.arm
     if not INTERVALS[0] <= detector.dt <= INTERVALS[1]:
-        raise ValueError(f"dt {detector.dt:g} s: expected {INTERVALS[0]:g} to {INTERVALS[1]:g}")
+        raise ArgumentError(f"dt {detector.dt:g} s: expected {INTERVALS[0]:g} to {INTERVALS[1]:g}")
     if not 0 <= detector.settle <= LONGEST_SETTLE:
-        raise ValueError(f"settle {detector.settle:g} s: expected 0 to {LONGEST_SETTLE:g}")
+        raise ArgumentError(f"settle {detector.settle:g} s: expected 0 to {LONGEST_SETTLE:g}")
     if detector.settle / detector.dt > MOST_SAMPLES:
-        raise ValueError(
+        raise ArgumentError(
             f"settle {detector.settle:g} s of dt {detector.dt:g} s: expected {MOST_SAMPLES:g} "
             "samples at most"
         )
     size = np.abs(arm.drive_gain)
     if not ((size >= GAINS[0]) & (size <= GAINS[1])).all():
-        raise ValueError(f"drive_gain {arm.drive_gain}: expected {GAINS[0]:g} to {GAINS[1]:g}")
+        raise ArgumentError(f"drive_gain {arm.drive_gain}: expected {GAINS[0]:g} to {GAINS[1]:g}")
     mass = arm.robot.inertial[:, 0]
     if not ((mass >= -1e-9) & (mass <= HEAVIEST)).all():
-        raise ValueError(f"masses {mass} kg: expected 0 to {HEAVIEST:g}")
+        raise ArgumentError(f"masses {mass} kg: expected 0 to {HEAVIEST:g}")
     if np.abs(arm.robot.gravity).max() > GRAVITY:
-        raise ValueError(f"gravity {arm.robot.gravity} m/s^2: expected {GRAVITY:g} at most")
+        raise ArgumentError(f"gravity {arm.robot.gravity} m/s^2: expected {GRAVITY:g} at most")
 
 
 def check_alarms(alarm: CollisionAlarm) -> None:
@@ -58,7 +59,7 @@ def check_alarms(alarm: CollisionAlarm) -> None:
         A learned score and the thresholds on the residual are checked separately.
 
     Raises:
-        ValueError: says which of the two, or that a score is not a number.
+        ArgumentError: says which of the two, or that a score is not a number.
     """
     plain = floor_of(alarm)
     if alarm.floor is not None and plain is not None:
@@ -67,10 +68,10 @@ def check_alarms(alarm: CollisionAlarm) -> None:
     trace, first = standing_then_hit(alarm.detector.arm, alarm.detector.dt, alarm.settle)
     up = alarm.detect(trace).alarm
     if not up[first:].any():
-        raise ValueError(f"it raises no alarm at any impact up to {IMPACTS[-1]:g} N m")
+        raise ArgumentError(f"it raises no alarm at any impact up to {IMPACTS[-1]:g} N m")
     standing = up[(trace.t > alarm.settle + PAUSE / 2) & (np.arange(len(up)) < first)]
     if len(standing) and standing.all() and up[first:].all():
-        raise ValueError("it raises an alarm all the time while the arm stands still")
+        raise ArgumentError("it raises an alarm all the time while the arm stands still")
 
 
 def standing_then_hit(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:

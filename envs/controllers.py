@@ -5,6 +5,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models import Friction
 
 __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "friction_torque"]
@@ -23,13 +24,13 @@ def per_joint(value: ArrayLike, joints: int, name: str) -> Array:
     """The gains of n joints, shape (n,), from one number or n numbers of 0 or more.
 
     Raises:
-        ValueError: another shape, or a gain that is negative or not finite.
+        ArgumentError: another shape, or a gain that is negative or not finite.
     """
     gain = np.asarray(value, dtype=float)
     if gain.shape not in ((), (joints,)):
-        raise ValueError(f"{name}: shape {gain.shape}; expected a number or ({joints},)")
+        raise ArgumentError(f"{name}: shape {gain.shape}; expected a number or ({joints},)")
     if not (np.isfinite(gain) & (gain >= 0)).all():
-        raise ValueError(f"{name} {value!r}: expected finite gains of 0 or more")
+        raise ArgumentError(f"{name} {value!r}: expected finite gains of 0 or more")
     return np.array(np.broadcast_to(gain, (joints,)))
 
 
@@ -68,10 +69,11 @@ class GravityPD:
             bandwidth: w [rad/s]; replaces ``kp`` and ``kd``.
 
         Raises:
-            ValueError: gains of another shape, negative or not finite, or a bandwidth not above 0.
+            ArgumentError: gains of another shape, negative or not finite, or a bandwidth not above
+                0.
         """
         if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
-            raise ValueError(f"bandwidth {bandwidth}: expected rad/s above 0")
+            raise ArgumentError(f"bandwidth {bandwidth}: expected rad/s above 0")
         self.model, self._data, self.bandwidth = model, model.createData(), bandwidth
         self.kp, self.kd = per_joint(kp, model.nv, "kp"), per_joint(kd, model.nv, "kd")
 
@@ -97,10 +99,10 @@ class ComputedTorque:
         """For an arm; ``bandwidth`` is w [rad/s].
 
         Raises:
-            ValueError: a bandwidth that is not above 0.
+            ArgumentError: a bandwidth that is not above 0.
         """
         if not (np.isfinite(bandwidth) and bandwidth > 0):
-            raise ValueError(f"bandwidth {bandwidth}: expected rad/s above 0")
+            raise ArgumentError(f"bandwidth {bandwidth}: expected rad/s above 0")
         self.model, self._data = model, model.createData()
         self.bandwidth = bandwidth
 
@@ -143,11 +145,12 @@ class OperationalSpace:
             dt: time between two calls of :meth:`torque` [s]; only the integral needs it.
 
         Raises:
-            ValueError: an unknown frame (the message lists the known ones), or gains out of range.
+            ArgumentError: an unknown frame (the message lists the known ones), or gains out of
+                range.
         """
         names = [f.name for f in model.frames]
         if frame not in names:
-            raise ValueError(f"frame {frame!r}: no such frame; the model has {', '.join(names)}")
+            raise ArgumentError(f"frame {frame!r}: no such frame; the model has {', '.join(names)}")
         self.model, self._data = model, model.createData()
         self._frame = model.getFrameId(frame)
         self.stiffness = per_joint(stiffness, 6, "stiffness")
@@ -233,13 +236,13 @@ class Admittance:
                 as the largest residual of an observer without contact.
 
         Raises:
-            ValueError: gains of another shape or out of range, or a ``dt`` not above 0.
+            ArgumentError: gains of another shape or out of range, or a ``dt`` not above 0.
         """
         self.rest = np.array(q, dtype=float)
         n = len(self.rest)
         self.mass = per_joint(mass, n, "mass")
         if not (self.mass > 0).all() or not dt > 0:
-            raise ValueError(f"mass {mass!r} and dt {dt}: expected above 0")
+            raise ArgumentError(f"mass {mass!r} and dt {dt}: expected above 0")
         self.damping = per_joint(damping, n, "damping")
         self.stiffness = per_joint(stiffness, n, "stiffness")
         self.dead_band = per_joint(dead_band, n, "dead_band")

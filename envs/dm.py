@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models import load_arm
 from tauguard.models.mjcf import xml_text
 
@@ -49,7 +50,7 @@ class ArmEntity(composer.Entity):  # type: ignore[misc]
         """Build from ``arm``: ``cura6``, or an MJCF or URDF file with one serial arm.
 
         Raises:
-            ValueError: not an arm, see :func:`tauguard.models.load_arm`.
+            ArgumentError: not an arm, see :func:`tauguard.models.load_arm`.
             FileNotFoundError: no such file.
         """
         source = load_arm(arm)
@@ -119,7 +120,7 @@ def without_frames(xml: str) -> str:
         xml: text written by MuJoCo, with orientations as quaternions.
 
     Raises:
-        ValueError: an orientation in a frame is not a quaternion.
+        ArgumentError: an orientation in a frame is not a quaternion.
     """
     root = ElementTree.fromstring(xml)
     world = root.find("worldbody")
@@ -144,7 +145,7 @@ def _flatten(parent: ElementTree.Element) -> None:
 def _pose(element: ElementTree.Element) -> tuple[Array, Array]:
     for name in ("euler", "axisangle", "xyaxes", "zaxis"):
         if element.get(name) is not None:
-            raise ValueError(f"<{element.tag} {name}>: expected a quaternion inside a frame")
+            raise ArgumentError(f"<{element.tag} {name}>: expected a quaternion inside a frame")
     pos = np.array(element.get("pos", "0 0 0").split(), dtype=float)
     quat = np.array(element.get("quat", "1 0 0 0").split(), dtype=float)
     return pos, quat / np.linalg.norm(quat)
@@ -194,7 +195,7 @@ class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
             seed: seed of the first episode.
 
         Raises:
-            ValueError: ``env`` has a space of another kind.
+            ArgumentError: ``env`` has a space of another kind.
         """
         self._env, self._seed, self._over = env, seed, True
         self._observation_spec = _spec(env.observation_space, "observation")
@@ -239,6 +240,6 @@ def _spec(space: gymnasium.Space[Any], name: str) -> Any:
         return specs.BoundedArray(space.shape, space.dtype, space.low, space.high, name)
     if isinstance(space, spaces.Discrete):
         if space.start != 0:
-            raise ValueError(f"{name}: a Discrete space from {space.start}; expected one from 0")
+            raise ArgumentError(f"{name}: a Discrete space from {space.start}; expected one from 0")
         return specs.DiscreteArray(int(space.n), np.int64, name)
-    raise ValueError(f"{name}: a {type(space).__name__} space; expected Box, Discrete or Dict")
+    raise ArgumentError(f"{name}: a {type(space).__name__} space; expected Box, Discrete or Dict")

@@ -9,6 +9,7 @@ import numpy as np
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.arrays import Array
 from tauguard.extras import extra
+from tauguard.findings import ArgumentError
 
 #: Keys of ``info`` that are stored at every step.
 KEYS = ("cost", "success", "force", "limit_ratio", "tau_ext_peak")
@@ -33,17 +34,17 @@ def record_policy(
         **keywords: keywords of the environment, and ``max_episode_steps``.
 
     Raises:
-        ValueError: Minari is not installed or has a dataset of that name, or ``episodes`` is
+        ArgumentError: Minari is not installed or has a dataset of that name, or ``episodes`` is
             below 1.
     """
     try:
         import minari
     except ImportError:
-        raise ValueError(f"Minari needs {extra('export')}") from None
+        raise ArgumentError(f"Minari needs {extra('export')}") from None
     if episodes < 1:
-        raise ValueError(f"episodes {episodes}: expected 1 or more")
+        raise ArgumentError(f"episodes {episodes}: expected 1 or more")
     if dataset in minari.list_local_datasets():
-        raise ValueError(f"{dataset}: Minari has a dataset of that name; name another version")
+        raise ArgumentError(f"{dataset}: Minari has a dataset of that name; name another version")
     env = gymnasium.make(name, **keywords)
     try:  # record all episodes first, so that a stored dataset is complete
         buffers = [_episode(env, policy, number, seed + number) for number in range(episodes)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.envs import _plant
+from tauguard.findings import ArgumentError
 from tauguard.models import Drive, Scene, derive
 from tauguard.models.mujoco_library import function_address, variable_address
 
@@ -28,7 +29,7 @@ class Gains:
         step is too long for it. (For the CURA6-like arm, the inertia is that of the home pose.)
 
         Raises:
-            ValueError: the time step is too long for the stated bandwidth; the message names the
+            ArgumentError: the time step is too long for the stated bandwidth; the message names the
                 joint and what would work.
         """
         facts, model = scene.facts, scene.model
@@ -42,7 +43,7 @@ class Gains:
             w = w * min(1.0, derive.MOST_PER_STEP / mode)
         elif mode > derive.LIMIT_PER_STEP:
             dt, fraction = float(model.opt.timestep), derive.MOST_PER_STEP / mode
-            raise ValueError(
+            raise ArgumentError(
                 f"timestep {dt} s: too long for the servo of joint {names[joint]!r} at a bandwidth "
                 f"of {w[joint]:g} rad/s; expected a timestep of at most {dt * fraction:.1g} s, or "
                 f"a bandwidth of at most {w[joint] * fraction:.2g} rad/s"

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.untrusted_input import reading
 
 #: Observations are normalised and clipped to this many standard deviations, as VecNormalize does.
@@ -40,11 +41,11 @@ class MlpPolicy:
         """The action, within [-1, 1].
 
         Raises:
-            ValueError: an observation of another size.
+            ArgumentError: an observation of another size.
         """
         seen = np.asarray(observation, dtype=float)
         if seen.shape[-1] != len(self.mean):
-            raise ValueError(
+            raise ArgumentError(
                 f"observation of {seen.shape[-1]} numbers: the policy expects {len(self.mean)}; "
                 f"make the environment with the keywords of its training, {dict(self.environment)}"
             )
@@ -77,7 +78,7 @@ class MlpPolicy:
         """The policy of a file.
 
         Raises:
-            ValueError: not such a file.
+            ArgumentError: not such a file.
             FileNotFoundError: no such file.
         """
         with reading(Path(path), "expected a policy that MlpPolicy.save wrote"):
@@ -86,14 +87,14 @@ class MlpPolicy:
                 arrays = {name: np.asarray(file[name], dtype=float) for name in names}
                 environment = json.loads(str(file.get("environment", "{}")))
             if not isinstance(environment, dict):
-                raise ValueError("an environment that is no table of keywords")
+                raise ArgumentError("an environment that is no table of keywords")
             count = sum(name.startswith("weight") for name in arrays)
             weights = tuple(arrays[f"weight{k}"] for k in range(count))
             biases = tuple(arrays[f"bias{k}"] for k in range(count))
             widths = [len(arrays["mean"]), *map(len, biases)]
             shapes = [(b, a) for a, b in itertools.pairwise(widths)]
             if not count or [w.shape for w in weights] != shapes:
-                raise ValueError("layers whose shapes do not fit together")
+                raise ArgumentError("layers whose shapes do not fit together")
             return cls(arrays["mean"], arrays["deviation"], weights, biases, environment)
 
     def to_sb3(self, model: Any, normalize: Any) -> None:
@@ -104,12 +105,12 @@ class MlpPolicy:
             normalize: its ``VecNormalize``, which gets mean and variance of the observation.
 
         Raises:
-            ValueError: layers of other sizes.
+            ArgumentError: layers of other sizes.
         """
         rms, layers = normalize.obs_rms, _actor(model)
         found = [tuple(layer.weight.shape) for layer in layers]
         if found != [weight.shape for weight in self.weights]:
-            raise ValueError(f"{self}: the learner's layers have the shapes {found}")
+            raise ArgumentError(f"{self}: the learner's layers have the shapes {found}")
         for layer, weight, bias in zip(layers, self.weights, self.biases, strict=True):
             layer.weight.data[:] = layer.weight.new_tensor(weight)
             layer.bias.data[:] = layer.bias.new_tensor(bias)

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.envs.gym.vector import VectorArmEnv
+from tauguard.findings import ArgumentError
 
 #: Keys in the ``info`` of each copy.
 KEYS = ("cost", "cost_sum", "success", "force", "limit_ratio")
@@ -36,7 +37,8 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
             **keywords: keywords of the environment, ``threads`` and ``max_episode_steps``.
 
         Raises:
-            ValueError: not an environment of tauguard, or a keyword that the environment refuses.
+            ArgumentError: not an environment of tauguard, or a keyword that the environment
+                refuses.
         """
         envs = gymnasium.make_vec(
             name,
@@ -46,7 +48,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
             **keywords,
         ).unwrapped
         if not isinstance(envs, VectorArmEnv):
-            raise ValueError(f"{name}: expected an environment of tauguard")
+            raise ArgumentError(f"{name}: expected an environment of tauguard")
         self.envs, self._keys = envs, tuple(keys)
         self.render_mode = envs.render_mode
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)

@@ -8,12 +8,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.findings import ArgumentError
+
 
 def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
     """``value`` as a C-contiguous float64 array of ``shape`` (``None``: any length).
 
     Raises:
-        ValueError: the shape differs, an entry is NaN or infinite, or entries are text, complex
+        ArgumentError: the shape differs, an entry is NaN or infinite, or entries are text, complex
             or dates; the message names the argument and the first bad row.
     """
     return all_finite(name, numbers(name, value, shape))
@@ -27,11 +29,11 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArr
             raise TypeError(f"its entries are {given.dtype}")
         array = np.ascontiguousarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+        raise ArgumentError(f"{name}: not an array of numbers ({error})") from None
     fits = [want is None or have == want for have, want in zip(array.shape, shape, strict=False)]
     if array.ndim != len(shape) or not all(fits):
         wanted = ", ".join("N" if want is None else str(want) for want in shape)
-        raise ValueError(f"{name}: shape {array.shape}, expected ({wanted})")
+        raise ArgumentError(f"{name}: shape {array.shape}, expected ({wanted})")
     return array
 
 
@@ -41,7 +43,7 @@ def all_finite(name: str, array: NDArray[np.float64]) -> NDArray[np.float64]:
     if not known.all():
         bad = np.argwhere(~known)[0]
         where = f"row {bad[0]}" if array.ndim > 1 else f"index {bad[0]}"
-        raise ValueError(f"{name}: {array[tuple(bad)]} in {where}; every entry must be finite")
+        raise ArgumentError(f"{name}: {array[tuple(bad)]} in {where}; every entry must be finite")
     return array
 
 
@@ -51,23 +53,23 @@ def indices(
     """``value`` as a C-contiguous int32 array of ``shape`` with entries in ``[0, upper)``.
 
     Raises:
-        ValueError: entries that are not integers, another shape, or an index out of range (the
+        ArgumentError: entries that are not integers, another shape, or an index out of range (the
             message names its row).
     """
     array = np.asarray(value)
     if array.size == 0:
         array = array.astype(np.int32)
     if not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"{name}: dtype {array.dtype}, expected integers")
+        raise ArgumentError(f"{name}: dtype {array.dtype}, expected integers")
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
     ):
         wanted = ", ".join("N" if want is None else str(want) for want in shape)
-        raise ValueError(f"{name}: shape {array.shape}, expected ({wanted})")
+        raise ArgumentError(f"{name}: shape {array.shape}, expected ({wanted})")
     outside = (array < 0) | (array >= upper)
     if outside.any():
         bad = np.argwhere(outside)[0]
-        raise ValueError(
+        raise ArgumentError(
             f"{name}: index {array[tuple(bad)]} in row {bad[0]}, expected 0 to {upper - 1}"
         )
     return np.ascontiguousarray(array, dtype=np.int32)
@@ -120,14 +122,14 @@ def thread_count(threads: int) -> int:
     """The number of threads; 0 means all processors.
 
     Raises:
-        ValueError: ``threads`` is not an integer from 0 to 1024.
+        ArgumentError: ``threads`` is not an integer from 0 to 1024.
     """
     try:
         count = operator.index(threads)
     except TypeError:
         count = -1
     if isinstance(threads, bool) or not 0 <= count <= MOST_THREADS:
-        raise ValueError(
+        raise ArgumentError(
             f"threads: {threads!r:.40}, expected an integer from 0 (all processors) "
             f"to {MOST_THREADS}"
         )

@@ -3,6 +3,7 @@
 import importlib
 from typing import Any, Protocol
 
+from tauguard.findings import ArgumentError
 from tauguard.hard_cases.case import KINDS
 
 #: The adapters of the package: name of the library, and module and class of its adapter.
@@ -43,7 +44,7 @@ def adapters(names: tuple[str, ...] = ()) -> list[Adapter]:
     """Adapters by name of a library or by ``module:Class``; by default all installed libraries.
 
     Raises:
-        ValueError: a text that is neither a known name nor an importable class, or a class that
+        ArgumentError: a text that is neither a known name nor an importable class, or a class that
             needs arguments, has no ``name`` or has none of the methods.
     """
     if not names:
@@ -61,24 +62,24 @@ def _installed(place: str) -> Adapter | None:
 def _named(name: str) -> Adapter:
     place = BUILT_IN.get(name, name)
     if ":" not in place:
-        raise ValueError(
+        raise ArgumentError(
             f"adapter {name!r}: expected one of {', '.join(BUILT_IN)}, or module:Class"
         )
     try:
         return _make(place)
     except ModuleNotFoundError as error:
         where = "; modules are looked for in the working folder and on PYTHONPATH"
-        raise ValueError(f"adapter {name!r}: {error}{where}") from None
+        raise ArgumentError(f"adapter {name!r}: {error}{where}") from None
     except (ImportError, AttributeError, TypeError) as error:
-        raise ValueError(f"adapter {name!r}: {error}") from None
+        raise ArgumentError(f"adapter {name!r}: {error}") from None
 
 
 def _make(place: str) -> Adapter:
     module, _, attribute = place.partition(":")
     made: Any = getattr(importlib.import_module(module), attribute)()
     if not isinstance(getattr(made, "name", None), str):
-        raise ValueError(f"adapter {place!r}: it has no name")
+        raise ArgumentError(f"adapter {place!r}: it has no name")
     if not any(hasattr(made, kind) for kind in KINDS):
-        raise ValueError(f"adapter {place!r}: it has none of the methods {', '.join(KINDS)}")
+        raise ArgumentError(f"adapter {place!r}: it has none of the methods {', '.join(KINDS)}")
     adapter: Adapter = made
     return adapter

@@ -7,6 +7,7 @@ from typing import TextIO
 
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
 #: Largest length of a line [bytes].
@@ -37,7 +38,7 @@ class LineStream(Closing):
 
         Raises:
             StreamClosed: the stream has ended, or a line has no end.
-            ValueError: the first line is no sample.
+            ArgumentError: the first line is no sample.
         """
         deadline = time.monotonic() + timeout
         left = timeout
@@ -75,7 +76,7 @@ class LineStream(Closing):
                 f"currents) separated by commas, got {line[:60]!r}"
             )
             if self._lines == 1:
-                raise ValueError(wrong)
+                raise ArgumentError(wrong)
             add_event(self.events, wrong)
             values = np.full(1 + 3 * n, np.nan)
         q, qd, current = np.split(values[1:], 3)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 Rows = NDArray[np.int64]
@@ -43,20 +44,20 @@ class Fault:
     duration: float = 1.0  #: [s]
 
     def __post_init__(self) -> None:
-        """Raise ``ValueError`` for an unknown name, or a number out of range."""
+        """Raise ``ArgumentError`` for an unknown name, or a number out of range."""
         if self.name not in FAULTS:
-            raise ValueError(f"no fault {self.name!r}: there are {', '.join(FAULTS)}")
+            raise ArgumentError(f"no fault {self.name!r}: there are {', '.join(FAULTS)}")
         if not (np.isfinite(self.start) and self.start >= 0):
-            raise ValueError(f"fault {self.name}: start {self.start} s, expected 0 or more")
+            raise ArgumentError(f"fault {self.name}: start {self.start} s, expected 0 or more")
         if not self.duration > 0:
-            raise ValueError(f"fault {self.name}: lasts {self.duration} s, expected above 0")
+            raise ArgumentError(f"fault {self.name}: lasts {self.duration} s, expected above 0")
 
     @classmethod
     def parse(cls, text: str) -> Fault:
         """A fault from ``NAME@SECONDS`` or ``NAME@SECONDS+DURATION``.
 
         Raises:
-            ValueError: another form, or no such fault.
+            ArgumentError: another form, or no such fault.
         """
         name, _, times = text.partition("@")
         start, plus, duration = times.partition("+")
@@ -65,7 +66,7 @@ class Fault:
         except ValueError as error:
             if "could not convert" not in str(error):
                 raise
-            raise ValueError(
+            raise ArgumentError(
                 f"--fault {text}: expected NAME@SECONDS or NAME@SECONDS+DURATION, such as "
                 "frozen@5 or bias@5+2"
             ) from None

@@ -2,6 +2,7 @@
 
 import time
 
+from tauguard.findings import ArgumentError
 from tauguard.live.stream import Closing, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
@@ -17,7 +18,7 @@ class PlayedStream(Closing):
     def __init__(self, trace: Trace, pace: float = 1.0) -> None:
         """The clock starts at the first :meth:`read`."""
         if not pace > 0:
-            raise ValueError(f"pace: {pace}, expected above 0")
+            raise ArgumentError(f"pace: {pace}, expected above 0")
         self.trace, self.pace = trace, pace
         self.joint_names, self.rate = trace.joint_names, 1 / trace.dt
         self.events: list[str] = []

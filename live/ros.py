@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
 #: Length of the queue of unread samples; further samples are lost and counted.
@@ -20,16 +21,16 @@ def sample_of(message: Any, names: Sequence[str], arrived: int) -> Sample:
     """Convert a JointState to a sample; its joints are found by name.
 
     Raises:
-        ValueError: the message lacks a joint, velocities or efforts.
+        ArgumentError: the message lacks a joint, velocities or efforts.
     """
     order = list(message.name)
     if missing := [name for name in names if name not in order]:
-        raise ValueError(f"JointState: no {', '.join(missing)}; it has {', '.join(order)}")
+        raise ArgumentError(f"JointState: no {', '.join(missing)}; it has {', '.join(order)}")
     rows = [order.index(name) for name in names]
     signals = (message.position, message.velocity, message.effort)
     for what, signal in zip(("position", "velocity", "effort"), signals, strict=True):
         if len(signal) != len(order):
-            raise ValueError(f"JointState: {len(signal)} numbers in {what}, {len(order)} joints")
+            raise ArgumentError(f"JointState: {len(signal)} numbers in {what}, {len(order)} joints")
     stamp = message.header.stamp
     q, qd, effort = (np.array([signal[i] for i in rows], dtype=np.float64) for signal in signals)
     return Sample(stamp.sec + 1e-9 * stamp.nanosec, q, qd, effort, arrived)
@@ -44,7 +45,7 @@ class RosStream(Closing):
         rate: expected sample rate [Hz].
 
     Raises:
-        ValueError: rclpy is not installed.
+        ArgumentError: rclpy is not installed.
     """
 
     def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
@@ -56,7 +57,7 @@ class RosStream(Closing):
             qos: Any = import_module("rclpy.qos")
             kind: Any = import_module("sensor_msgs.msg").JointState
         except ImportError as error:
-            raise ValueError(
+            raise ArgumentError(
                 f"--ros {topic}: {error}; source a ROS 2 installation first, or pipe the topic "
                 "into --stdin"
             ) from None
@@ -90,7 +91,7 @@ class RosStream(Closing):
 
         Raises:
             StreamClosed: ROS has been shut down.
-            ValueError: a message without the joints, velocities or efforts.
+            ArgumentError: a message without the joints, velocities or efforts.
         """
         try:
             found = self._waiting.get(timeout=timeout)

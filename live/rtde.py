@@ -9,6 +9,8 @@ import struct
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from tauguard.findings import ArgumentError
+
 PORT = 30004
 VERSION = 2
 HEADER = struct.Struct(">HB")
@@ -48,11 +50,11 @@ def packet(kind: int, payload: bytes = b"") -> bytes:
     """Encode a packet.
 
     Raises:
-        ValueError: the payload does not fit the 16 bits of the size.
+        ArgumentError: the payload does not fit the 16 bits of the size.
     """
     size = HEADER.size + len(payload)
     if size > 0xFFFF:
-        raise ValueError(f"an RTDE packet of {size} bytes: at most 65535")
+        raise ArgumentError(f"an RTDE packet of {size} bytes: at most 65535")
     return HEADER.pack(size, kind) + payload
 
 
@@ -71,14 +73,14 @@ class PacketReader:
         """The next complete packet, or None if it has not arrived completely.
 
         Raises:
-            ValueError: the packet states a size below that of its header, so the other side does
+            ArgumentError: the packet states a size below that of its header, so the other side does
                 not speak RTDE.
         """
         if len(self._bytes) < HEADER.size:
             return None
         size, kind = HEADER.unpack_from(self._bytes)
         if size < HEADER.size:
-            raise ValueError(f"a packet of {size} bytes: this is not RTDE")
+            raise ArgumentError(f"a packet of {size} bytes: this is not RTDE")
         if len(self._bytes) < size:
             return None
         payload = bytes(self._bytes[HEADER.size : size])

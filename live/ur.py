@@ -10,6 +10,7 @@ import time
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.live import rtde
 from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 from tauguard.traces.trace import UR_JOINTS
@@ -203,14 +204,14 @@ class _Connection:
         while (found := self.packet(deadline)) is not None and time.monotonic() < deadline:
             if found.kind == kind:
                 return found.payload
-        raise ValueError("no answer to the handshake")
+        raise ArgumentError("no answer to the handshake")
 
     def packet(self, deadline: float) -> rtde.Packet | None:
         """The next packet, or None if there is none at the deadline.
 
         Raises:
             OSError: the connection is broken.
-            ValueError: the other side does not speak RTDE.
+            ArgumentError: the other side does not speak RTDE.
         """
         left = deadline - time.monotonic()
         while (found := self._reader.next()) is None:
@@ -232,10 +233,10 @@ class _Connection:
         """The numbers in a data packet: time, q, qd, currents.
 
         Raises:
-            ValueError: a packet of another recipe or size.
+            ArgumentError: a packet of another recipe or size.
         """
         if len(payload) != self._layout.size or payload[0] != self._recipe:
-            raise ValueError(
+            raise ArgumentError(
                 f"a data packet of {len(payload)} bytes, expected {self._layout.size} of recipe "
                 f"{self._recipe}"
             )

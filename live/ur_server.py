@@ -15,6 +15,7 @@ import time
 
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.live import rtde
 from tauguard.live.packets import Packets
 from tauguard.live.stream import Closing
@@ -44,7 +45,7 @@ class UrServer(Closing):
         controller: major version of the controller; 5 and up sends up to 500 samples per second.
 
     Raises:
-        ValueError: the number of joints is not six, or the port cannot be opened.
+        ArgumentError: the number of joints is not six, or the port cannot be opened.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class UrServer(Closing):
     ) -> None:
         """Open the port; :meth:`start` serves."""
         if packets.q.shape[1] != 6:
-            raise ValueError(f"{packets.q.shape[1]} joints: RTDE carries six")
+            raise ArgumentError(f"{packets.q.shape[1]} joints: RTDE carries six")
         self.packets, self.version = packets, version
         spacing = float(np.median(np.diff(packets.t))) if len(packets.t) > 1 else 0.008
         self.controller = controller or (5 if spacing < 4e-3 else 3)
@@ -67,7 +68,7 @@ class UrServer(Closing):
             self._listener.bind((HOST, port))
         except OSError as error:
             self._listener.close()
-            raise ValueError(f"port {port} on {HOST}: {error.strerror}") from None
+            raise ArgumentError(f"port {port} on {HOST}: {error.strerror}") from None
         self._listener.listen()
         self.sent = 0  #: data packets to all clients together
         self._began: float | None = None

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array, in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.models import cura6, derive
 from tauguard.models.arm_drive import (
     PRESLIDING,
@@ -139,7 +140,7 @@ def load_arm(source: str | Robot) -> Arm:
             the arm's joints (:meth:`Robot.named`). Missing numbers are derived.
 
     Raises:
-        ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
+        ArgumentError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
         FileNotFoundError: no such name or file.
     """
@@ -156,7 +157,7 @@ def load_arm(source: str | Robot) -> Arm:
         modified = max(file.stat().st_mtime_ns for file in files)
         arm = _from_file(robot, path, modified, tuple(sources.items()))
     except ValueError as error:
-        raise ValueError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
+        raise ArgumentError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
     return replace(arm, spec=arm.spec.copy())
 
 
@@ -201,7 +202,7 @@ def _by_name(robot: Robot) -> tuple[Robot, Path, dict[str, str]]:
 def _cura6(robot: Robot) -> Arm:
     name = robot.file
     if robot.joints not in (None, cura6.JOINTS):
-        raise ValueError(f"arm {name}: joints: its own six are used; leave `joints` out")
+        raise ArgumentError(f"arm {name}: joints: its own six are used; leave `joints` out")
     spec = mujoco.MjSpec.from_string(cura6.arm_xml(name))
     links = tuple(f"link{i}" for i in range(1, len(cura6.JOINTS) + 1))
     model, n, drive = spec.compile(), len(cura6.JOINTS), cura6_drive(name)
@@ -345,7 +346,7 @@ def _home(
         pose = said.row("home", np.zeros(0), "")
         bad = [j for j, q, a, b in zip(joints, pose, low, high, strict=True) if not a <= q <= b]
         if bad:
-            raise ValueError(f"home: joint {', '.join(bad)} outside its range")
+            raise ArgumentError(f"home: joint {', '.join(bad)} outside its range")
         return pose
     if file.home is not None:
         inside = (file.home >= low) & (file.home <= high)
@@ -363,7 +364,7 @@ def _tool(robot: Robot, spec: mujoco.MjSpec, file: ArmFile, said: _SourceNotes) 
         if robot.tool in sites:
             said.sources["tool"] = "given"
             return robot.tool
-        raise ValueError(
+        raise ArgumentError(
             f"tool {robot.tool!r}: no such site or body; sites: {', '.join(sites) or 'none'}"
         )
     for name in TOOL_FRAMES:

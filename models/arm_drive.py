@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.arrays import Array, Bools
+from tauguard.findings import ArgumentError
 from tauguard.models import cura6
 from tauguard.models.arm_file import ArmFile
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
@@ -127,11 +128,11 @@ def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
         lossy: joints with friction in the file, which get no more friction, shape (n,).
 
     Raises:
-        ValueError: a joint without a torque limit.
+        ArgumentError: a joint without a torque limit.
     """
     limit, current = drive.torque_limit, drive.current_limit
     if not np.isfinite(limit).all():
-        raise ValueError("drive.like: a joint has no torque limit; state torque_limit")
+        raise ArgumentError("drive.like: a joint has no torque limit; state torque_limit")
     like, stated = cura6_drive(), drive.friction
     own, ripple, sensors = like.friction, like.ripple, like.sensors
     assert own is not None

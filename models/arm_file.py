@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import FileError
 from tauguard.models.mjcf import SpecText, compiled, inline_meshes
 from tauguard.models.robot_check import checked_robot
 from tauguard.models.urdf import UrdfFile, is_urdf, max_speeds, read_urdf
@@ -74,7 +75,7 @@ def read_arm(
             a site of its name.
 
     Raises:
-        ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
+        FileError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
     """
     if is_urdf(path):
@@ -128,12 +129,12 @@ def _requested_joints(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[
         ends = entry.split("..")
         for name in ends:
             if name not in names:
-                raise ValueError(f"joints: no joint {name!r}; the file has {', '.join(names)}")
+                raise FileError(f"joints: no joint {name!r}; the file has {', '.join(names)}")
         body = spec.joint(ends[-1]).parent
         chain = set(ends[-1:])
         while ends[0] not in chain:
             if body is None or body.name == "world":
-                raise ValueError(
+                raise FileError(
                     f"joints {entry!r}: {ends[-1]} is not beyond {ends[0]} in the chain"
                 )
             chain |= {joint.name for joint in body.joints}
@@ -235,14 +236,14 @@ def _chain(
         moving = [body for body in level if any(True for _ in _joints_below(body))]
         moving = [body for body in moving if not _all_of(body, gripper)]
         if len(moving) > 1:
-            raise ValueError(_branches(moving))
+            raise FileError(_branches(moving))
         if not moving:
             break
         body = moving[0]
         if body.joints:
             joint = body.joints[0]
             if len(body.joints) > 1 or joint.type not in _KINDS:
-                raise ValueError(
+                raise FileError(
                     f"body {body.name!r}: expected one hinge or slide joint per body; name the "
                     'arm\'s joints, Robot(file, joints=("...", ...)), and the others are welded'
                 )
@@ -250,7 +251,7 @@ def _chain(
             joints.append(joint.name)
         level = list(body.bodies)
     if not links:
-        raise ValueError("no joints; expected an arm of hinge and slide joints")
+        raise FileError("no joints; expected an arm of hinge and slide joints")
     return tuple(links), tuple(joints)
 
 

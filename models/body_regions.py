@@ -9,6 +9,8 @@ risk assessment of a real workplace.
 import math
 from dataclasses import dataclass
 
+from tauguard.findings import ArgumentError
+
 #: Text to show beside a value that no open source confirmed.
 UNCONFIRMED = "verify against the standard"
 
@@ -44,7 +46,7 @@ class BodyRegion:
 
     def _reduced_mass(self, robot_mass: float) -> float:
         if not robot_mass > 0:
-            raise ValueError(f"robot_mass {robot_mass} kg: expected above 0")
+            raise ArgumentError(f"robot_mass {robot_mass} kg: expected above 0")
         if math.isinf(robot_mass):
             return self.mass
         return self.mass * robot_mass / (self.mass + robot_mass)
@@ -85,8 +87,8 @@ def body_region(name: str) -> BodyRegion:
     """The region called ``name``.
 
     Raises:
-        ValueError: no such region; the message lists them.
+        ArgumentError: no such region; the message lists them.
     """
     if name not in BODY_REGIONS:
-        raise ValueError(f"body region {name!r}: expected one of {', '.join(BODY_REGIONS)}")
+        raise ArgumentError(f"body region {name!r}: expected one of {', '.join(BODY_REGIONS)}")
     return BODY_REGIONS[name]

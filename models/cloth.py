@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.findings import ArgumentError
 from tauguard.models.checks import above_zero, not_negative
 
 Vector = tuple[float, float, float]
@@ -43,15 +44,15 @@ class Cloth:
     self_collide: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         if not (isinstance(self.count, int) and 2 <= self.count <= 200):
-            raise ValueError(f"Cloth.count {self.count}: expected a whole number from 2 to 200")
+            raise ArgumentError(f"Cloth.count {self.count}: expected a whole number from 2 to 200")
         above_zero(self, "size", "mass", "radius")
         not_negative(self, "damping")
         if self.young is not None:
             above_zero(self, "young")
         if self.pinned not in PINS:
-            raise ValueError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
+            raise ArgumentError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
 
     def pins(self) -> list[int]:
         """Indices of the fixed vertices; ``i * count + j`` is the i-th along x and j-th along y."""

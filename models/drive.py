@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, Bools, in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
 from tauguard.models.left_over import LeftOver, Player
@@ -48,11 +49,11 @@ class Friction:
     slope_velocity: Array | None = None  #: w [rad/s], shape (k,)
 
     def __post_init__(self) -> None:
-        """Check shapes and signs: ``ValueError`` names the field."""
+        """Check shapes and signs: ``ArgumentError`` names the field."""
         per_joint = tuple(f.name for f in fields(self) if f.type == "Array")
         shaped(self, (len(self.coulomb),), "one per joint", *per_joint)
         if (self.slope is None) != (self.slope_velocity is None):
-            raise ValueError("Friction.slope, slope_velocity: expected both or neither")
+            raise ArgumentError("Friction.slope, slope_velocity: expected both or neither")
         if self.slope is not None and self.slope_velocity is not None:
             shape = (len(self.coulomb), len(self.slope_velocity))
             shaped(self, shape, "joints, slopes", "slope")
@@ -61,16 +62,16 @@ class Friction:
         above_zero(self, "stribeck_velocity")
         not_negative(self, "coulomb", "bristle_stiffness", "viscous", "load")
         if not ((self.bristle_stiffness > 0) | (self.coulomb == 0)).all():
-            raise ValueError(
+            raise ArgumentError(
                 f"Friction.bristle_stiffness {self.bristle_stiffness}: expected above 0 where "
                 "there is Coulomb friction"
             )
         if not ((self.static > 0) | ((self.coulomb == 0) & (self.static == 0))).all():
-            raise ValueError("Friction.static: expected above 0 where there is Coulomb friction")
+            raise ArgumentError("Friction.static: expected above 0 where there is Coulomb friction")
         warm = self.temperature - self.reference_temperature
         for name in ("coulomb_per_kelvin", "viscous_per_kelvin"):
             if not 1 + getattr(self, name) * warm > 0:
-                raise ValueError(
+                raise ArgumentError(
                     f"Friction.temperature {self.temperature} degC: friction would be negative for "
                     f"{name} = {getattr(self, name)}; expected a temperature nearer to "
                     f"{self.reference_temperature}"
@@ -88,12 +89,12 @@ class Ripple:
     phase: Array  #: [rad], shape (n, h)
 
     def __post_init__(self) -> None:
-        """Check shapes and values: ``ValueError`` names the field."""
+        """Check shapes and values: ``ArgumentError`` names the field."""
         shape = (len(self.phase), len(self.cycles))
         shaped(self, shape, "joints, harmonics", "amplitude", "phase")
         for name in ("cycles", "amplitude", "phase"):
             if not np.isfinite(getattr(self, name)).all():
-                raise ValueError(f"Ripple.{name}: not finite")
+                raise ArgumentError(f"Ripple.{name}: not finite")
 
     def at(self, angle: Array) -> Array:
         """The series [A] at angles of the motor or joint [rad], both of shape (..., n)."""
@@ -120,12 +121,12 @@ class Sensors:
     currents and do not affect the motion."""
 
     def __post_init__(self) -> None:
-        """Check shapes and signs: ``ValueError`` names the field."""
+        """Check shapes and signs: ``ArgumentError`` names the field."""
         shaped(self, (len(self.current_noise),), "one per joint", "current_quantum")
         not_negative(self, *(f.name for f in fields(self) if f.name != "left_over"))
         joints = 0 if self.left_over is None else self.left_over.qd.shape[1]
         if self.left_over is not None and joints != len(self.current_noise):
-            raise ValueError(
+            raise ArgumentError(
                 f"Sensors.left_over: of {joints} joints, expected {len(self.current_noise)}"
             )
 
@@ -161,10 +162,10 @@ class Sensors:
             player: adds left-over errors, see :meth:`player`; it depends on earlier samples.
 
         Raises:
-            ValueError: signals whose shapes differ, or are not (T, n) of these sensors.
+            ArgumentError: signals whose shapes differ, or are not (T, n) of these sensors.
         """
         if not (q.shape == qd.shape == current.shape and q.shape[1:] == self.current_noise.shape):
-            raise ValueError(
+            raise ArgumentError(
                 f"measure: shapes {q.shape}, {qd.shape}, {current.shape}; "
                 f"expected (T, {len(self.current_noise)}) each"
             )
@@ -218,23 +219,23 @@ class Drive:
     no_load_speed: Array | None = None  #: [rad/s], above the rated speed, shape (n,)
 
     def __post_init__(self) -> None:
-        """Check shapes and signs: ``ValueError`` names the field."""
+        """Check shapes and signs: ``ArgumentError`` names the field."""
         joints = (len(self.gain),)
         if (self.rated_speed is None) != (self.no_load_speed is None):
-            raise ValueError("Drive.rated_speed, no_load_speed: expected both or neither")
+            raise ArgumentError("Drive.rated_speed, no_load_speed: expected both or neither")
         if self.rated_speed is not None and self.no_load_speed is not None:
             shaped(self, joints, "one per joint", "rated_speed", "no_load_speed")
             above_zero(self, "rated_speed")
             if not (self.no_load_speed > self.rated_speed).all():
-                raise ValueError("Drive.no_load_speed: expected above rated_speed")
+                raise ArgumentError("Drive.no_load_speed: expected above rated_speed")
         shaped(self, joints, "one per joint", "gear", "current_limit")
         if not (np.isfinite(self.gain).all() and (self.gain != 0).all()):
-            raise ValueError(f"Drive.gain {self.gain}: expected N m/A other than 0")
+            raise ArgumentError(f"Drive.gain {self.gain}: expected N m/A other than 0")
         if not (self.current_limit > 0).all():
-            raise ValueError(f"Drive.current_limit {self.current_limit}: expected above 0")
+            raise ArgumentError(f"Drive.current_limit {self.current_limit}: expected above 0")
         constant = self.electrical_time_constant
         if constant is not None and not (np.isfinite(constant) and constant > 0):
-            raise ValueError(
+            raise ArgumentError(
                 f"Drive.electrical_time_constant {constant}: expected seconds above 0, or None"
             )
         rows: dict[str, Array] = {}
@@ -246,7 +247,7 @@ class Drive:
             rows["sensors"] = self.sensors.current_noise
         for name, values in rows.items():
             if len(values) != joints[0]:
-                raise ValueError(f"Drive.{name}: of {len(values)} joints, expected {joints[0]}")
+                raise ArgumentError(f"Drive.{name}: of {len(values)} joints, expected {joints[0]}")
 
     @classmethod
     def ideal(cls, torque_limit: Array, gain: float = 10.0) -> Drive:
@@ -267,11 +268,11 @@ class Drive:
             parts: of :data:`PARTS`.
 
         Raises:
-            ValueError: another name.
+            ArgumentError: another name.
         """
         for name in parts:
             if name not in PARTS:
-                raise ValueError(f"part {name!r}: expected one of {', '.join(PARTS)}")
+                raise ArgumentError(f"part {name!r}: expected one of {', '.join(PARTS)}")
         friction = None if "friction" in parts else self.friction
         if friction is not None:
             if "stribeck" in parts:

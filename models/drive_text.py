@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors
 
 #: Version of the text; a reader refuses other versions.
@@ -34,19 +35,19 @@ def drive_of(text: str) -> Drive:
     """The drive that :func:`drive_text` wrote.
 
     Raises:
-        ValueError: the text is not of a drive, or is of another version (its number is named).
+        ArgumentError: the text is not of a drive, or is of another version (its number is named).
     """
     try:
         values: dict[str, Any] = json.loads(text)
         version = values.pop("version")
         if version != VERSION:
-            raise ValueError(f"drive: of version {version}; this tauguard reads {VERSION}")
+            raise ArgumentError(f"drive: of version {version}; this tauguard reads {VERSION}")
         for name, kind in _PARTS.items():
             if values[name] is not None:
                 values[name] = kind(**_arrays(values[name]))
         return Drive(**_arrays(values))
     except (LookupError, TypeError, AttributeError, RecursionError, json.JSONDecodeError) as error:
-        raise ValueError(f"drive: not the numbers of a drive ({error})") from None
+        raise ArgumentError(f"drive: not the numbers of a drive ({error})") from None
 
 
 def _plain(value: object) -> object:

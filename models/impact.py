@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models.scene import Scene
 
 
@@ -26,12 +27,12 @@ def reflected_mass(
         direction: n, the direction of the impact, of any length, shape (3,).
 
     Raises:
-        ValueError: a zero direction, or one in which no joint can move the point.
+        ArgumentError: a zero direction, or one in which no joint can move the point.
     """
     mass, column = _along(scene, q, body, point, direction)
     mobility = float(column @ np.linalg.solve(mass, column))
     if not mobility > 0:
-        raise ValueError(
+        raise ArgumentError(
             f"direction {np.asarray(direction).tolist()}: no joint moves body {body} along it"
         )
     return 1.0 / mobility
@@ -71,7 +72,7 @@ def _along(
     n = np.asarray(direction, dtype=float)
     length = np.linalg.norm(n)
     if n.shape != (3,) or not length > 0:
-        raise ValueError(f"direction {n.tolist()}: expected three numbers, not all zero")
+        raise ArgumentError(f"direction {n.tolist()}: expected three numbers, not all zero")
     model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[scene.qpos_adr] = q
     mujoco.mj_forward(model, data)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from tauguard.extras import extra
+from tauguard.findings import FileError
 from tauguard.models.robot import Robot
 
 #: Arms of this package, with published numbers and simple shapes.
@@ -104,7 +105,7 @@ def menagerie_file(name: str, download: bool = False) -> Path | None:
 
     Raises:
         ModuleNotFoundError: ``download`` without mujoco-menagerie.
-        ValueError: no such model, or it cannot be fetched.
+        FileError: no such model, or it cannot be fetched.
     """
     if not download and importlib.util.find_spec("mujoco_menagerie") is None:
         return None
@@ -116,4 +117,4 @@ def menagerie_file(name: str, download: bool = False) -> Path | None:
             return None
         return Path(robot.xml(robot.default_model, cache))
     except mujoco_menagerie.MenagerieError as error:
-        raise ValueError(f"mujoco-menagerie: {error}") from None
+        raise FileError(f"mujoco-menagerie: {error}") from None

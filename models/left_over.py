@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array, Bools
 from tauguard.atomic_write import write_atomic
+from tauguard.findings import ArgumentError
 from tauguard.untrusted_input import read_text, reading
 
 if TYPE_CHECKING:
@@ -65,23 +66,25 @@ class LeftOver:
     current: Array  #: reported less modelled current [A], shape (N, n)
 
     def __post_init__(self) -> None:
-        """Check shapes and values: ``ValueError`` names the field."""
+        """Check shapes and values: ``ArgumentError`` names the field."""
         rows, joints = self.current.shape
         if self.qd.shape != (rows, joints) or self.log.shape != (rows,):
-            raise ValueError(f"left_over: log, qd: expected shapes ({rows},), ({rows}, {joints})")
+            raise ArgumentError(
+                f"left_over: log, qd: expected shapes ({rows},), ({rows}, {joints})"
+            )
         if not (np.isfinite(self.qd).all() and np.isfinite(self.current).all()):
-            raise ValueError("left_over: not finite")
+            raise ArgumentError("left_over: not finite")
         if not self.rate > 0 or (np.diff(self.log) < 0).any():
-            raise ValueError("left_over: expected a rate above 0 and logs in rising order")
+            raise ArgumentError("left_over: expected a rate above 0 and logs in rising order")
         if not len(self._starts):
-            raise ValueError(f"left_over: no log is longer than {LEAST} s")
+            raise ArgumentError(f"left_over: no log is longer than {LEAST} s")
 
     @classmethod
     def read(cls, path: str | Path) -> LeftOver:
         """Read a CSV file that :meth:`write` made.
 
         Raises:
-            ValueError: the file has another form.
+            ArgumentError: the file has another form.
             FileNotFoundError: no such file.
         """
         with reading(path, "expected columns log, t, qd1, ..., error1, ..."):
@@ -89,7 +92,7 @@ class LeftOver:
             table = np.loadtxt(lines[1:], delimiter=",", ndmin=2)
             joints = lines[0].count("error")
             if joints == 0 or table.shape[1] != 2 + 2 * joints or len(table) < 2:
-                raise ValueError(f"{table.shape[1]} columns for {joints} joints")
+                raise ArgumentError(f"{table.shape[1]} columns for {joints} joints")
             rate = 1 / float(np.median(np.diff(table[:, 1])))
             log = table[:, 0].astype(np.int64)
             return cls(rate, log, table[:, 2 : 2 + joints], table[:, 2 + joints :])

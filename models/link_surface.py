@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
+from tauguard.findings import FileError
 from tauguard.models.arm_file import read_arm
 from tauguard.models.nominal import compiled
 
@@ -33,25 +34,25 @@ class LinkSurface:
     normal: Array  #: unit vector out of the link, in its frame, shape (K, 3)
 
     def __post_init__(self) -> None:
-        """Check shapes: ``ValueError`` names the field."""
+        """Check shapes: ``FileError`` names the field."""
         count = len(self.link)
         for name in ("point", "normal"):
             value = getattr(self, name)
             if value.shape != (count, 3) or not np.isfinite(value).all():
-                raise ValueError(f"{name}: shape {value.shape}, expected ({count}, 3) numbers")
+                raise FileError(f"{name}: shape {value.shape}, expected ({count}, 3) numbers")
         if count and (self.link.min() < 0 or (np.diff(self.link) < 0).any()):
-            raise ValueError("link: expected 0-based numbers in rising order")
+            raise FileError("link: expected 0-based numbers in rising order")
 
     def only(self, links: Iterable[int]) -> LinkSurface:
         """The surface of the given links only (1-based).
 
         Raises:
-            ValueError: a link has no surface in this object.
+            FileError: a link has no surface in this object.
         """
         wanted = sorted(set(links))
         there = sorted({int(i) + 1 for i in self.link})
         if not wanted or not set(wanted) <= set(there):
-            raise ValueError(f"links {wanted}: expected some of {there}")
+            raise FileError(f"links {wanted}: expected some of {there}")
         rows = np.isin(self.link + 1, wanted)
         return LinkSurface(self.link[rows], self.point[rows], self.normal[rows])
 
@@ -71,11 +72,11 @@ def link_surface(
         seed: seed of the lines.
 
     Raises:
-        ValueError: no model, or no collision geometry (``contype`` or ``conaffinity``) on any
+        FileError: no model, or no collision geometry (``contype`` or ``conaffinity``) on any
             moving link, as in a URDF without shapes.
     """
     if points < 1:
-        raise ValueError(f"points {points}: expected 1 or more")
+        raise FileError(f"points {points}: expected 1 or more")
     model = compiled(source)
     data = mujoco.MjData(model)
     data.qpos[:] = 0
@@ -93,7 +94,7 @@ def link_surface(
         normals.append(out @ frame)
         links.append(np.full(len(place), joint, dtype=np.int64))
     if not links:
-        raise ValueError(
+        raise FileError(
             "robot: no link has collision geometry, or its meshes were not found; give a model "
             "with its shapes"
         )
@@ -114,17 +115,17 @@ def arm_surface(
         points: number of points on each link.
 
     Raises:
-        ValueError: MuJoCo cannot read the robot, a joint is missing, the joints are no serial
+        FileError: MuJoCo cannot read the robot, a joint is missing, the joints are no serial
             chain, or the last link has no shape.
     """
     file = read_arm(path, joints)
     if file.joints != joints:
-        raise ValueError(
+        raise FileError(
             f"{path}: its joints, base to tip, are {', '.join(file.joints)}; expected "
             f"{', '.join(joints)}"
         )
     if file.links[-1] in file.sticks:
-        raise ValueError(
+        raise FileError(
             f"{path}: the last link, {file.links[-1]}, has no shape, or its mesh is not there"
         )
     return link_surface(file.spec, points), file.sticks

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.models.drive import Drive
 
 
@@ -30,13 +31,13 @@ class Mismatch:
     ripple: float = 0.20
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         for name in ("mass", "inertia", "gain", "coulomb", "viscous", "ripple"):
             value = getattr(self, name)
             if not 0 <= value < 0.9:
-                raise ValueError(f"Mismatch.{name} {value}: expected 0 to 0.9 (relative)")
+                raise ArgumentError(f"Mismatch.{name} {value}: expected 0 to 0.9 (relative)")
         if not 0 <= self.com < 0.1:
-            raise ValueError(f"Mismatch.com {self.com}: expected 0 to 0.1 m")
+            raise ArgumentError(f"Mismatch.com {self.com}: expected 0 to 0.1 m")
 
     def perturb_arm(self, spec: mujoco.MjSpec, links: list[str]) -> None:
         """Change the inertial numbers of the named bodies of ``spec`` in place."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from tauguard.findings import FileError
 from tauguard.models.mujoco_library import library
 from tauguard.models.urdf import coarse
 
@@ -82,7 +83,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The model of ``spec``, without its mesh geoms if it does not compile with them.
 
     Raises:
-        ValueError: it compiles neither with nor without them; the text is MuJoCo's first message.
+        FileError: it compiles neither with nor without them; the text is MuJoCo's first message.
     """
     try:
         return spec.compile()
@@ -95,7 +96,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
         try:
             return spec.compile()
         except (ValueError, RuntimeError):
-            raise ValueError(str(error)) from error
+            raise FileError(str(error)) from error
 
 
 def inline_meshes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models.robot_check import checked_robot, checked_text
 from tauguard.models.urdf import is_urdf, xml_root
 from tauguard.untrusted_input import read_text
@@ -29,7 +30,7 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
     Missing meshes of a URDF are ignored, because dynamics do not need them.
 
     Raises:
-        ValueError: MuJoCo cannot compile the text or file.
+        ArgumentError: MuJoCo cannot compile the text or file.
         FileNotFoundError: no such file.
     """
     if isinstance(source, mujoco.MjModel):
@@ -47,7 +48,7 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
             return _compiled_urdf(read_text(path))
         return mujoco.MjModel.from_xml_path(str(checked_robot(path)))
     except ValueError as error:
-        raise ValueError(f"robot: {' '.join(str(error).split())}") from None
+        raise ArgumentError(f"robot: {' '.join(str(error).split())}") from None
 
 
 def _compiled_urdf(text: str) -> mujoco.MjModel:
@@ -84,7 +85,7 @@ def _check_depth(root: ElementTree.Element) -> None:
     while level:
         level, depth = [child for one in level for child in one], depth + 1
         if depth > MOST_DEPTH:
-            raise ValueError(f"elements nested more than {MOST_DEPTH} deep")
+            raise ArgumentError(f"elements nested more than {MOST_DEPTH} deep")
 
 
 def pin_model(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> pin.Model:
@@ -94,11 +95,11 @@ def pin_model(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> pin.Model:
         source: MJCF or URDF (text or file), a spec or a compiled model, of the arm only.
 
     Raises:
-        ValueError: not a model, no joints, ball or free joints, or several joints on one body.
+        ArgumentError: not a model, no joints, ball or free joints, or several joints on one body.
     """
     m = compiled(source)
     if m.njnt == 0:
-        raise ValueError("robot: no joints; expected an arm of hinge and slide joints")
+        raise ArgumentError("robot: no joints; expected an arm of hinge and slide joints")
     data = mujoco.MjData(m)
     data.qpos[:] = 0
     mujoco.mj_kinematics(m, data)
@@ -111,7 +112,9 @@ def pin_model(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> pin.Model:
         parent = int(m.body_parentid[body])
         joint, here = joint_of[parent], offset[parent] * placed
         if m.body_jntnum[body] > 1:
-            raise ValueError(f"robot: body {m.body(body).name!r} has several joints; expected one")
+            raise ArgumentError(
+                f"robot: body {m.body(body).name!r} has several joints; expected one"
+            )
         if m.body_jntnum[body] == 1:
             joint, here = _add_joint(model, m, int(m.body_jntadr[body]), joint, here)
         joint_of[body], offset[body] = joint, here
@@ -145,7 +148,7 @@ def _add_joint(
     }
     kind = kinds.get(int(m.jnt_type[j]))
     if kind is None:
-        raise ValueError(f"robot: joint {name!r} is neither hinge nor slide")
+        raise ArgumentError(f"robot: joint {name!r} is neither hinge nor slide")
     at = model.addJoint(parent, kind(*axis), placement, name)
     model.armature[model.idx_vs[at]] = m.dof_armature[m.jnt_dofadr[j]]
     limited = bool(m.jnt_limited[j])

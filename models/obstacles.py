@@ -7,6 +7,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.models.body_regions import BodyRegion, body_region
 from tauguard.models.checks import above_zero, not_negative
 from tauguard.models.scene_objects import GROUND_BIT
@@ -27,7 +28,7 @@ class Striker:
     damping: float = 60.0  #: of its contact [N s/m]
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         above_zero(self, "radius", "mass", "stiffness")
         not_negative(self, "damping")
 
@@ -41,7 +42,7 @@ class Clamp:
     damping: float = 100.0  #: of its contact [N s/m]
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         above_zero(self, "radius", "stiffness")
         not_negative(self, "damping")
 
@@ -62,16 +63,18 @@ class BodyProxy:
     clamped: bool = False  #: fixed in place: the quasi-static case
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         body_region(self.region)
         above_zero(self, "radius")
         not_negative(self, "damping")
         for name in ("position", "direction"):
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.isfinite(value).all():
-                raise ValueError(f"BodyProxy.{name} {getattr(self, name)}: expected three numbers")
+                raise ArgumentError(
+                    f"BodyProxy.{name} {getattr(self, name)}: expected three numbers"
+                )
         if not np.any(self.direction):
-            raise ValueError("BodyProxy.direction: zero; expected a direction to slide along")
+            raise ArgumentError("BodyProxy.direction: zero; expected a direction to slide along")
 
     @property
     def limits(self) -> BodyRegion:
@@ -92,9 +95,9 @@ class Table:
     half_extents: Vector = (0.35, 0.6, 0.02)  #: [m]
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         if np.shape(self.half_extents) != (3,) or np.shape(self.position) != (3,):
-            raise ValueError("Table: position and half_extents are three numbers each [m]")
+            raise ArgumentError("Table: position and half_extents are three numbers each [m]")
         above_zero(self, "half_extents")
 
 

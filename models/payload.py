@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models.obstacles import pair_weights
 
 #: Distance of the payload's centre of mass from the flange [m].
@@ -64,12 +65,12 @@ def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: flo
         mass: [kg].
 
     Raises:
-        ValueError: a mass that is negative or not finite, or a scene without a payload body.
+        ArgumentError: a mass that is negative or not finite, or a scene without a payload body.
     """
     if body < 0:
-        raise ValueError("the scene has no payload: compose it with SceneSpec(payload=True)")
+        raise ArgumentError("the scene has no payload: compose it with SceneSpec(payload=True)")
     if not (np.isfinite(mass) and mass >= 0):
-        raise ValueError(f"payload {mass} kg: expected 0 or more")
+        raise ArgumentError(f"payload {mass} kg: expected 0 or more")
     before, solref = pair_weights(model), model.pair_solref.copy()
     load_body(model, body, mass)
     keep_stiffness(model, before, solref)

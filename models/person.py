@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from tauguard.findings import ArgumentError
 from tauguard.models.body_regions import BodyRegion, body_region
 from tauguard.models.checks import above_zero, not_negative
 
@@ -99,19 +100,19 @@ class Person:
     damping: float = 0.0  #: of the contacts [N s/m]; the standard's spring has none
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         above_zero(self, "hand_speed", "walk_speed")
         not_negative(self, "damping", "reaction_time")
         if not 1.0 <= self.stature <= 2.3:
-            raise ValueError(f"Person.stature {self.stature}: expected 1 to 2.3 m")
+            raise ArgumentError(f"Person.stature {self.stature}: expected 1 to 2.3 m")
         for name, known in (("posture", POSTURES), ("motion", MOTIONS)):
             if getattr(self, name) not in known:
-                raise ValueError(
+                raise ArgumentError(
                     f"Person.{name} {getattr(self, name)!r}: expected one of {', '.join(known)}"
                 )
         place = (*self.position, self.facing, self.floor)
         if len(place) != 4 or not np.isfinite(place).all():
-            raise ValueError("Person: position (x, y), facing and floor are finite numbers")
+            raise ArgumentError("Person: position (x, y), facing and floor are finite numbers")
 
     @property
     def seated(self) -> bool:

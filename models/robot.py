@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import FileError
 from tauguard.models.checks import check_keys
 from tauguard.untrusted_input import read_text, reading
 
@@ -31,12 +32,12 @@ class RobotRipple:
     phase: Rows  #: [rad], shape (n, h)
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the field."""
+        """Check the values: ``FileError`` names the field."""
         object.__setattr__(self, "cycles", _row(self.cycles, "cycles"))
         for name in ("amplitude", "phase"):
             rows = tuple(_row(row, name) for row in getattr(self, name))
             if any(len(row) != len(self.cycles) for row in rows):
-                raise ValueError(f"{name}: expected {len(self.cycles)} numbers per joint")
+                raise FileError(f"{name}: expected {len(self.cycles)} numbers per joint")
             object.__setattr__(self, name, rows)
 
 
@@ -54,12 +55,12 @@ class RobotSensors:
     left_over: str | None = None  #: CSV file, see :class:`tauguard.models.left_over.LeftOver`
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the field."""
+        """Check the values: ``FileError`` names the field."""
         for name in [field.name for field in fields(self) if field.name != "left_over"]:
             value = _numbers(getattr(self, name), f"drive.sensors.{name}")
             object.__setattr__(self, name, value)
             if not np.all(np.asarray(value) >= 0):
-                raise ValueError(f"drive.sensors.{name} {value}: expected 0 or more")
+                raise FileError(f"drive.sensors.{name} {value}: expected 0 or more")
 
 
 @dataclass(frozen=True)
@@ -92,11 +93,11 @@ class RobotDrive:
     is stated nowhere also gets that arm's friction (:mod:`tauguard.models.arm_drive`)."""
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the field."""
+        """Check the values: ``FileError`` names the field."""
         if self.like not in (None, "cura6"):
-            raise ValueError(f'drive.like {self.like!r}: expected "cura6"')
+            raise FileError(f'drive.like {self.like!r}: expected "cura6"')
         if self.gain is not None and self.torque_constant is not None:
-            raise ValueError("drive.gain, drive.torque_constant: give one of them")
+            raise FileError("drive.gain, drive.torque_constant: give one of them")
         if self.slope is not None:
             rows = tuple(_row(row, "drive.slope") for row in self.slope)
             object.__setattr__(self, "slope", rows)
@@ -110,13 +111,13 @@ class RobotDrive:
             object.__setattr__(self, field.name, value)
             zero = field.name in ("rotor_inertia", "coulomb", "viscous", "static", "load")
             if not np.all(np.asarray(value) >= 0 if zero else np.asarray(value) > 0):
-                raise ValueError(f"drive.{field.name} {value}: expected above 0")
+                raise FileError(f"drive.{field.name} {value}: expected above 0")
 
     def row(self, name: str, joints: int) -> Array | None:
         """A field for every joint, shape (n,), or None where it is not stated.
 
         Raises:
-            ValueError: a row of another length.
+            FileError: a row of another length.
         """
         value = getattr(self, name)
         return None if value is None else per_joint(value, joints, f"drive.{name}")
@@ -146,10 +147,10 @@ class Robot:
     source: str | None = None  #: source of the identified drive, as text
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the field and what would work."""
+        """Check the values: ``FileError`` names the field and what would work."""
         object.__setattr__(self, "file", str(self.file))
         if self.gripper not in GRIPPERS:
-            raise ValueError(f"gripper {self.gripper!r}: expected one of {', '.join(GRIPPERS)}")
+            raise FileError(f"gripper {self.gripper!r}: expected one of {', '.join(GRIPPERS)}")
         for name in ("home", "torque_limit", "max_speed", "max_acceleration", "bandwidth"):
             value = getattr(self, name)
             if value is None:
@@ -157,13 +158,13 @@ class Robot:
             value = _numbers(value, name)
             object.__setattr__(self, name, value)
             if name != "home" and not all(x > 0 for x in np.atleast_1d(value)):
-                raise ValueError(f"{name} {value}: expected above 0")
+                raise FileError(f"{name} {value}: expected above 0")
         if self.joints is not None:
             if isinstance(self.joints, str) or not all(isinstance(j, str) for j in self.joints):
-                raise ValueError(f"joints {self.joints!r}: expected a list of joint names")
+                raise FileError(f"joints {self.joints!r}: expected a list of joint names")
             object.__setattr__(self, "joints", tuple(self.joints))
         if not 0 <= self.friction_compensation <= 1:
-            raise ValueError(f"friction_compensation {self.friction_compensation}: expected 0 to 1")
+            raise FileError(f"friction_compensation {self.friction_compensation}: expected 0 to 1")
 
     @classmethod
     def named(cls, text: str) -> Robot:
@@ -178,14 +179,14 @@ class Robot:
         """The robot that a TOML file describes; ``file`` in it is relative to the file's folder.
 
         Raises:
-            ValueError: not TOML, or a key or value that a robot cannot have.
+            FileError: not TOML, or a key or value that a robot cannot have.
             FileNotFoundError: no such file.
         """
         path = Path(path)
         with reading(path):
             values: dict[str, Any] = tomllib.loads(read_text(path))
             if "file" not in values:
-                raise ValueError('no file; expected file = "arm.xml" (MJCF or URDF)')
+                raise FileError('no file; expected file = "arm.xml" (MJCF or URDF)')
             sensors = values.get("drive", {}).get("sensors", {})
             for table, name in ((values, "file"), (sensors, "left_over")):
                 beside = path.parent / str(table.get(name, ""))
@@ -221,14 +222,14 @@ def _part(kind: type, values: Mapping[str, Any], where: str) -> Any:
     try:
         return kind(**values)
     except TypeError as error:
-        raise ValueError(f"{where}: {str(error).partition('() ')[2]}") from None
+        raise FileError(f"{where}: {str(error).partition('() ')[2]}") from None
 
 
 def bodies_file(path: Path) -> Path:
     """The URDF or MJCF file of a robot: of a TOML description, of an arm by name, else ``path``.
 
     Raises:
-        ValueError: a TOML file that describes no robot, or one whose ``file`` is not there.
+        FileError: a TOML file that describes no robot, or one whose ``file`` is not there.
         FileNotFoundError: no such file, or the model of a known arm is in no installed package.
     """
     from tauguard.models.known_robots import find_file, known_names
@@ -239,7 +240,7 @@ def bodies_file(path: Path) -> Path:
         return path
     bodies = Path(Robot.from_toml(path).file)
     if not bodies.is_file():
-        raise ValueError(f"{path}: file {str(bodies)!r}: no such file")
+        raise FileError(f"{path}: file {str(bodies)!r}: no such file")
     return bodies
 
 
@@ -247,9 +248,9 @@ def _numbers(value: Any, name: str) -> float | Numbers:
     try:
         rows = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} {value!r}: expected a number or one per joint") from None
+        raise FileError(f"{name} {value!r}: expected a number or one per joint") from None
     if rows.ndim > 1 or not np.isfinite(rows).all():
-        raise ValueError(f"{name} {value!r}: expected finite numbers, one or one per joint")
+        raise FileError(f"{name} {value!r}: expected finite numbers, one or one per joint")
     return float(rows) if rows.ndim == 0 else tuple(rows.tolist())
 
 
@@ -261,9 +262,9 @@ def per_joint(value: float | Numbers, joints: int, name: str) -> Array:
     """A number for each joint, shape (n,).
 
     Raises:
-        ValueError: a row of another length.
+        FileError: a row of another length.
     """
     rows = np.asarray(value, dtype=float)
     if rows.shape not in ((), (joints,)):
-        raise ValueError(f"{name}: {rows.size} numbers, expected one or {joints}, one per joint")
+        raise FileError(f"{name}: {rows.size} numbers, expected one or {joints}, one per joint")
     return np.array(np.broadcast_to(rows, (joints,)))

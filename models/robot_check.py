@@ -18,6 +18,7 @@ from itertools import product
 from pathlib import Path
 from select import select
 
+from tauguard.findings import ArgumentError
 from tauguard.untrusted_input import read_text, reading
 
 #: Limits of one trial: memory beyond that of the loaded MuJoCo [bytes], and time [s].
@@ -175,8 +176,8 @@ def checked_robot(path: Path) -> Path:
     A file that MuJoCo merely refuses passes, because its later compilation reports the reason.
 
     Raises:
-        ValueError: a file outside the robot's folder is named, or MuJoCo crashes or needs more than
-            1 GiB, 3 s of processor time or 10 s.
+        ArgumentError: a file outside the robot's folder is named, or MuJoCo crashes or needs more
+            than 1 GiB, 3 s of processor time or 10 s.
         OSError: cannot be read.
     """
     stamp = os.stat(path)
@@ -188,7 +189,7 @@ def checked_text(text: str) -> str:
     """Check that the ``text`` of a robot does not crash MuJoCo; returns it.
 
     Raises:
-        ValueError: as for :func:`checked_robot`.
+        ArgumentError: as for :func:`checked_robot`.
     """
     _check_text(text)
     return text
@@ -198,7 +199,7 @@ def checked_text(text: str) -> str:
 def _check_text(text: str) -> None:
     wrong = TRIAL.of(text=text)
     if wrong:
-        raise ValueError(wrong)
+        raise ArgumentError(wrong)
 
 
 @lru_cache(maxsize=256)
@@ -206,7 +207,7 @@ def _check(path: str, mtime: int, size: int) -> None:
     _check_names(Path(path))
     wrong = TRIAL.of(path=path)
     if wrong:
-        raise ValueError(f"{path}: {wrong}")
+        raise ArgumentError(f"{path}: {wrong}")
 
 
 def _check_names(path: Path) -> None:
@@ -218,7 +219,7 @@ def _check_names(path: Path) -> None:
             continue
         seen.add(one)
         if len(seen) > MOST_INCLUDES:
-            raise ValueError(f"{path}: more than {MOST_INCLUDES} files include one another")
+            raise ArgumentError(f"{path}: more than {MOST_INCLUDES} files include one another")
         with reading(one, "expected the XML of a robot"):
             root = ElementTree.fromstring(read_text(one))
         dirs = [folder]
@@ -237,5 +238,5 @@ def _check_names(path: Path) -> None:
 def _inside(robot: Path, folder: Path, where: Path, name: str) -> Path:
     target = (where / name.replace("\\", "/")).resolve()  # both separate folders in MuJoCo
     if not target.is_relative_to(folder):
-        raise ValueError(f"{robot}: names {name!r}, a file outside its folder {folder}")
+        raise ArgumentError(f"{robot}: names {name!r}, a file outside its folder {folder}")
     return target

@@ -8,6 +8,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.atomic_write import write_atomic
+from tauguard.findings import FileError
 from tauguard.models.robot_check import checked_robot
 from tauguard.models.urdf import xml_root
 from tauguard.untrusted_input import read_text
@@ -30,7 +31,7 @@ def write_robot_file(
         note: any text; :func:`read_note` finds it again.
 
     Raises:
-        ValueError: not XML, not a robot, or without one of the joints.
+        FileError: not XML, not a robot, or without one of the joints.
         OSError: cannot be read or written.
     """
     root = _root(source)
@@ -45,7 +46,7 @@ def read_note(source: str | Path) -> str | None:
     """The note in a robot file, None if it has none.
 
     Raises:
-        ValueError: not XML.
+        FileError: not XML.
         OSError: cannot be read.
     """
     root = _root(source)
@@ -61,7 +62,7 @@ def _root(source: str | Path) -> ElementTree.Element:
     try:
         return xml_root(read_text(source))
     except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
+        raise FileError(f"{source}: {error}") from None
 
 
 def _about_centre(numbers: Array) -> tuple[float, Array, Array]:
@@ -98,7 +99,7 @@ def _urdf(root: ElementTree.Element, joints: tuple[str, ...], inertial: Array, n
 
     for name, numbers in zip(joints, inertial, strict=True):
         if name not in by_name:
-            raise ValueError(f"the robot file has no joint {name!r}")
+            raise FileError(f"the robot file has no joint {name!r}")
         link = _end(by_name[name], "child")
         strip(link)
         mass, centre, inertia = _about_centre(numbers)
@@ -128,7 +129,7 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
     try:
         spec = mujoco.MjSpec.from_file(str(checked_robot(Path(source))))
     except ValueError as error:
-        raise ValueError(f"{source}: {' '.join(str(error).split())}") from None
+        raise FileError(f"{source}: {' '.join(str(error).split())}") from None
     held = {str(joint.name) for joint in spec.joints} - set(joints)
     if held:
         spec.compile()
@@ -136,7 +137,7 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
     for name, numbers in zip(joints, inertial, strict=True):
         joint = spec.joint(name)
         if joint is None:
-            raise ValueError(f"the robot file has no joint {name!r}")
+            raise FileError(f"the robot file has no joint {name!r}")
         body = joint.parent
         mass, centre, inertia = _about_centre(numbers)
         for fixed in _welded(body):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.models.arm import NAMED, Arm, Facts, described_robot, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
@@ -70,18 +71,18 @@ class SceneSpec:
     """The nominal drive; default: the arm's own, see :class:`tauguard.models.arm.Facts`."""
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is out of range."""
+        """Check the values: ``ArgumentError`` names the one that is out of range."""
         if not 0 < self.timestep <= 0.02:
-            raise ValueError(f"timestep {self.timestep}: expected seconds above 0, at most 0.02")
+            raise ArgumentError(f"timestep {self.timestep}: expected seconds above 0, at most 0.02")
         if np.shape(self.gravity) != (3,) or not np.isfinite(self.gravity).all():
-            raise ValueError(f"gravity {self.gravity}: expected three numbers [m/s^2]")
+            raise ArgumentError(f"gravity {self.gravity}: expected three numbers [m/s^2]")
         if self.integrator not in INTEGRATORS:
-            raise ValueError(
+            raise ArgumentError(
                 f"integrator {self.integrator!r}: expected one of {', '.join(INTEGRATORS)}"
             )
         elastic = self.cloth is not None and self.cloth.young is not None
         if elastic and self.integrator != "discrete":
-            raise ValueError(
+            raise ArgumentError(
                 f"integrator {self.integrator!r}: a cloth with young= needs 'discrete'"
             )
         if self.base_pose is not None:
@@ -147,7 +148,7 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
             bits; ``Scene.xml`` always has them.
 
     Raises:
-        ValueError: an arm that cannot be used, see :func:`tauguard.models.arm.load_arm`.
+        ArgumentError: an arm that cannot be used, see :func:`tauguard.models.arm.load_arm`.
         FileNotFoundError: no such arm.
     """
     arm = load_arm(spec.arm)
@@ -236,7 +237,7 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
         obstacles["clamp"] = spec.clamp
     for proxy in spec.proxies:
         if proxy.region in obstacles:
-            raise ValueError(f"proxies: {proxy.region} twice; expected each body region once")
+            raise ArgumentError(f"proxies: {proxy.region} twice; expected each body region once")
         obstacles[proxy.region] = proxy
     for name, obstacle in obstacles.items():
         add_obstacle(whole, obstacle, name)
@@ -245,7 +246,7 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     taken |= {f"link{i + 1}" for i in range(len(arm.links))}
     for obj in spec.objects:
         if obj.name in taken:
-            raise ValueError(
+            raise ArgumentError(
                 f"object {obj.name}: the scene has a part of this name; choose another name"
             )
         taken.add(obj.name)
@@ -297,7 +298,7 @@ def _drive(spec: SceneSpec, arm: Arm) -> Drive:
     if drive is None:
         drive = arm.facts.drive
     if len(drive.gain) != len(arm.joints):
-        raise ValueError(
+        raise ArgumentError(
             f"drive: of {len(drive.gain)} joints, but the arm has {len(arm.joints)}: "
             f"{', '.join(arm.joints)}"
         )

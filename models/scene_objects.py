@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array, in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.models.checks import above_zero, check_keys, not_negative, vector
 from tauguard.models.mjcf import inline_meshes, xml_text
 from tauguard.untrusted_input import read_text, reading
@@ -49,20 +50,20 @@ class Shape:
     rgba: tuple[float, ...] = _COLOUR
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is wrong."""
+        """Check the values: ``ArgumentError`` names the one that is wrong."""
         if self.kind not in SHAPES:
-            raise ValueError(f"shape {self.kind!r}: expected one of {', '.join(SHAPES)}")
+            raise ArgumentError(f"shape {self.kind!r}: expected one of {', '.join(SHAPES)}")
         object.__setattr__(self, "size", tuple(np.atleast_1d(self.size).tolist()))
         for name, size in (("position", 3), ("quat_wxyz", 4), ("rgba", 4)):
             object.__setattr__(self, name, vector(self, name, size))
         object.__setattr__(self, "quat_wxyz", _unit(self.quat_wxyz, self.kind))
         if len(self.size) != SHAPES[self.kind] or not all(LEAST < s < MOST for s in self.size):
-            raise ValueError(
+            raise ArgumentError(
                 f"{self.kind} size {self.size}: expected {SHAPES[self.kind]} numbers between "
                 f"{LEAST} and {MOST} [m]"
             )
         if self.kind == "mesh" and not Path(self.file).is_file():
-            raise ValueError(f"mesh {self.file!r}: no such file")
+            raise ArgumentError(f"mesh {self.file!r}: no such file")
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class SceneObject:
     transient_limit: float | None = None  #: largest force of an impact without a cost [N]
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names the one that is wrong."""
+        """Check the values: ``ArgumentError`` names the one that is wrong."""
         shapes = tuple(s if isinstance(s, Shape) else Shape(**s) for s in self.shapes)
         object.__setattr__(self, "shapes", shapes)
         object.__setattr__(self, "position", vector(self, "position", 3))
@@ -105,11 +106,11 @@ class SceneObject:
         path = tuple(tuple(map(float, row)) for row in self.path)
         object.__setattr__(self, "path", path)
         if not self.name.isidentifier():
-            raise ValueError(f"object {self.name!r}: expected a name of letters, digits and _")
+            raise ArgumentError(f"object {self.name!r}: expected a name of letters, digits and _")
         if bool(shapes) == bool(self.mjcf):
-            raise ValueError(f"object {self.name}: expected either shapes or mjcf")
+            raise ArgumentError(f"object {self.name}: expected either shapes or mjcf")
         if self.motion not in MOTIONS:
-            raise ValueError(
+            raise ArgumentError(
                 f"object {self.name}: motion {self.motion!r}; expected one of {', '.join(MOTIONS)}"
             )
         above_zero(self, "mass", "stiffness")
@@ -120,21 +121,21 @@ class SceneObject:
         if self.belt is not None:
             object.__setattr__(self, "belt", vector(self, "belt", 3))
             if self.motion != "fixed" or path or not any(self.belt):
-                raise ValueError(
+                raise ArgumentError(
                     f"object {self.name}: belt {self.belt}: expected motion 'fixed', no path, and "
                     "a velocity that is not zero"
                 )
         if path:
             if not np.isfinite(path).all():
-                raise ValueError(f"object {self.name}: path: expected finite numbers")
+                raise ArgumentError(f"object {self.name}: path: expected finite numbers")
             times = [row[0] for row in path]
             if self.motion != "fixed" or any(len(row) != 4 for row in path) or len(path) < 2:
-                raise ValueError(
+                raise ArgumentError(
                     f"object {self.name}: path: expected motion 'fixed' and two or more rows of "
                     "time, x, y, z"
                 )
             if times[0] != 0 or any(b <= a for a, b in itertools.pairwise(times)):
-                raise ValueError(f"object {self.name}: path: expected times that grow from 0 on")
+                raise ArgumentError(f"object {self.name}: path: expected times that grow from 0 on")
             object.__setattr__(self, "position", path[0][1:])
 
     @property
@@ -160,7 +161,7 @@ class SceneObject:
 def _unit(quat: tuple[float, ...], name: str) -> Quat:
     size = float(np.linalg.norm(quat))
     if not size > 0:
-        raise ValueError(f"{name}: quat_wxyz {quat}: expected a quaternion that is not zero")
+        raise ArgumentError(f"{name}: quat_wxyz {quat}: expected a quaternion that is not zero")
     w, x, y, z = (c / size for c in quat)
     return w, x, y, z
 
@@ -175,13 +176,13 @@ def _text(mjcf: Any, name: str) -> str:
         elif hasattr(mjcf, "to_xml_string"):  # dm_control's
             spec = mujoco.MjSpec.from_string(mjcf.to_xml_string(), assets=mjcf.get_assets())
         elif not Path(mjcf).is_file():
-            raise ValueError(f"mjcf {str(mjcf)!r}: no such file, and no MJCF text")
+            raise ArgumentError(f"mjcf {str(mjcf)!r}: no such file, and no MJCF text")
         else:
             spec = mujoco.MjSpec.from_file(str(mjcf))
         inline_meshes(spec, spec.compile())
         spec.compile()
     except ValueError as error:
-        raise ValueError(f"object {name}: {' '.join(str(error).split())}") from None
+        raise ArgumentError(f"object {name}: {' '.join(str(error).split())}") from None
     return xml_text(spec)
 
 
@@ -191,7 +192,7 @@ def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
     Files that it names are relative to its folder.
 
     Raises:
-        ValueError: not TOML, or a key or value that an object cannot have.
+        ArgumentError: not TOML, or a key or value that an object cannot have.
         FileNotFoundError: no such file.
     """
     path = Path(path)
@@ -200,7 +201,7 @@ def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
     with reading(path):
         rows = tomllib.loads(read_text(path)).get("object", [])
         if not rows:
-            raise ValueError("no objects; expected tables [[object]]")
+            raise ArgumentError("no objects; expected tables [[object]]")
         return tuple(_from_mapping(row, path.parent) for row in rows)
 
 
@@ -266,14 +267,14 @@ def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: SceneObject) -> list[m
         try:
             child = mujoco.MjSpec.from_string(obj.mjcf)
         except ValueError as error:
-            raise ValueError(f"object {obj.name}: {' '.join(str(error).split())}") from None
+            raise ArgumentError(f"object {obj.name}: {' '.join(str(error).split())}") from None
         spec.attach(child, frame=body.add_frame(), prefix=f"{obj.name}_")
     else:
         for k, shape in enumerate(obj.shapes):
             _add_shape(spec, body, shape, f"{obj.name}_{k}")
     geoms = [geom for part in _below(body) for geom in part.geoms]
     if not geoms:
-        raise ValueError(f"object {obj.name}: no geoms; expected something that can be touched")
+        raise ArgumentError(f"object {obj.name}: no geoms; expected something that can be touched")
     for k, geom in enumerate(geoms):
         geom.name = f"{obj.name}_{k}"
     return geoms
@@ -283,7 +284,7 @@ def check_apart(model: mujoco.MjModel, objects: tuple[SceneObject, ...]) -> None
     """Check that free objects overlap nothing at the beginning.
 
     Raises:
-        ValueError: an overlap exceeds :data:`RESTING`; the message has both names.
+        ArgumentError: an overlap exceeds :data:`RESTING`; the message has both names.
     """
     free = {obj.name for obj in objects if obj.motion == "free"}
     if not free:
@@ -294,7 +295,7 @@ def check_apart(model: mujoco.MjModel, objects: tuple[SceneObject, ...]) -> None
         names = [_owner(model, int(geom), parts) for geom in contact.geom]
         if contact.dist < -RESTING and names[0] != names[1] and free & set(names):
             first, second = sorted(names, key=lambda name: name not in free)
-            raise ValueError(
+            raise ArgumentError(
                 f"objects: {first} is {-1000 * contact.dist:.0f} mm inside {second}; expected free "
                 "objects that overlap nothing"
             )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import FileError
 from tauguard.models.robot_check import checked_text
 
 MOST_BYTES = 1 << 27  # largest size of a mesh file
@@ -51,12 +52,12 @@ def xml_root(text: str) -> ElementTree.Element:
     """The root of a robot's XML; namespace prefixes become part of the names.
 
     Raises:
-        ValueError: not XML.
+        FileError: not XML.
     """
     try:
         return ElementTree.fromstring(_PREFIX.sub(r"\1\2_", text))
     except ElementTree.ParseError as error:
-        raise ValueError(f"not well-formed XML ({error})") from None
+        raise FileError(f"not well-formed XML ({error})") from None
 
 
 def max_speeds(path: Path) -> dict[str, float]:
@@ -79,7 +80,7 @@ def read_urdf(path: Path) -> UrdfFile:
     """The spec of a URDF, with every mesh that exists and can be read.
 
     Raises:
-        ValueError: not a robot that MuJoCo can read.
+        FileError: not a robot that MuJoCo can read.
     """
     root = xml_root(path.read_text(errors="replace"))
     found, meshes = UrdfFile(mended=mend_inertias(root)), dict[str, Mesh]()
@@ -130,11 +131,11 @@ def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
     """The mesh of a shape; a visual one is simplified, and gives its colour to the shape.
 
     Raises:
-        ValueError: the file cannot be used; the message leaves out its name.
+        FileError: the file cannot be used; the message leaves out its name.
     """
     source = _find(urdf, name)
     if source is None:
-        raise ValueError("is not there")
+        raise FileError("is not there")
     vertices, faces, colour = load_mesh(source)
     if shape.tag == "visual":
         vertices, faces = coarse(vertices, faces)
@@ -162,17 +163,17 @@ def load_mesh(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
     """Vertices [m], shape (V, 3), triangles, shape (F, 3), and colour, shape (4,), of a file.
 
     Raises:
-        ValueError: it cannot be read, or has no triangles; the message leaves out its name.
+        FileError: it cannot be read, or has no triangles; the message leaves out its name.
     """
     if source.stat().st_size > MOST_BYTES:
-        raise ValueError(f"is larger than {MOST_BYTES >> 20} MB")
+        raise FileError(f"is larger than {MOST_BYTES >> 20} MB")
     try:
         read = _load_msh if source.suffix.lower() == ".msh" else _load_any
         vertices, faces, colour = read(source)
     except Exception as error:  # readers of meshes raise exceptions of many types
-        raise ValueError(f"cannot be read ({' '.join(str(error).split())[:80]})") from None
+        raise FileError(f"cannot be read ({' '.join(str(error).split())[:80]})") from None
     if len(faces) == 0 or not np.isfinite(vertices).all():
-        raise ValueError("has no triangles, or vertices that are not finite")
+        raise FileError("has no triangles, or vertices that are not finite")
     return vertices, faces, colour
 
 
@@ -224,7 +225,7 @@ def _hull(vertices: Array) -> Mesh:
     """The convex hull, at least :data:`FLATTEST` of its length thick.
 
     Raises:
-        ValueError: the points do not span a body.
+        FileError: the points do not span a body.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -236,7 +237,7 @@ def _hull(vertices: Array) -> Mesh:
     try:
         hull = ConvexHull(vertices)
     except QhullError:
-        raise ValueError("spans no body") from None
+        raise FileError("spans no body") from None
     used, faces = np.unique(hull.simplices, return_inverse=True)
     faces = faces.reshape(-1, 3)
     points = vertices[used]
@@ -270,7 +271,7 @@ def mend_inertias(root: ElementTree.Element) -> tuple[str, ...]:
     moments become those of a ball.
 
     Raises:
-        ValueError: a mass or moment that is no number.
+        FileError: a mass or moment that is no number.
     """
     mended = []
     for link in root.findall("link"):
@@ -316,5 +317,5 @@ def _number(element: ElementTree.Element, key: str, link: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise ValueError(f"link {link!r}: {element.tag} {key} {text!r}: expected a number")
+        raise FileError(f"link {link!r}: {element.tag} {key} {text!r}: expected a number")
     return value

@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.replay.robot import bodies, sheets
 from tauguard.replay.rrd import (
     COLOURS,
@@ -54,7 +55,7 @@ def write_contacts_rrd(
         notes: Times [s] and texts, such as disagreements.
 
     Raises:
-        ValueError: an empty run, or arrays that do not fit the model.
+        ArgumentError: an empty run, or arrays that do not fit the model.
         OSError: the folder cannot be written.
     """
     from scipy.spatial.transform import Rotation
@@ -69,9 +70,9 @@ def write_contacts_rrd(
         shapes["vertices"] = (given, (len(t), model.nflexvert, 3))
     for name, (value, shape) in shapes.items():
         if np.shape(value) != shape:
-            raise ValueError(f"{name}: shape {np.shape(value)}, expected {shape}")
+            raise ArgumentError(f"{name}: shape {np.shape(value)}, expected {shape}")
     if len(t) == 0:
-        raise ValueError("t: empty, nothing to show")
+        raise ArgumentError("t: empty, nothing to show")
     with written(path, "tauguard_contacts") as recording:
         lay_out(recording, _blueprint(_eye(marks or {}, positions, vertices)))
         shown = bodies(model)

@@ -10,6 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.arrays import Array
     from tauguard.detectors import CollisionAlarm, Matching
@@ -94,10 +96,10 @@ class EventFolder:
             alarm: the detector, for its confirmation time (default: a confirmation time of 0).
 
         Raises:
-            ValueError: the folder contains other files.
+            ArgumentError: the folder contains other files.
         """
         if folder.exists() and (not folder.is_dir() or not all(map(_own, folder.iterdir()))):
-            raise ValueError(f"{folder}: holds other files; give --events a new folder")
+            raise ArgumentError(f"{folder}: holds other files; give --events a new folder")
         folder.mkdir(parents=True, exist_ok=True)
         for old in filter(_own, folder.iterdir()):
             old.unlink()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.traces import Detection, Trace
 
 if TYPE_CHECKING:
@@ -24,12 +25,12 @@ def plot(trace: Trace, detection: Detection | None = None) -> Figure:
         detection: a detector's output for it.
 
     Raises:
-        ValueError: a detection of another recording.
+        ArgumentError: a detection of another recording.
     """
     from matplotlib.figure import Figure
 
     if detection is not None and len(detection.t) != len(trace.t):
-        raise ValueError(f"detection: {len(detection.t)} samples, the trace has {len(trace.t)}")
+        raise ArgumentError(f"detection: {len(detection.t)} samples, the trace has {len(trace.t)}")
     rows: list[tuple[str, Array]] = [
         ("position [rad]", trace.q),
         ("current [A]", trace.current),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import FileError
 from tauguard.models.cloth import flex_elements
 
 LARGEST_SHOWN_GROUP = 2  # in MuJoCo's viewer and the menagerie, group 3 holds collision geoms
@@ -39,7 +40,7 @@ def load_model(source: Any) -> Any:
     A URDF whose meshes are missing is drawn as sticks between its joints.
 
     Raises:
-        ValueError: the file or text is no valid model, or needs too much time or memory (see
+        FileError: the file or text is no valid model, or needs too much time or memory (see
             :func:`tauguard.models.robot_check.checked_robot`); one line.
         OSError: the file is missing.
     """
@@ -60,17 +61,17 @@ def load_model(source: Any) -> Any:
         else:
             checked_robot(Path(source))
     except ValueError as error:
-        raise ValueError(f"{name}: {error}" if is_text else str(error)) from error
+        raise FileError(f"{name}: {error}" if is_text else str(error)) from error
     try:
         parse = mujoco.MjSpec.from_string if is_text else mujoco.MjSpec.from_file
         spec = parse(str(source))
     except (ValueError, RuntimeError) as error:
-        raise ValueError(f"{name}: no MJCF or URDF: {error}") from error
+        raise FileError(f"{name}: no MJCF or URDF: {error}") from error
     spec.compiler.discardvisual = False
     try:
         return compiled(spec)
     except ValueError as error:
-        raise ValueError(f"{name}: {error}") from error
+        raise FileError(f"{name}: {error}") from error
 
 
 def bodies(model: Any) -> list[Body]:
@@ -193,21 +194,21 @@ def motion(model: Any, joint_names: Sequence[str], q: Array) -> Motion:
     Joints of the model that are not in ``joint_names`` keep the model's initial position.
 
     Raises:
-        ValueError: a joint that the model lacks, or that is not a hinge or a slide.
+        FileError: a joint that the model lacks, or that is not a hinge or a slide.
     """
     import mujoco
 
     known = {model.joint(i).name: i for i in range(model.njnt)}
     missing = [name for name in joint_names if name not in known]
     if missing:
-        raise ValueError(
+        raise FileError(
             f"joint {missing[0]!r} is not in the model; its joints: {', '.join(known) or 'none'}"
         )
     joints = [known[name] for name in joint_names]
     single = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
     for name, joint in zip(joint_names, joints, strict=True):
         if int(model.jnt_type[joint]) not in single:
-            raise ValueError(f"joint {name!r}: expected a hinge or a slide")
+            raise FileError(f"joint {name!r}: expected a hinge or a slide")
     address = model.jnt_qposadr[joints]
     data = mujoco.MjData(model)
     positions = np.empty((len(q), model.nbody, 3))

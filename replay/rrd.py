@@ -15,6 +15,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.replay.estimates import arrow, arrows, during
 from tauguard.replay.plot import SCORE_TOP
 from tauguard.replay.robot import Body, Motion, bodies, load_model, motion
@@ -72,16 +73,16 @@ def write_rrd(
         about: a line above the text with the reason for showing the recording.
 
     Raises:
-        ValueError: no model, a model without the trace's joints, an empty trace.
+        ArgumentError: no model, a model without the trace's joints, an empty trace.
         OSError: the folder cannot be written.
     """
     path = Path(path)
     if len(trace.t) == 0:
-        raise ValueError("the trace is empty: nothing to show")
+        raise ArgumentError("the trace is empty: nothing to show")
     if model is None:
         attached = [text for name, text in trace.attachments.items() if name.endswith(".xml")]
         if not attached:
-            raise ValueError("the trace has no attached MJCF: give the robot's model (--robot)")
+            raise ArgumentError("the trace has no attached MJCF: give the robot's model (--robot)")
         model = attached[0]
     scene = load_model(model)
     with written(path, "tauguard") as recording:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.extras import extra
+from tauguard.findings import ArgumentError
 from tauguard.replay.estimates import arrow
 from tauguard.traces import TARGETS, Trace
 
@@ -44,7 +45,7 @@ def frames(
         view: the camera's azimuth and elevation [deg], and distance in units of the arm's size.
 
     Raises:
-        ValueError: the recording holds no scene, or no samples in that time.
+        ArgumentError: the recording holds no scene, or no samples in that time.
         RuntimeError: no OpenGL; one line that says what to change.
     """
     import mujoco
@@ -52,11 +53,11 @@ def frames(
     from tauguard.models.picture import mark, opengl, point_at
 
     if "scene.xml" not in trace.attachments:
-        raise ValueError("the recording holds no scene: only those of a simulation can be drawn")
+        raise ArgumentError("the recording holds no scene: only those of a simulation can be drawn")
     end = trace.t[-1] if seconds is None else min(trace.t[-1], start + seconds)
     rows = np.searchsorted(trace.t, np.arange(start, end, 1 / rate))
     if not len(rows) or start < trace.t[0] - 1:
-        raise ValueError(
+        raise ArgumentError(
             f"no sample from {start:g} s on: it lasts from {trace.t[0]:g} to {trace.t[-1]:g} s"
         )
     model = _stage(trace, int(rows[0]))
@@ -169,7 +170,7 @@ def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) 
     """Write pictures of shape (height, width, 3), ``rate`` per second; returns their number.
 
     Raises:
-        ValueError: an ending that is not known, or MP4 without the extra ``video``.
+        ArgumentError: an ending that is not known, or MP4 without the extra ``video``.
     """
     ending = path.suffix.lower()
     if ending in PILLOW:
@@ -179,11 +180,11 @@ def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) 
         shown[0].save(path, save_all=True, append_images=shown[1:], duration=1000 / rate, loop=0)
         return len(shown)
     if ending != ".mp4":
-        raise ValueError(f"{path}: expected an ending of {', '.join(PILLOW)} or .mp4")
+        raise ArgumentError(f"{path}: expected an ending of {', '.join(PILLOW)} or .mp4")
     try:
         from moviepy import ImageSequenceClip
     except ModuleNotFoundError:
-        raise ValueError(f"{path}: MP4 needs {extra('video')}; .gif does not") from None
+        raise ArgumentError(f"{path}: MP4 needs {extra('video')}; .gif does not") from None
     shown = list(pictures)
     ImageSequenceClip(shown, fps=rate).write_videofile(str(path), audio=False, logger=None)
     return len(shown)

@@ -3,17 +3,19 @@
 import math
 from typing import Any
 
+from tauguard.findings import ArgumentError
+
 
 def rate(successes: int, trials: int) -> dict[str, Any]:
     """A proportion with its Wilson 95 % interval (Wilson 1927); all ``None`` where n is 0.
 
     Raises:
-        ValueError: not 0 <= ``successes`` <= ``trials``.
+        ArgumentError: not 0 <= ``successes`` <= ``trials``.
     """
     from scipy.special import ndtri  # scipy.stats loads for seconds
 
     if not 0 <= successes <= trials:
-        raise ValueError(f"{successes} of {trials}: expected 0 <= successes <= trials")
+        raise ArgumentError(f"{successes} of {trials}: expected 0 <= successes <= trials")
     if trials == 0:
         return {"value": None, "low": None, "high": None, "n": 0}
     n, share, z = int(trials), int(successes) / int(trials), float(ndtri(0.975))
@@ -29,12 +31,12 @@ def poisson_rate(count: int, hours: float, confidence: float = 0.95) -> dict[str
     """Events per hour with the exact (Garwood) Poisson interval; ``n`` is the count.
 
     Raises:
-        ValueError: a count or hours below 0.
+        ArgumentError: a count or hours below 0.
     """
     from scipy.special import gammaincinv
 
     if count < 0 or not hours >= 0:
-        raise ValueError(f"{count} events in {hours} h: expected 0 or more")
+        raise ArgumentError(f"{count} events in {hours} h: expected 0 or more")
     if hours == 0:
         return {"value": None, "low": None, "high": None, "n": count, "hours": 0.0}
     side = (1 - confidence) / 2

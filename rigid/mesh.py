@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
@@ -80,8 +81,8 @@ class MeshTree:
         volume: ``"obb"`` or ``"aabb"``.
 
     Raises:
-        ValueError: wrong shapes, an entry that is not finite, an index out of range, no faces, or
-            an unknown volume.
+        ArgumentError: wrong shapes, an entry that is not finite, an index out of range, no faces,
+            or an unknown volume.
     """
 
     volumes: tuple[str, ...] = get_args(Volume)
@@ -91,13 +92,13 @@ class MeshTree:
         points = frozen_finite("vertices", vertices, (None, 3))
         triangles = frozen_indices("faces", faces, (None, 3), len(points))
         if len(triangles) == 0:
-            raise ValueError("faces: empty; a mesh needs at least one triangle")
+            raise ArgumentError("faces: empty; a mesh needs at least one triangle")
         if len(triangles) > 2**28 - 1:
-            raise ValueError(f"faces: {len(triangles)} rows, at most {2**28 - 1} fit")
+            raise ArgumentError(f"faces: {len(triangles)} rows, at most {2**28 - 1} fit")
         if np.abs(points).max() > 1e30:
-            raise ValueError("vertices: a coordinate beyond 1e30; scale the mesh down")
+            raise ArgumentError("vertices: a coordinate beyond 1e30; scale the mesh down")
         if volume not in self.volumes:
-            raise ValueError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
+            raise ArgumentError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
         self._vertices, self._faces, self._volume = points, triangles, volume
         self._mesh = _rigid.Mesh(points, triangles, volume)
 
@@ -129,12 +130,12 @@ class MeshTree:
 
     def _check(self, other: MeshTree) -> None:
         if not isinstance(other, MeshTree):
-            raise ValueError(
+            raise ArgumentError(
                 f"other: {type(other).__name__}, expected a MeshTree; for convex bodies use "
                 "tauguard.rigid.overlap or distance"
             )
         if other.volume != self.volume:
-            raise ValueError(
+            raise ArgumentError(
                 f"other: its volume is {other.volume!r}, this tree's {self.volume!r}; "
                 "build both with the same volume"
             )
@@ -150,7 +151,7 @@ class MeshTree:
             threads: 0 means all processors; the answer does not depend on it.
 
         Raises:
-            ValueError: another volume, or a bad pose (named with its row).
+            ArgumentError: another volume, or a bad pose (named with its row).
         """
         self._check(other)
         batch = poses("pose", pose)
@@ -173,11 +174,11 @@ class MeshTree:
             limit: Largest number of pairs over all poses; coincident meshes can exceed it.
 
         Raises:
-            ValueError: as for :meth:`overlap`, a bad limit, or more pairs than ``limit``.
+            ArgumentError: as for :meth:`overlap`, a bad limit, or more pairs than ``limit``.
         """
         self._check(other)
         if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
-            raise ValueError(f"limit: {limit!r:.40}, expected a positive integer")
+            raise ArgumentError(f"limit: {limit!r:.40}, expected a positive integer")
         rows, values = self._mesh.contacts(
             other._mesh, poses("pose", pose), limit, thread_count(threads)
         )
@@ -210,13 +211,14 @@ class MeshTree:
             threads: 0 means all processors; the answer does not depend on it.
 
         Raises:
-            ValueError: a bad pose or displacement (named with its row), lengths that do not match.
+            ArgumentError: a bad pose or displacement (named with its row), lengths that do not
+                match.
         """
         start, move = poses("pose", pose), np.asarray(displacement)
         if move.ndim == 2 and len(start) == 1:
             start = np.repeat(start, len(move), axis=0)
         if move.shape not in ((3,), (len(start), 3)):
-            raise ValueError(
+            raise ArgumentError(
                 f"displacement: shape {move.shape}, expected ({len(start)}, 3) or (3,)"
             )
         finite("displacement", np.atleast_2d(move), (None, 3))

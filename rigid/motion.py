@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
 
@@ -20,22 +21,23 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """``value`` as homogeneous matrices of shape (N, 4, 4); a (4, 4) matrix is a batch of one.
 
     Raises:
-        ValueError: another shape, an entry that is not finite, a bottom row other than 0 0 0 1, or
-            a rotation further than 1e-6 from a proper orthonormal one; the message names the row.
+        ArgumentError: another shape, an entry that is not finite, a bottom row other than 0 0 0 1,
+            or a rotation further than 1e-6 from a proper orthonormal one; the message names the
+            row.
     """
     raw = np.asarray(value)
     batch = frozen_finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
     bottom = (batch[:, 3] != (0.0, 0.0, 0.0, 1.0)).any(axis=1)
     if bottom.any():
         row = int(np.argmax(bottom))
-        raise ValueError(f"{name}: bottom row {batch[row, 3]} in row {row}, expected 0 0 0 1")
+        raise ArgumentError(f"{name}: bottom row {batch[row, 3]} in row {row}, expected 0 0 0 1")
     rotation = batch[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(rotation.transpose(0, 2, 1) @ rotation - np.eye(3)).max(axis=(1, 2), initial=0)
         bad = ~(off <= ORTHONORMAL_TOLERANCE) | (np.linalg.det(rotation) < 0)
     if bad.any():
         row = int(np.argmax(bad))
-        raise ValueError(
+        raise ArgumentError(
             f"{name}: the rotation in row {row} is not proper orthonormal "
             f"(R^T R differs from I by {off[row]:.3g}, allowed is {ORTHONORMAL_TOLERANCE:g})"
         )
@@ -56,7 +58,7 @@ class Motion(Rebuilt):
         angular: Rotation vector over the step. Shape (N, 3) or (3,), rad.
 
     Raises:
-        ValueError: wrong shapes or lengths, an entry that is not finite, a rotation further than
+        ArgumentError: wrong shapes or lengths, an entry that is not finite, a rotation further than
             1e-6 from orthonormal, or more than 10,000 rad about an axis (named with its row).
     """
 
@@ -77,7 +79,7 @@ class Motion(Rebuilt):
         fast = np.abs(self.angular).max(axis=1, initial=0) > MOST_TURN
         if fast.any():
             row = int(np.argmax(fast))
-            raise ValueError(
+            raise ArgumentError(
                 f"angular: {self.angular[row]} in row {row}, expected at most {MOST_TURN:g} rad; "
                 "divide the step"
             )
@@ -103,20 +105,20 @@ class Motion(Rebuilt):
 
 
 def bounded(name: str, motion: Motion) -> None:
-    """Raise a ``ValueError`` for coordinates beyond 1e100, whose products would overflow."""
+    """Raise an ``ArgumentError`` for coordinates beyond 1e100, whose products would overflow."""
     for value in (motion.pose_t0[:, :3, 3], motion.linear):
         if np.abs(value).max(initial=0.0) > 1e100:
-            raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")
+            raise ArgumentError(f"{name}: a coordinate beyond 1e100; scale the scene down")
 
 
 def common_length(lengths: dict[str, int]) -> int:
     """The common length of several named batches; each has this length or 1.
 
     Raises:
-        ValueError: lengths that do not match.
+        ArgumentError: lengths that do not match.
     """
     count = 0 if 0 in lengths.values() else max(lengths.values())
     for name, length in lengths.items():
         if length not in (1, count):
-            raise ValueError(f"{name}: {length} rows, expected {count} or 1")
+            raise ArgumentError(f"{name}: {length} rows, expected {count} or 1")
     return count

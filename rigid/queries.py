@@ -17,6 +17,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.findings import ArgumentError
 from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.results import Impacts, Overlap, Witness
@@ -31,10 +32,10 @@ _KINDS = (Tetrahedra, Boxes, Parallelepipeds, Hulls, Polygons)
 
 
 def check_method(method: object, known: Sequence[str]) -> None:
-    """Raise a ``ValueError`` if ``method``, which may be of any type, is not in ``known``."""
+    """Raise an ``ArgumentError`` if ``method``, which may be of any type, is not in ``known``."""
     if not (isinstance(method, str) and method in known):
         given = repr(method) if isinstance(method, str) else f"a {type(method).__name__}"
-        raise ValueError(f"method: {given}, expected one of {', '.join(known)}")
+        raise ArgumentError(f"method: {given}, expected one of {', '.join(known)}")
 
 
 def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
@@ -57,9 +58,9 @@ def native_overlap(
 
 
 def refuse_hulls(a: Bodies, b: Bodies) -> None:
-    """Raise a ``ValueError`` for hulls and polygons, whose facets are not known."""
+    """Raise an ``ArgumentError`` for hulls and polygons, whose facets are not known."""
     if isinstance(a, Hulls | Polygons) or isinstance(b, Hulls):
-        raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
+        raise ArgumentError("method: sat needs facets, which hulls do not have; use abfme or auto")
 
 
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
@@ -90,17 +91,17 @@ def sweep(
         at t = 0).
 
     Raises:
-        ValueError: lengths or shapes that do not match, an entry that is not finite, an unknown
+        ArgumentError: lengths or shapes that do not match, an entry that is not finite, an unknown
             method.
     """
     count = rows(a, b)
     if isinstance(a, Polygons):
-        raise ValueError("a: Polygons, expected bodies in space; give them thickness as Hulls")
+        raise ArgumentError("a: Polygons, expected bodies in space; give them thickness as Hulls")
     check_method(method, get_args(SweepMethod))
     given = np.asarray(displacement)
     moves = frozen_finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
     if len(moves) not in (1, count):
-        raise ValueError(f"displacement: {len(moves)} rows, expected {count} or 1")
+        raise ArgumentError(f"displacement: {len(moves)} rows, expected {count} or 1")
     hit, out, _ = native_sweep(a, b, moves, method, threads)
     return Impacts(hit, out[:, 0], out[:, 1:4], out[:, 4:7])
 
@@ -144,11 +145,11 @@ def rows(a: Bodies, b: Bodies) -> int:
     """The common number of rows of two batches; a batch of one body fits any number.
 
     Raises:
-        ValueError: not batches of bodies, or lengths that do not match.
+        ArgumentError: not batches of bodies, or lengths that do not match.
     """
     for name, bodies in (("a", a), ("b", b)):
         if isinstance(bodies, Rounded | Spheres | Capsules):
-            raise ValueError(
+            raise ArgumentError(
                 f"{name}: {type(bodies).__name__}, expected bodies without a radius; for bodies "
                 "with radii use overlap, distance, or time_of_impact with a Motion of angular = 0"
             )
@@ -156,11 +157,11 @@ def rows(a: Bodies, b: Bodies) -> int:
             kinds = ", ".join(kind.__name__ for kind in _KINDS)
             given = type(bodies).__name__
             advice = "; for two meshes use MeshTree.sweep" if given == "MeshTree" else ""
-            raise ValueError(f"{name}: {given}, expected one of {kinds}{advice}")
+            raise ArgumentError(f"{name}: {given}, expected one of {kinds}{advice}")
     if isinstance(a, Polygons) != isinstance(b, Polygons):
-        raise ValueError("b: polygons are tested against polygons only; both must be Polygons")
+        raise ArgumentError("b: polygons are tested against polygons only; both must be Polygons")
     if len(a) != len(b) and 1 not in (len(a), len(b)):
-        raise ValueError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
+        raise ArgumentError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
     return max(len(a), len(b)) if len(a) and len(b) else 0
 
 
@@ -175,13 +176,13 @@ class PlaneCache:
         count: The number of pairs N, the same in every frame.
 
     Raises:
-        ValueError: ``count`` is not an integer of 0 or more.
+        ArgumentError: ``count`` is not an integer of 0 or more.
     """
 
     def __init__(self, count: int) -> None:
         """Start without planes; see the class."""
         if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 0:
-            raise ValueError(f"count: {count!r:.40}, expected an integer of 0 or more")
+            raise ArgumentError(f"count: {count!r:.40}, expected an integer of 0 or more")
         self._lock = Lock()
         self._normals: NDArray[np.float64] = np.zeros((count, 3))
         #: Number of pairs of the last frame that were decided by their cached plane.
@@ -191,11 +192,11 @@ class PlaneCache:
         """Overlap in one frame; the separating planes are kept. Arguments as for ``overlap``.
 
         Raises:
-            ValueError: the number of pairs is not ``count``, or an error of ``overlap``.
+            ArgumentError: the number of pairs is not ``count``, or an error of ``overlap``.
         """
         count = rows(a, b)
         if count != len(self._normals):
-            raise ValueError(f"a, b: {count} pairs, expected {len(self._normals)}")
+            raise ArgumentError(f"a, b: {count} pairs, expected {len(self._normals)}")
         hit = np.empty(count, dtype=np.uint8)
         with self._lock:
             self.answered = _rigid.overlap_cached(

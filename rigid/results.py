@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +110,11 @@ class Distances:
         """Whether each distance is at most ``min_distance`` [m]. Shape (N,).
 
         Raises:
-            ValueError: ``min_distance`` is not a number.
+            ArgumentError: ``min_distance`` is not a number.
         """
         least = np.asarray(min_distance)
         if least.dtype.kind not in "fiu" or np.isnan(least).any():
-            raise ValueError(f"min_distance: {min_distance!r}, expected a number [m]")
+            raise ArgumentError(f"min_distance: {min_distance!r}, expected a number [m]")
         return np.asarray(self.distance <= least)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
 from tauguard.rigid.shapes import (
     SHARP,
@@ -33,7 +34,7 @@ def _radius(value: ArrayLike, count: int) -> NDArray[np.float64]:
     )
     if (radius < 0).any():
         row = int(np.argmax(radius < 0))
-        raise ValueError(f"radius: {radius[row]} in row {row}; expected 0 or more")
+        raise ArgumentError(f"radius: {radius[row]} in row {row}; expected 0 or more")
     return radius
 
 
@@ -48,8 +49,8 @@ class Rounded(Rebuilt):
         radius: Zero or more. Shape (N,), or one number for all.
 
     Raises:
-        ValueError: a core that is not a batch of three-dimensional bodies, wrong lengths, an entry
-            that is not finite, or a negative radius (named with its row).
+        ArgumentError: a core that is not a batch of three-dimensional bodies, wrong lengths, an
+            entry that is not finite, or a negative radius (named with its row).
     """
 
     core: Spatial
@@ -60,7 +61,7 @@ class Rounded(Rebuilt):
     def __init__(self, core: Spatial, radius: ArrayLike) -> None:
         """Check the core, and copy the radii."""
         if not isinstance(core, Spatial):
-            raise ValueError(f"core: {type(core).__name__}, expected convex bodies in space")
+            raise ArgumentError(f"core: {type(core).__name__}, expected convex bodies in space")
         object.__setattr__(self, "core", core)
         object.__setattr__(self, "radius", _radius(radius, len(core)))
 
@@ -77,7 +78,7 @@ class Spheres(Rebuilt):
         radius: Zero or more. Shape (N,), or one number for all.
 
     Raises:
-        ValueError: as for :class:`Rounded`.
+        ArgumentError: as for :class:`Rounded`.
     """
 
     center: NDArray[np.float64]
@@ -109,7 +110,7 @@ class Capsules(Rebuilt):
         radius: Zero or more. Shape (N,), or one number for all.
 
     Raises:
-        ValueError: as for :class:`Rounded`.
+        ArgumentError: as for :class:`Rounded`.
     """
 
     start: NDArray[np.float64]
@@ -150,18 +151,20 @@ def solid_parts(
     """Core and radii of three-dimensional bodies.
 
     Raises:
-        ValueError: not a batch of bodies, polygons, or a number beyond ``most``.
+        ArgumentError: not a batch of bodies, polygons, or a number beyond ``most``.
     """
     core, radius = parts(solid)
     if isinstance(core, Polygons):
-        raise ValueError(
+        raise ArgumentError(
             f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
         )
     if not isinstance(core, Spatial):
         kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
         triangles = hasattr(core, "vertices") and hasattr(core, "faces")
         way = "; a mesh is MeshTree(mesh.vertices, mesh.faces)" if triangles else ""
-        raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}{way}")
+        raise ArgumentError(f"{name}: {type(core).__name__}, expected one of {kinds}{way}")
     if core.largest > most or (radius is not SHARP and radius.max(initial=0.0) > most):
-        raise ValueError(f"{name}: a number beyond {most:g}; scale the scene down".replace("+", ""))
+        raise ArgumentError(
+            f"{name}: a number beyond {most:g}; scale the scene down".replace("+", "")
+        )
     return core, radius

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen, frozen_finite, sealed
 from tauguard.rigid import _rigid
 
@@ -59,7 +60,7 @@ class Tetrahedra(_Batch):
         vertices: Shape (N, 4, 3).
 
     Raises:
-        ValueError: wrong shape, or an entry that is not finite (named with its row).
+        ArgumentError: wrong shape, or an entry that is not finite (named with its row).
     """
 
     kind: ClassVar[int] = 0
@@ -93,8 +94,8 @@ class Boxes(_Batch):
         rotation: Shape (N, 3, 3), body to world; entries of R^T R within 1e-6 of the identity.
 
     Raises:
-        ValueError: wrong shapes or lengths, an entry that is not finite, a negative half extent, a
-            rotation that is not orthonormal (named with its row).
+        ArgumentError: wrong shapes or lengths, an entry that is not finite, a negative half extent,
+            a rotation that is not orthonormal (named with its row).
     """
 
     kind: ClassVar[int] = 1
@@ -113,12 +114,12 @@ class Boxes(_Batch):
         rotation = frozen_finite("rotation", rotation, (len(center), 3, 3))
         if (half_extents < 0).any():
             row, axis = np.argwhere(half_extents < 0)[0]
-            raise ValueError(
+            raise ArgumentError(
                 f"half_extents: {half_extents[row, axis]} in row {row}; expected 0 or more"
             )
         skew, row = _rigid.box_skew(rotation.reshape(-1, 9), ORTHONORMAL_TOLERANCE)
         if row < len(center):
-            raise ValueError(
+            raise ArgumentError(
                 f"rotation: row {row} is not orthonormal: R^T R differs from the identity by more "
                 f"than {ORTHONORMAL_TOLERANCE:g}"
             )
@@ -159,7 +160,7 @@ class Parallelepipeds(_Batch):
         edges: ``edges[n, k]`` is the k-th edge vector from the corner. Shape (N, 3, 3).
 
     Raises:
-        ValueError: wrong shapes or lengths, or an entry that is not finite (named with its row).
+        ArgumentError: wrong shapes or lengths, or an entry that is not finite (named with its row).
     """
 
     kind: ClassVar[int] = 2
@@ -197,7 +198,7 @@ class PointSets(_Batch):
     def __init__(self, vertices: ArrayLike, offsets: ArrayLike) -> None:
         """Check and copy the arrays."""
         if isinstance(vertices, list | tuple) and any(_ndim(v) > 1 for v in vertices[:1]):
-            raise ValueError(
+            raise ArgumentError(
                 f"vertices: {len(vertices)} arrays, expected one (M, {self.dimensions}): "
                 "np.concatenate(arrays) and the offsets np.cumsum([0, *map(len, arrays)])"
             )
@@ -224,7 +225,7 @@ class Hulls(PointSets):
         offsets: Shape (N + 1,), integers, strictly increasing from 0 to M.
 
     Raises:
-        ValueError: wrong shapes, an entry that is not finite, offsets that do not partition the
+        ArgumentError: wrong shapes, an entry that is not finite, offsets that do not partition the
             vertices, or an empty hull (named with its row).
     """
 
@@ -248,16 +249,18 @@ def _ndim(value: ArrayLike) -> int:
 def _partition(given: ArrayLike, count: int) -> NDArray[np.int64]:
     array = np.asarray(given)
     if array.ndim != 1 or len(array) == 0 or not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(
+        raise ArgumentError(
             f"offsets: shape {array.shape} of {array.dtype}, expected (N + 1,) integers"
         )
     offsets = frozen(array.astype(np.int64))  # an overflow becomes negative and is refused below
     if offsets[0] != 0 or offsets[-1] != count:
-        raise ValueError(f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {count}")
+        raise ArgumentError(
+            f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {count}"
+        )
     empty = offsets[1:] <= offsets[:-1]
     if empty.any():
         row = int(np.argmax(empty))
-        raise ValueError(
+        raise ArgumentError(
             f"offsets: hull {row} is empty (offsets {offsets[row]} and {offsets[row + 1]}); "
             "expected strictly increasing offsets"
         )

@@ -7,6 +7,7 @@ from typing import Literal, cast, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
@@ -57,14 +58,14 @@ def overlap(
         first access; for a mesh also ``faces``.
 
     Raises:
-        ValueError: lengths that do not match, a method that is unknown or not available for the
+        ArgumentError: lengths that do not match, a method that is unknown or not available for the
             arguments, two meshes, or a coordinate beyond 1e100 of bodies with radii (with a mesh:
             a coordinate of the bodies beyond 1e30).
     """
     check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
     if special and method != "auto":
-        raise ValueError(
+        raise ArgumentError(
             f"method: {method!r} needs bodies without radii, but {special[0]} is a "
             f"{type(a if special[0] == 'a' else b).__name__}; expected auto"
         )
@@ -126,7 +127,7 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Dist
         threads: 0 means all processors; the answer does not depend on it.
 
     Raises:
-        ValueError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
+        ArgumentError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
             (with a mesh: a coordinate of the bodies beyond 1e30).
     """
     if beside := _mesh_beside(a, b):
@@ -179,13 +180,13 @@ def time_of_impact(
         the point is in both bodies.
 
     Raises:
-        ValueError: lengths that do not match, a motion that is not a ``Motion``, polygons, or a
+        ArgumentError: lengths that do not match, a motion that is not a ``Motion``, polygons, or a
             coordinate beyond 1e100, whose products would overflow (with a mesh: a coordinate of
             the bodies beyond 1e30).
     """
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
         if not isinstance(motion, Motion):
-            raise ValueError(f"{name}: a {type(motion).__name__}, expected a Motion")
+            raise ArgumentError(f"{name}: a {type(motion).__name__}, expected a Motion")
         bounded(name, motion)
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         return first_touch(a, b, motion_a, motion_b, threads)
@@ -222,10 +223,10 @@ def _mesh_beside(
     """The mesh, the bodies, their number, and whether the mesh is ``b``; ``None`` without a mesh.
 
     Raises:
-        ValueError: both are meshes.
+        ArgumentError: both are meshes.
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        raise ValueError(
+        raise ArgumentError(
             "a, b: both are meshes; MeshTree.overlap, contacts and sweep work on two meshes, and "
             "distance on a mesh and convex bodies, such as Hulls of the vertices"
         )

@@ -44,7 +44,7 @@ ALLOWED = {
 #: The packages inside envs, and what each may use of the others; plant.py is common to them.
 ENVS = {"episodes": set(), "gym": {"episodes"}, "adapters": {"gym", "episodes"}}
 #: Modules at the top that every package may use: they use each other and no package.
-SHARED = {"arrays", "lazy", "untrusted_input", "atomic_write", "extras"}
+SHARED = {"arrays", "lazy", "untrusted_input", "atomic_write", "extras", "findings"}
 #: The entry points: what they start is in the packages.
 ENTRY = {"__init__", "__main__", "environments"}
 FOLDERS = {

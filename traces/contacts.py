@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 
 
 @dataclass(frozen=True)
@@ -26,20 +27,20 @@ class CheckedContacts:
     distance: Array  #: signed distance of the surfaces, negative in penetration [m], shape (K,)
 
     def __post_init__(self) -> None:
-        """Check shapes, order and indices; a ``ValueError`` names the field with the error."""
+        """Check shapes, order and indices; an ``ArgumentError`` names the field with the error."""
         rows = len(self.t)
         for name, tail in (("t", ()), ("pair", (2,)), ("point", (3,)), ("normal", (3,))):
             shape = getattr(self, name).shape
             if shape != (rows, *tail):
-                raise ValueError(f"{name}: shape {shape}, expected {(rows, *tail)}")
+                raise ArgumentError(f"{name}: shape {shape}, expected {(rows, *tail)}")
         if self.distance.shape != (rows,):
-            raise ValueError(f"distance: shape {self.distance.shape}, expected {(rows,)}")
+            raise ArgumentError(f"distance: shape {self.distance.shape}, expected {(rows,)}")
         if (np.diff(self.t) < 0).any():
-            raise ValueError(f"t: decreasing at row {int(np.argmax(np.diff(self.t) < 0)) + 1}")
+            raise ArgumentError(f"t: decreasing at row {int(np.argmax(np.diff(self.t) < 0)) + 1}")
         bad = (self.pair < 0) | (self.pair >= len(self.partners))
         if bad.any():
             row = int(np.argmax(bad.any(axis=1)))
-            raise ValueError(
+            raise ArgumentError(
                 f"pair: row {row} is {self.pair[row].tolist()}, but there are "
                 f"{len(self.partners)} partners"
             )

@@ -15,6 +15,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.atomic_write import atomic_file
+from tauguard.findings import FileError
 from tauguard.traces.contacts import CheckedContacts
 from tauguard.traces.mcap_cdr import Anything, Layout, nanoseconds, stamp
 from tauguard.traces.mcap_container import Contents, Group, Topic
@@ -63,7 +64,7 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     one is written in the same folder and renamed.
 
     Raises:
-        ValueError: a field of the wrong shape, a time below 0 or after the year 2262, or a
+        FileError: a field of the wrong shape, a time below 0 or after the year 2262, or a
             detection whose times are not those of the trace.
         OSError: the folder is missing or cannot be written.
     """
@@ -97,7 +98,7 @@ def read_mcap(path: str | Path) -> Trace:
     default shape (0, 0, 4, 4).
 
     Raises:
-        ValueError: not a file of :func:`write_mcap`, or truncated, damaged, or with messages
+        FileError: not a file of :func:`write_mcap`, or truncated, damaged, or with messages
             missing. The message is one line: what is wrong, where, and what would work.
         OSError: the file is missing or cannot be read.
     """
@@ -114,7 +115,7 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, Any]:
     """Metadata, stored as JSON, from which the reader derives the layouts of the messages.
 
     Raises:
-        ValueError: a checker has two entries.
+        FileError: a checker has two entries.
     """
     form: dict[str, Any] = {
         "format": FORMAT,
@@ -129,7 +130,7 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, Any]:
     if trace.contacts:
         names = [one.checker for one in trace.contacts]
         if len(set(names)) < len(names):
-            raise ValueError(f"contacts: a checker twice: {', '.join(names)}")
+            raise FileError(f"contacts: a checker twice: {', '.join(names)}")
         form["checkers"] = [
             {"name": one.checker, "partners": one.partners, "rows": len(one)}
             for one in trace.contacts
@@ -162,7 +163,7 @@ def sample_topics(
     """The topics of :func:`sample_layouts` with the trace's and the detection's values.
 
     Raises:
-        ValueError: poses of the wrong shape, or the detection of another trace.
+        FileError: poses of the wrong shape, or the detection of another trace.
     """
     truth = trace.truth
     values: dict[str, Anything] = {**stamp(trace.t), "time": trace.t, **trace.signals}
@@ -170,14 +171,14 @@ def sample_topics(
         values |= {name: getattr(truth, name) for name in TRUTH}
         shape = (len(trace.t), len(truth.obstacle_names), 4, 4)
         if truth.obstacle_names and truth.obstacle_poses.shape != shape:
-            raise ValueError(
+            raise FileError(
                 f"truth.obstacle_poses: shape {truth.obstacle_poses.shape}, expected {shape}"
             )
         poses = truth.obstacle_poses
         values["obstacle_poses"] = poses.reshape(len(poses), 16 * len(truth.obstacle_names))
     if detection is not None:
         if not np.array_equal(detection.t, trace.t):
-            raise ValueError("detection.t: differs from trace.t; expected one row per sample")
+            raise FileError("detection.t: differs from trace.t; expected one row per sample")
         values |= {name: getattr(detection, name) for name in ("residual", "score", "alarm")}
         values["threshold"] = np.full(len(trace.t), detection.threshold)
     return [
@@ -190,13 +191,13 @@ def event_group(topic: str, events: Sequence[Collision] | Sequence[Alarm]) -> Gr
     """Events of one kind, logged at their beginnings.
 
     Raises:
-        ValueError: an unknown kind of collision.
+        FileError: an unknown kind of collision.
     """
     kind, fields = EVENTS[topic]
     values: dict[str, Any] = {name: [getattr(one, name) for one in events] for name in fields}
     for name in values.get("kind", ()):
         if name not in KINDS:
-            raise ValueError(f"collision kind {name!r}: one of {', '.join(KINDS)}")
+            raise FileError(f"collision kind {name!r}: one of {', '.join(KINDS)}")
     if "kind" in values:
         values["kind"] = [KINDS.index(name) for name in values["kind"]]
     arrays = {name: np.array(value) for name, value in values.items()}
@@ -219,10 +220,10 @@ def decode(contents: Contents) -> Trace:
     """The trace in an MCAP file's records, with its detection."""
     if "tauguard.trace" not in contents.metadata:
         topics = ", ".join(sorted(c.topic for c in contents.channels.values())) or "none"
-        raise ValueError(f"no metadata record tauguard.trace (topics: {topics})")
+        raise FileError(f"no metadata record tauguard.trace (topics: {topics})")
     form = {k: json.loads(v) for k, v in contents.metadata["tauguard.trace"].items()}
     if form["format"] != FORMAT:
-        raise ValueError(f"format {form['format']}, this version reads {FORMAT}")
+        raise FileError(f"format {form['format']}, this version reads {FORMAT}")
     sampled = sample_layouts(form)
     checkers = {f"/contacts/{one['name']}": one for one in form.get("checkers", [])}
     checked = {topic: layout(*CHECKED, one["partners"]) for topic, one in checkers.items()}
@@ -232,9 +233,7 @@ def decode(contents: Contents) -> Trace:
     rows |= {topic: one["rows"] for topic, one in checkers.items()}
     for topic, wanted in rows.items():
         if (found := len(tables[topic]["sec"])) != wanted:
-            raise ValueError(
-                f"{topic}: {found} messages, expected {wanted}: some were filtered out"
-            )
+            raise FileError(f"{topic}: {found} messages, expected {wanted}: some were filtered out")
     values: dict[str, Any] = {}
     for topic in sampled:
         values |= tables[topic]
@@ -301,7 +300,7 @@ def collect(contents: Contents, known: Mapping[str, Layout]) -> dict[str, dict[s
     """Field arrays of every known topic, sorted by sequence number.
 
     Raises:
-        ValueError: a message whose length or strings differ from the layout of its topic.
+        FileError: a message whose length or strings differ from the layout of its topic.
     """
     runs: dict[str, list[dict[str, Anything]]] = {name: [] for name in known}
     for channel, sequence, _, payload in contents.messages():
@@ -310,11 +309,11 @@ def collect(contents: Contents, known: Mapping[str, Layout]) -> dict[str, dict[s
             continue
         layout = known[name]
         if payload.shape[1] != layout.size:
-            raise ValueError(f"{name}: a message of {payload.shape[1]} bytes, not {layout.size}")
+            raise FileError(f"{name}: a message of {payload.shape[1]} bytes, not {layout.size}")
         try:
             runs[name].append({"sequence": sequence, **layout.unpack(payload)})
         except ValueError as error:
-            raise ValueError(f"{name}: {error}") from error
+            raise FileError(f"{name}: {error}") from error
     tables = {}
     for name, layout in known.items():
         empty = np.zeros((0, layout.size), np.uint8) + layout.template()

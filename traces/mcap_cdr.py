@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import FileError
 
 Bytes = NDArray[np.uint8]
 Anything = NDArray[np.generic]
@@ -73,10 +74,10 @@ class Layout:
         return self.number("sec", "i4").number("nanosec", "u4").string("")
 
     def check(self, values: Mapping[str, Anything], rows: int) -> None:
-        """Raise ``ValueError`` for a field array whose shape is not (rows, *field shape)."""
+        """Raise ``FileError`` for a field array whose shape is not (rows, *field shape)."""
         for name, (dtype, _) in self.fields.items():
             if values[name].shape != (rows, *dtype.shape):
-                raise ValueError(
+                raise FileError(
                     f"{name}: shape {values[name].shape}, expected {(rows, *dtype.shape)}"
                 )
 
@@ -98,12 +99,12 @@ class Layout:
         """Field arrays of messages ``data``, shape (rows, size): copies, in native byte order.
 
         Raises:
-            ValueError: the constant bytes (strings and lengths) differ from those of this layout.
+            FileError: the constant bytes (strings and lengths) differ from those of this layout.
         """
         for offset, expected in self._constants:
             found = data[:, offset : offset + len(expected)]
             if (found != np.frombuffer(expected, np.uint8)).any():
-                raise ValueError(f"strings or lengths differ from the layout at byte {offset}")
+                raise FileError(f"strings or lengths differ from the layout at byte {offset}")
         fields = {}
         for name, (dtype, offset) in self.fields.items():
             raw = np.ascontiguousarray(data[:, offset : offset + dtype.itemsize])
@@ -116,11 +117,11 @@ def nanoseconds(t: Array) -> NDArray[np.uint64]:
     """Times ``t`` [s] as log times [ns].
 
     Raises:
-        ValueError: a time below 0 or after the year 2262.
+        FileError: a time below 0 or after the year 2262.
     """
     bad = np.flatnonzero(~((t >= 0) & (t < 2**63 / 1e9)))
     if bad.size:
-        raise ValueError(f"t: {t[bad[0]]} s in row {bad[0]}, expected 0 to 9.2e9 s; shift the time")
+        raise FileError(f"t: {t[bad[0]]} s in row {bad[0]}, expected 0 to 9.2e9 s; shift the time")
     whole = np.floor(t)
     return whole.astype(np.uint64) * np.uint64(10**9) + np.rint((t - whole) * 1e9).astype(np.uint64)
 

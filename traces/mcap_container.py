@@ -19,6 +19,7 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
 
+from tauguard.findings import FileError
 from tauguard.traces.mcap_cdr import Anything, Bytes, Layout
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -58,13 +59,13 @@ class Contents:
     """The records of an MCAP file in memory; chunks are decompressed one at a time.
 
     Raises:
-        ValueError: not an MCAP file, or truncated or damaged.
+        FileError: not an MCAP file, or truncated or damaged.
     """
 
     def __init__(self, data: bytes) -> None:
         """Index the file ``data``."""
         if data[: len(MAGIC)] != MAGIC:
-            raise ValueError("not an MCAP file (its first bytes are not \\x89MCAP0)")
+            raise FileError("not an MCAP file (its first bytes are not \\x89MCAP0)")
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.channels: dict[int, records.Channel] = {}
@@ -100,11 +101,11 @@ class Contents:
         """Compare the data section with its checksum, if there is one.
 
         Raises:
-            ValueError: metadata, names or messages were damaged or changed.
+            FileError: metadata, names or messages were damaged or changed.
         """
         end, wanted = self._end
         if wanted not in (0, zlib.crc32(memoryview(self._data)[:end])):
-            raise ValueError(f"damaged: the first {end} bytes do not match their checksum")
+            raise FileError(f"damaged: the first {end} bytes do not match their checksum")
 
     def messages(self) -> Iterator[Block]:
         """Blocks of equally long messages, in the order of the file."""
@@ -117,7 +118,7 @@ class Contents:
                 inside = stream.read(size)
                 yield from rows_of(inside) or singles(inside)
             except Exception as error:
-                raise ValueError(f"damaged chunk at byte {offset}: {error}") from error
+                raise FileError(f"damaged chunk at byte {offset}: {error}") from error
 
 
 MOST_CHUNK = 1 << 27  #: largest unpacked size of a chunk [bytes]
@@ -130,7 +131,7 @@ def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
     """Check the unpacked size of chunks in a file of ``size`` bytes.
 
     Raises:
-        ValueError: a limit is exceeded; the message gives position and size of the chunk.
+        FileError: a limit is exceeded; the message gives position and size of the chunk.
     """
     total = 0
     for offset, body in chunks:
@@ -138,7 +139,7 @@ def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
         claimed = max(chunk.uncompressed_size, unpacked_size(chunk))
         total += claimed
         if claimed > MOST_CHUNK or total > max(MOST_UNPACKED, MOST_RATIO * size):
-            raise ValueError(
+            raise FileError(
                 f"the chunk at byte {offset} unpacks to {claimed} bytes, {total} with those before "
                 f"it, out of a file of {size}: more than a recording holds"
             )
@@ -152,14 +153,14 @@ def unpacked_size(chunk: records.Chunk) -> int:
         try:
             return int(zstandard.frame_content_size(chunk.data))
         except zstandard.ZstdError as error:
-            raise ValueError(f"damaged chunk: {error}") from error
+            raise FileError(f"damaged chunk: {error}") from error
     if chunk.compression == "lz4":
         import lz4.frame
 
         try:
             unpacked = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, MOST_CHUNK + 1)
         except RuntimeError as error:
-            raise ValueError(f"damaged chunk: {error}") from error
+            raise FileError(f"damaged chunk: {error}") from error
         return len(unpacked)
     return len(chunk.data)
 
@@ -178,7 +179,7 @@ def walk(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
     """Top-level records up to the footer: offset, opcode, body.
 
     Raises:
-        ValueError: the data end before the footer and the closing magic.
+        FileError: the data end before the footer and the closing magic.
     """
     view, at = memoryview(data), len(MAGIC)
     while at + 9 <= len(data):
@@ -189,9 +190,9 @@ def walk(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
         at += 9 + length
         if opcode == Opcode.FOOTER:
             if data[at:] != MAGIC:
-                raise ValueError(f"no closing magic at byte {at}: cut off or overwritten")
+                raise FileError(f"no closing magic at byte {at}: cut off or overwritten")
             return
-    raise ValueError(f"cut off: {len(data)} bytes end inside the record at byte {at}")
+    raise FileError(f"cut off: {len(data)} bytes end inside the record at byte {at}")
 
 
 def rows_of(data: bytes) -> list[Block]:

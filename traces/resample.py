@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace, Truth
 
 
@@ -21,17 +22,17 @@ def resampled(trace: Trace, hz: float) -> Trace:
         hz: The new rate, at most the rate of the trace [Hz].
 
     Raises:
-        ValueError: a rate that is not above 0 or exceeds the rate of the trace, or a trace that
+        ArgumentError: a rate that is not above 0 or exceeds the rate of the trace, or a trace that
             ends before the second sample.
     """
     if not (hz > 0 and len(trace.t) > 1 and hz * trace.dt < 1.01):
         own = f"at {1 / trace.dt:g} Hz" if len(trace.t) > 1 else f"of {len(trace.t)} samples"
-        raise ValueError(
+        raise ArgumentError(
             f"hz {hz:g} for a trace {own}: expected above 0 and at most the rate of the trace"
         )
     t = np.arange(trace.t[0], trace.t[-1] + 1e-9, 1 / hz)
     if len(t) < 2:
-        raise ValueError(f"hz {hz:g}: the trace ends before the second sample")
+        raise ArgumentError(f"hz {hz:g}: the trace ends before the second sample")
 
     def at(values: Array) -> Array:
         return np.column_stack([np.interp(t, trace.t, column) for column in values.T])
@@ -56,10 +57,10 @@ def averaged(trace: Trace, hz: float) -> Trace:
         hz: The new rate, at most the rate of the trace [Hz].
 
     Raises:
-        ValueError: as :func:`resampled`, or a trace with truth.
+        ArgumentError: as :func:`resampled`, or a trace with truth.
     """
     if trace.truth is not None:
-        raise ValueError(
+        raise ArgumentError(
             "trace: it has truth, expected none; averaged signals would lag behind the labels"
         )
     thin = resampled(trace, hz)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array, Bools, in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
@@ -109,8 +110,8 @@ class Trace:
         """Check shapes and values.
 
         Raises:
-            ValueError: a wrong shape, a value that is not finite, or time that is not increasing;
-                the message names the field and the first bad row.
+            ArgumentError: a wrong shape, a value that is not finite, or time that is not
+                increasing; the message names the field and the first bad row.
         """
         rows, joints = len(self.t), len(self.joint_names)
         signals = self.signals
@@ -118,17 +119,17 @@ class Trace:
             signals["truth.tau_ext"] = self.truth.tau_ext
         for name, value in signals.items():
             if value.shape != (rows, joints):
-                raise ValueError(
+                raise ArgumentError(
                     f"{name}: shape {value.shape}, expected ({rows}, {joints}): "
                     f"{rows} samples of joints {', '.join(self.joint_names)}"
                 )
         for name, value in {"t": self.t, **signals}.items():
             if not np.isfinite(value).all():
                 row = int(np.argwhere(~np.isfinite(value))[0][0])
-                raise ValueError(f"{name}: not finite in row {row}")
+                raise ArgumentError(f"{name}: not finite in row {row}")
         back = np.flatnonzero(np.diff(self.t) <= 0)
         if back.size:
-            raise ValueError(f"t: not increasing at row {back[0] + 1}")
+            raise ArgumentError(f"t: not increasing at row {back[0] + 1}")
 
     def __repr__(self) -> str:
         """One line: arm, samples, duration, and the number of collisions if it is known."""

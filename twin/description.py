@@ -9,6 +9,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors.calibration.arm_file import save_arm
+from tauguard.findings import FileError
 from tauguard.twin.identify import NUMBERS, Twin
 
 #: The ten inertial numbers of a body, in its joint's frame.
@@ -31,11 +32,11 @@ def write_twin(
         The URDF or MJCF file, and the CSV file.
 
     Raises:
-        ValueError: ``out`` does not end in .toml.
+        FileError: ``out`` does not end in .toml.
         OSError: a file cannot be written.
     """
     if out.suffix != ".toml":
-        raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        raise FileError(f"--out {out}: expected a name that ends in .toml")
     bodies = out.with_name(f"{out.stem}.bodies{robot.suffix}")
     save_arm(twin.arm, robot, bodies, scale=scale, logs=list(logs))
     _without_losses(bodies)

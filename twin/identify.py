@@ -9,6 +9,7 @@ from scipy.special import stdtrit
 
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel
+from tauguard.findings import ArgumentError
 from tauguard.models import Drive, Friction, LeftOver, Sensors
 from tauguard.traces import Trace
 from tauguard.twin.drive_fit import SLOPES, FrictionFit, fit_friction
@@ -61,7 +62,7 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
         current_limit: largest motor currents [A], shape (n,).
 
     Raises:
-        ValueError: no joint moves for long enough.
+        ArgumentError: no joint moves for long enough.
     """
     n = arm.robot.joints
     parts = [(k, part) for k, trace in enumerate(traces) for part in without_gaps(trace)]
@@ -69,7 +70,7 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
     torques = [part.current * arm.drive_gain for _, part in parts]
     fits = tuple(fit_friction(j, motions, torques) if motions else None for j in range(n))
     if all(fit is None for fit in fits):
-        raise ValueError("no joint moves for a second: give longer logs")
+        raise ArgumentError("no joint moves for a second: give longer logs")
     drive = Drive(
         gain=arm.drive_gain,
         gear=np.full(n, GEAR),

@@ -11,6 +11,7 @@ from tauguard.detectors import ArmModel
 from tauguard.detectors.calibration.assessment import OUTLYING, outlier, residual_rms
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.findings import ArgumentError
 
 #: Logs are of two arms if calibrations from each of two groups of logs reduce the sum of the logs'
 #: residuals by this factor, compared with one calibration from all logs. The factor is 1.0 to 1.2
@@ -30,7 +31,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         recordings: with their loads, all with motion.
 
     Raises:
-        ValueError: the logs are of two arms or two loads; names the logs of each.
+        ArgumentError: the logs are of two arms or two loads; names the logs of each.
     """
     told = [k for k, r in enumerate(recordings) if r.load == Load()]
     errors = _errors(arm, [recordings[k] for k in told])
@@ -46,7 +47,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         side = _split_in_two(errors, rest)
         if side is not None:
             one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
-            raise ValueError(
+            raise ArgumentError(
                 f"{one} and {two} do not predict each other: they are of two arms, or some carry a "
                 "load that was not given (--payload LOG=KG, or LOG=unknown, for each that does)"
             )

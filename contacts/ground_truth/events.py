@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tauguard.contacts.ground_truth.touches import Touches
+from tauguard.findings import ArgumentError
 
 #: Longest time without contact within one event [s]; up to two steps are always allowed.
 GAP = 5e-3
@@ -47,10 +48,10 @@ def events(model: Any, times: Sequence[float], touches: Sequence[Touches]) -> li
         touches: Contacts of the steps between the states.
 
     Raises:
-        ValueError: lengths that do not match.
+        ArgumentError: lengths that do not match.
     """
     if len(times) != len(touches) + 1:
-        raise ValueError(
+        raise ArgumentError(
             f"times: {len(times)} states, expected {len(touches) + 1}, one more than touches"
         )
     open_: dict[Pair, Event] = {}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts.checker import State, geom_kinds, pair_kind
 from tauguard.contacts.ground_truth import triangles
+from tauguard.findings import ArgumentError
 from tauguard.models.cloth import flex_elements
 
 Index = NDArray[np.int32]
@@ -223,8 +224,8 @@ class GroundTruth:
         model: MjModel.
 
     Raises:
-        ValueError: a flex that is not two-dimensional, or that can touch a geom whose kind is not
-            in :data:`FLEX_MEETS`.
+        ArgumentError: a flex that is not two-dimensional, or that can touch a geom whose kind is
+            not in :data:`FLEX_MEETS`.
     """
 
     def __init__(self, model: Any) -> None:
@@ -240,7 +241,7 @@ class GroundTruth:
             for geom in flex_geoms(model, flex):
                 name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
                 if model.flex_dim[flex] != 2 or kinds[geom] not in FLEX_MEETS:
-                    raise ValueError(
+                    raise ArgumentError(
                         f"flex {name!r} (dim {model.flex_dim[flex]}) and geom "
                         f"{geom} ({kinds[geom]}): the ground truth handles flexes of dim 2 with "
                         f"{', '.join(FLEX_MEETS)}"

@@ -12,6 +12,7 @@ from tauguard.contacts.geoms import CONVEX
 from tauguard.contacts.guard.eroded_shapes import ErodedShapes
 from tauguard.contacts.guard.report import Pair, Partner
 from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
+from tauguard.findings import ArgumentError
 from tauguard.models.cloth import flex_elements
 
 #: Layers eroded from both partners, as fractions of half their thickness. If the eroded shapes of
@@ -122,9 +123,9 @@ def names(covers: Sequence[str]) -> tuple[bool, bool]:
     """Whether ``rigid`` is in ``covers``, and whether ``cloth`` is.
 
     Raises:
-        ValueError: an unknown name.
+        ArgumentError: an unknown name.
     """
     for one in covers:
         if one not in ("rigid", "cloth"):
-            raise ValueError(f"checker {one!r}: expected rigid or cloth")
+            raise ArgumentError(f"checker {one!r}: expected rigid or cloth")
     return "rigid" in covers, "cloth" in covers

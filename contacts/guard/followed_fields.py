@@ -19,6 +19,7 @@ from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
 from tauguard.contacts.geoms import hull_rows
 from tauguard.contacts.guard.engine import PHYSICS
+from tauguard.findings import ArgumentError
 
 #: Fields that determine the pairs.
 _PAIRS = (
@@ -99,13 +100,13 @@ def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
     """Compare the structure of the model with the structure ``built`` at compilation.
 
     Raises:
-        ValueError: they differ; the message names field, row and both values.
+        ArgumentError: they differ; the message names field, row and both values.
     """
     for name, before in built.items():
         now = getattr(model, name)
         if (now != before).any():
             row = int(np.argwhere(now != before)[0, 0])
-            raise ValueError(
+            raise ArgumentError(
                 f"{name}: row {row} is {now[row].tolist()}, expected {before[row].tolist()} as "
                 "compiled; change the MjSpec and recompile it"
             )
@@ -149,16 +150,16 @@ def refuse_values(model: Any) -> None:
     """Check for values with which MuJoCo or a guard cannot step.
 
     Raises:
-        ValueError: a number that is not finite (limits may be infinite); a negative mass, moment of
-            inertia, armature, radius or size; a quaternion without unit length; an unknown id, type
-            of geom or number of contact dimensions. The message names field, row and value.
+        ArgumentError: a number that is not finite (limits may be infinite); a negative mass, moment
+            of inertia, armature, radius or size; a quaternion without unit length; an unknown id,
+            type of geom or number of contact dimensions. The message names field, row and value.
     """
     for name, rule in _rules().items():
         _refuse_rows(model, name, np.isnan if rule == _NOT_NAN else _infinite, "not finite")
     for name in PHYSICS:
         value = getattr(model.opt, name)
         if not np.isfinite(value).all():
-            raise ValueError(f"opt.{name}: {np.array(value).tolist()}, not finite")
+            raise ArgumentError(f"opt.{name}: {np.array(value).tolist()}, not finite")
     for name in _MASSES:
         _refuse_rows(model, name, lambda rows: rows < 0, "negative")
     for name in _DIMENSIONS:
@@ -174,7 +175,7 @@ def refuse_values(model: Any) -> None:
     _refuse_rows(model, "geom_size", lambda rows: (rows < 0) & ~plane[:, None], "negative")
     hulls = _hull_rows(model)
     for row in hulls[~np.isfinite(model.mesh_vert[hulls]).all(axis=1)].tolist():
-        raise ValueError(f"mesh_vert: row {row} is {model.mesh_vert[row].tolist()}, not finite")
+        raise ArgumentError(f"mesh_vert: row {row} is {model.mesh_vert[row].tolist()}, not finite")
 
 
 def _targets(model: Any) -> list[tuple[str, Any, Any]]:
@@ -198,12 +199,12 @@ def _targets(model: Any) -> list[tuple[str, Any, Any]]:
 
 
 def _refuse_rows(model: Any, name: str, wrong: Callable[[Any], Any], defect: str) -> None:
-    """Raise a ``ValueError`` with the first row in which an entry is ``wrong``."""
+    """Raise an ``ArgumentError`` with the first row in which an entry is ``wrong``."""
     rows = getattr(model, name)
     found = np.argwhere(wrong(rows))
     if len(found):
         row = int(found[0, 0])
-        raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, {defect}")
+        raise ArgumentError(f"{name}: row {row} is {rows[row].tolist()}, {defect}")
 
 
 def _outside(ids: NDArray[np.int32], least: Any, end: Any) -> NDArray[np.bool_]:

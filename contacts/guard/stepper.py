@@ -26,6 +26,7 @@ from tauguard.contacts.guard.followed_fields import (
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents
+from tauguard.findings import ArgumentError
 from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
 #: Settings of the native part; "held" pairs are those whose approach the solver stops.
@@ -72,7 +73,7 @@ class GuardedStepper:
         most: Largest number of calls of ``mj_step`` in one step; at this number stage 3 follows.
 
     Raises:
-        ValueError: an unknown checker, ``most`` below 2, or a model that :meth:`step` refuses.
+        ArgumentError: an unknown checker, ``most`` below 2, or a model that :meth:`step` refuses.
     """
 
     def __init__(
@@ -85,7 +86,7 @@ class GuardedStepper:
     ) -> None:
         """Check the model, and make the native guard."""
         if most < 2:
-            raise ValueError(f"most {most}: expected 2 or more calls of mj_step")
+            raise ArgumentError(f"most {most}: expected 2 or more calls of mj_step")
         self._rigid, self._cloth = names(checkers)
         self._model, self._data, self._stiff, self._most = model, data, stiff, most
         warn_of_sparse_newton(model)
@@ -127,7 +128,7 @@ class GuardedStepper:
         self._guard.follow(followed_fields(model, self._flags), numbers(model, self._physics))
 
     def _follow(self) -> None:
-        """Apply changes of the model since the last step, or refuse them (``ValueError``)."""
+        """Apply changes of the model since the last step, or refuse them (``ArgumentError``)."""
         refuse_structure(self._model, self._built)
         _refuse(self._model, self._data)
         if self._guard.changed():
@@ -206,7 +207,7 @@ class GuardedStepper:
                 is accepted does not call it.
 
         Raises:
-            ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
+            ArgumentError: a timestep that is not finite or not above 0; the flags ``ipc``,
                 ``speculative`` or ``sleep``, with which a step cannot be rolled back; the
                 integrator RK4; an unknown friction cone; a contact filter (``mjcb_contactfilter``);
                 a mocap pose, mass, contact parameter or other number of the model that is not
@@ -291,22 +292,22 @@ def _turning(model: Any) -> NDArray[np.int32]:
 def _refuse(model: Any, data: Any) -> None:
     step = model.opt.timestep
     if not 0 < step < np.inf:
-        raise ValueError(f"timestep {step}: expected a finite number above 0")
+        raise ArgumentError(f"timestep {step}: expected a finite number above 0")
     for name, bit in REFUSED.items():
         if model.opt.enableflags & bit:
-            raise ValueError(
+            raise ArgumentError(
                 f"option flag {name}: a guarded step cannot be rolled back with it; disable it"
             )
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        raise ValueError("integrator RK4: expected Euler, implicit, implicitfast or discrete")
+        raise ArgumentError("integrator RK4: expected Euler, implicit, implicitfast or discrete")
     if model.opt.cone not in [int(cone) for cone in mujoco.mjtCone.__members__.values()]:
-        raise ValueError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
+        raise ArgumentError(f"cone {model.opt.cone}: MuJoCo crashes with it; expected 0 or 1")
     if mujoco.get_mjcb_contactfilter() is not None:
-        raise ValueError(
+        raise ArgumentError(
             "mjcb_contactfilter: a guard cannot know which pairs the filter rejects; unset it"
         )
     refuse_values(model)
     for name in ("mocap_pos", "mocap_quat"):
         rows = getattr(data, name)
         for row in np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist():
-            raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, not finite")
+            raise ArgumentError(f"{name}: row {row} is {rows[row].tolist()}, not finite")

@@ -5,6 +5,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.findings import ArgumentError
 from tauguard.models.cloth import Cloth, add_cloth
 from tauguard.models.scene import INTEGRATORS
 
@@ -39,10 +40,10 @@ def ball_cloth(
         count: vertices along each side of the cloth.
 
     Raises:
-        ValueError: an unknown impact point, or a speed that is not above 0.
+        ArgumentError: an unknown impact point, or a speed that is not above 0.
     """
     if impact not in IMPACT_POINTS:
-        raise ValueError(f"impact {impact!r}: expected one of {', '.join(IMPACT_POINTS)}")
+        raise ArgumentError(f"impact {impact!r}: expected one of {', '.join(IMPACT_POINTS)}")
     spec = _spec("discrete", speed)
     cloth = Cloth(
         count=count,
@@ -91,7 +92,7 @@ def sphere_plate(speed: float = 10.0, offset: float = 0.0, stiff: bool = True) -
         stiff: whether contacts of the plate use :data:`STIFF` instead of MuJoCo's default.
 
     Raises:
-        ValueError: a speed that is not above 0.
+        ArgumentError: a speed that is not above 0.
     """
     spec = _spec("implicitfast", speed)
     plate = spec.worldbody.add_geom(
@@ -110,9 +111,9 @@ def sphere_plate(speed: float = 10.0, offset: float = 0.0, stiff: bool = True) -
 
 
 def _spec(integrator: str, speed: float) -> mujoco.MjSpec:
-    """An empty scene without gravity; ``ValueError`` for a bad speed."""
+    """An empty scene without gravity; ``ArgumentError`` for a bad speed."""
     if not 0 < speed < np.inf:
-        raise ValueError(f"speed {speed} m/s: expected above 0")
+        raise ArgumentError(f"speed {speed} m/s: expected above 0")
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.option.integrator = INTEGRATORS[integrator]

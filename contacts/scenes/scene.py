@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 
 #: Called before every step. Sets ``data.ctrl`` or ``data.qfrc_applied`` as a function of the state.
 Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
@@ -30,12 +31,12 @@ class ContactScene:
         """A copy of the model, with ``timestep`` [s] if given, and data in the initial state.
 
         Raises:
-            ValueError: a timestep that is not above 0 or not finite.
+            ArgumentError: a timestep that is not above 0 or not finite.
         """
         model = copy.copy(self.model)
         if timestep is not None:
             if not 0 < timestep < np.inf:
-                raise ValueError(f"timestep {timestep}: expected seconds above 0")
+                raise ArgumentError(f"timestep {timestep}: expected seconds above 0")
             model.opt.timestep = timestep
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = self.qpos, self.qvel

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from tauguard.atomic_write import atomic_file, write_atomic
+from tauguard.findings import ArgumentError
 from tauguard.traces import Trace
 
 Array = NDArray[Any]
@@ -38,11 +39,11 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
         robot: LeRobot's ``robot_type``.
 
     Raises:
-        ValueError: the folder is not empty, no traces, or traces without truth.
+        ArgumentError: the folder is not empty, no traces, or traces without truth.
         OSError: the folder cannot be written.
     """
     if folder.exists() and any(folder.iterdir()):
-        raise ValueError(f"{folder}: not empty; name a new folder")
+        raise ArgumentError(f"{folder}: not empty; name a new folder")
     for name in ("meta/episodes/chunk-000", "data"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     episodes: list[dict[str, Any]] = []
@@ -52,7 +53,7 @@ def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) 
         _write_file(folder, where, group, episodes)
         names = group[0].joint_names
     if not episodes:
-        raise ValueError("no episodes to export")
+        raise ArgumentError("no episodes to export")
     _write_meta(folder, episodes, rate, robot, features(names))
     return len(episodes)
 
@@ -84,7 +85,7 @@ def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
     """A trace as LeRobot's columns; ``first`` is the index of its first row in the dataset."""
     truth = trace.truth
     if truth is None or trace.q_des is None or trace.qd_des is None:
-        raise ValueError("a trace without truth or references cannot be exported to LeRobot")
+        raise ArgumentError("a trace without truth or references cannot be exported to LeRobot")
     rows = len(trace.t)
     busy = np.zeros(rows, bool)
     for one in truth.collisions:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.extras import extra
+from tauguard.findings import ArgumentError
 from tauguard.traces import Trace
 
 #: Minari's warnings that author, code and environments are not given.
@@ -26,17 +27,17 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
         rate: sample rate of the traces [Hz], for the description.
 
     Raises:
-        ValueError: Minari is not installed or has a dataset of this name, there are no traces, or
-            traces have no truth.
+        ArgumentError: Minari is not installed or has a dataset of this name, there are no traces,
+            or traces have no truth.
     """
     try:
         import minari
     except ImportError:
-        raise ValueError(f"Minari needs {extra('export')}") from None
+        raise ArgumentError(f"Minari needs {extra('export')}") from None
     from gymnasium.spaces import Box
 
     if name in minari.list_local_datasets():
-        raise ValueError(f"{name}: Minari has a dataset of that name; name another version")
+        raise ArgumentError(f"{name}: Minari has a dataset of that name; name another version")
     dataset: Any = None
     count = 0
     for trace in traces:
@@ -57,7 +58,7 @@ def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
             dataset.update_dataset_from_buffer([buffer])
         count += 1
     if not count:
-        raise ValueError("no episodes to export")
+        raise ArgumentError("no episodes to export")
     return count
 
 
@@ -67,7 +68,7 @@ def _buffer(trace: Trace, number: int) -> Any:
 
     truth = trace.truth
     if truth is None or trace.q_des is None or trace.qd_des is None:
-        raise ValueError("a trace without truth or references cannot be exported to Minari")
+        raise ArgumentError("a trace without truth or references cannot be exported to Minari")
     seen = np.hstack([trace.q, trace.qd, trace.current]).astype(np.float32)
     wanted = np.hstack([trace.q_des, trace.qd_des]).astype(np.float32)
     steps = len(seen) - 1

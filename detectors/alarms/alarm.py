@@ -28,6 +28,7 @@ from tauguard.detectors.thresholds.free_scores import (
     memory_samples,
     recent_speed,
 )
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Detection, Trace
 
 #: Message when an extreme sample has made the detector's state infinite or NaN.
@@ -53,12 +54,12 @@ class CollisionAlarm(Frozen):
     detector's own score is used."""
 
     def __post_init__(self) -> None:
-        """Check the fields: ``ValueError``."""
+        """Check the fields: ``ArgumentError``."""
         confirmation_samples(self.confirmation, self.detector.dt)
         if np.isnan(self.threshold):
-            raise ValueError("threshold: not a number")
+            raise ArgumentError("threshold: not a number")
         if self.floor is not None and (self.normalisation is None or floor_of(self) is None):
-            raise ValueError("floor: needs a normalisation and a detector with a floor")
+            raise ArgumentError("floor: needs a normalisation and a detector with a floor")
 
     @property
     def settle(self) -> float:
@@ -107,7 +108,7 @@ class CollisionAlarm(Frozen):
             score: the detector's score before normalisation (default: computed).
 
         Raises:
-            ValueError: the trace ends before the detector has settled.
+            ArgumentError: the trace ends before the detector has settled.
         """
         found = FreeScores.of(self.sustained(trace, score), trace, self.settle)
         plain = floor_of(self)
@@ -123,7 +124,7 @@ class CollisionAlarm(Frozen):
         """Alarms of a trace, with the residual of the plain momentum observer.
 
         Raises:
-            ValueError: the trace has another number of joints than the training data, or a
+            ArgumentError: the trace has another number of joints than the training data, or a
                 sample rate that the detector does not accept.
         """
         score = self.scores(trace)
@@ -154,7 +155,7 @@ def floor_of(alarm: CollisionAlarm) -> FittedThresholds | None:
 
 def _finite(score: Array, trace: Trace) -> Array:
     if not np.isfinite(score).all():
-        raise ValueError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
+        raise ArgumentError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
     return score
 
 
@@ -191,18 +192,18 @@ class AlarmStream:
         Args: as :meth:`~tauguard.detectors.ScoreStream.step`.
 
         Raises:
-            ValueError: as there, or a sample interval that differs from the training's.
+            ArgumentError: as there, or a sample interval that differs from the training's.
         """
         interval = self._dt if dt is None else dt
         if not self._first and not same_rate(interval, self._dt):
-            raise ValueError(
+            raise ArgumentError(
                 f"dt {1e3 * interval:g} ms: this detector works at {1e3 * self._dt:g} ms; feed it "
                 "every sample, or train one at this rate"
             )
         try:
             up = self.native.step(q, qd, current, interval)
         except TypeError:
-            raise ValueError(
+            raise ArgumentError(
                 "q, qd, current: expected float64 arrays, one entry per joint"
             ) from None
         self._first = False

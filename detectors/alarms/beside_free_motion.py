@@ -12,6 +12,7 @@ from tauguard.detectors.calibration.recording import Load
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 
@@ -27,11 +28,11 @@ class BesideFreeMotion(Frozen):
     learned: CollisionAlarm  #: of the same arm
 
     def __post_init__(self) -> None:
-        """Check the fields: ``ValueError``."""
+        """Check the fields: ``ArgumentError``."""
         if self.learned.detector.arm.robot.joints != self.free.arm.robot.joints:
-            raise ValueError("free, learned: of arms with different joints")
+            raise ArgumentError("free, learned: of arms with different joints")
         if not self.learned.threshold > 0:
-            raise ValueError(f"learned.threshold {self.learned.threshold}: expected above 0")
+            raise ArgumentError(f"learned.threshold {self.learned.threshold}: expected above 0")
 
     @property
     def name(self) -> str:
@@ -61,7 +62,7 @@ class BesideFreeMotion(Frozen):
         """The larger score, shape (T,).
 
         Raises:
-            ValueError: other joints or another sample rate than the training's.
+            ArgumentError: other joints or another sample rate than the training's.
         """
         found = self.learned.detect(trace)
         learned = np.where(found.alarm, found.score / self.learned.threshold, 0.0)

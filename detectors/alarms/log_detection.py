@@ -16,6 +16,7 @@ from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, find_alarms
 from tauguard.detectors.features.motion_regimes import SEEN, SHORTLY, motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion, Judged
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Alarm, Detection, Trace
 
 STRANGE = 0.2  # fraction of a log in alarm above which it may be the log of another arm
@@ -50,12 +51,12 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
         load_known: the detector accounts for the carried load, so no note asks for the load.
 
     Raises:
-        ValueError: number of joints or sample rate differs from the training's, the log ends
+        ArgumentError: number of joints or sample rate differs from the training's, the log ends
             before the detector has settled, or its motion does not explain its torques.
     """
     settled = float(trace.t[0] + alarm.settle)
     if not trace.t[-1] > settled:
-        raise ValueError(
+        raise ArgumentError(
             f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector raises alarms only "
             f"after {alarm.settle:g} s"
         )

@@ -34,6 +34,7 @@ from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Fraction of the collision-free traces that is held out for the threshold without folds.
@@ -86,7 +87,7 @@ def train(
             collision-free traces is held out for the threshold instead, which is faster.
 
     Raises:
-        ValueError: traces of different arms or rates, or without data that the method needs;
+        ArgumentError: traces of different arms or rates, or without data that the method needs;
             ``per_hour`` not above 0, or ``folds`` below 1.
     """
     believed = nominal_arm(traces) if arm is None else arm
@@ -113,7 +114,7 @@ def train_and_score(
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """As :func:`train`, with the normalised scores that the threshold comes from."""
     if not (per_hour > 0 and folds >= 1):
-        raise ValueError(f"per_hour {per_hour}, folds {folds}: expected above 0, and 1 or more")
+        raise ArgumentError(f"per_hour {per_hour}, folds {folds}: expected above 0, and 1 or more")
     free = sum(not _collisions(trace) for trace in traces)
     if min(folds, free) < 2:
         own, rest = held_out(traces)
@@ -151,7 +152,7 @@ def train_beside(
         The alarm, the normalised scores that its threshold comes from, and notes for the user.
 
     Raises:
-        ValueError: traces that do not fit, or too little motion.
+        ArgumentError: traces that do not fit, or too little motion.
     """
     parts = pieces([Recording(log) for log in logs.values()], 2)
     halved = len(parts) > len(logs)
@@ -236,7 +237,7 @@ def with_rate(detector: FittedDetector, traces: Sequence[Trace], per_hour: float
         per_hour: accepted false alarms per hour of such motion.
 
     Raises:
-        ValueError: no collision-free motion, or ``per_hour`` not above 0.
+        ArgumentError: no collision-free motion, or ``per_hour`` not above 0.
     """
     return _with_rate(detector, _free_scores(detector, traces), per_hour)[0]
 
@@ -284,11 +285,11 @@ def with_guarantee(
         confidence: see :func:`~tauguard.detectors.thresholds.guarantee.guaranteed_threshold`.
 
     Raises:
-        ValueError: an episode with collisions, or too few episodes for the guarantee.
+        ArgumentError: an episode with collisions, or too few episodes for the guarantee.
     """
     for trace in traces:
         if count := _collisions(trace):
-            raise ValueError(
+            raise ArgumentError(
                 f"an episode with {count} collisions: calibration needs collision-free motion"
             )
     scores = [alarm.free_scores(trace) for trace in traces]
@@ -300,11 +301,11 @@ def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:
     """Traces that are longer than settling and confirmation time together.
 
     Raises:
-        ValueError: there are none.
+        ArgumentError: there are none.
     """
     found = [t for t in traces if t.t[-1] - t.t[0] > alarm.settle + alarm.confirmation]
     if not found:
-        raise ValueError(
+        raise ArgumentError(
             f"no collision-free motion after the {alarm.settle:g} s that {alarm.detector.name} "
             "needs to settle"
         )
@@ -315,10 +316,10 @@ def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
     """The alarm for the arm with a load in its gripper.
 
     Raises:
-        ValueError: not a free-motion detector: other detectors cannot be given a load.
+        ArgumentError: not a free-motion detector: other detectors cannot be given a load.
     """
     if not isinstance(alarm.detector, FittedFreeMotion | BesideFreeMotion):
-        raise ValueError(
+        raise ArgumentError(
             f"{alarm.detector.name}: a load can be given only to free-motion detectors"
         )
     return replace(alarm, detector=alarm.detector.carrying(load))

@@ -12,6 +12,7 @@ import numpy as np
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.findings import FileError
 from tauguard.models import pin_model
 from tauguard.models.robot_file import read_note, write_robot_file
 
@@ -52,7 +53,7 @@ def load_arm(path: str | Path) -> ArmModel | None:
     """The calibrated arm of a robot file; None for a file without a calibration.
 
     Raises:
-        ValueError: not a robot file, or a calibration of other joints or of another version.
+        FileError: not a robot file, or a calibration of other joints or of another version.
         OSError: cannot be read.
     """
     text = read_note(path)
@@ -62,13 +63,13 @@ def load_arm(path: str | Path) -> ArmModel | None:
     try:
         note = json.loads(text)
         if note["format"] != FORMAT:
-            raise ValueError(f"format {note['format']!r}, expected {FORMAT!r}")
+            raise FileError(f"format {note['format']!r}, expected {FORMAT!r}")
         if tuple(note["joints"]) != robot.joint_names:
-            raise ValueError(f"joints {', '.join(note['joints'])}")
+            raise FileError(f"joints {', '.join(note['joints'])}")
         friction = None if note["friction"] is None else FrictionModel(**note["friction"])
         # The links may have fewer digits than the comment.
         inertial, armature = (np.array(note[k], np.float64) for k in ("inertial", "armature"))
         robot = replace(robot, inertial=inertial, armature=armature)
         return ArmModel(robot, note["drive_gain"], friction, note["noise"])
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path}: its calibration cannot be read ({error})") from None
+        raise FileError(f"{path}: its calibration cannot be read ({error})") from None

@@ -22,6 +22,7 @@ from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import intervals, lagged, low_pass
 from tauguard.detectors.events import find_alarms
+from tauguard.findings import RefusedError
 from tauguard.traces.trace import Trace
 
 #: A log is refused if more than the fraction UNEXPLAINED of a joint's torque is unexplained, and
@@ -143,7 +144,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
         logs: by name, from :func:`unexplained` with a calibration from these logs.
 
     Raises:
-        ValueError: a log with bursts; names each of them and the times.
+        RefusedError: a log with bursts; names each of them and the times.
     """
     found = []
     for name, log in logs.items():
@@ -167,7 +168,7 @@ def check_bursts(joints: Sequence[str], logs: Mapping[str, Unexplained]) -> None
                 f"do, at {said} s after the beginning"
             )
     if found:
-        raise ValueError(
+        raise RefusedError(
             f"{'; '.join(found)}: if something touched the arm there, leave the log out or cut "
             "these seconds out"
         )
@@ -184,7 +185,7 @@ def unexplained_notes(
         limit: largest unexplained fraction of a joint's torque.
 
     Raises:
-        ValueError: a fraction above ``limit``.
+        RefusedError: a fraction above ``limit``.
     """
     left, torque, rows = np.zeros(len(joints)), np.full(len(joints), 1e-12), np.zeros(len(joints))
     for log in logs:
@@ -202,7 +203,7 @@ def unexplained_notes(
         "signs, units (milliamperes?) or gains of the currents or torques"
     )
     if fraction[worst] > limit:
-        raise ValueError(said)
+        raise RefusedError(said)
     return (said,) if fraction[worst] > DOUBTFUL else ()
 
 
@@ -235,7 +236,7 @@ def check_loads(
         data: from :func:`filtered_logs`.
 
     Raises:
-        ValueError: names the log, the given load and the load that the torques show.
+        RefusedError: names the log, the given load and the load that the torques show.
     """
     logs = list(recordings.values())
     for k, (name, recording) in enumerate(recordings.items()):
@@ -247,7 +248,7 @@ def check_loads(
         own = [*data[:k], *filtered_logs(arm, [open_]), *data[k + 1 :]]
         shown = float(identify(arm, asked, data=own).loads[k, 0])
         if abs(shown - given) > max(WRONG_LOAD[0], WRONG_LOAD[1] * given):
-            raise ValueError(
+            raise RefusedError(
                 f"{name}: {given:g} kg were given, its torques show {shown:.1f} kg compared with "
                 "the other logs: give the load that was carried, in kg, or =unknown"
             )
@@ -266,10 +267,10 @@ def left_out(
     the residuals of the recordings are comparable. ``data``: as in :func:`identify`.
 
     Raises:
-        ValueError: fewer than two recordings, or as :func:`identify`.
+        RefusedError: fewer than two recordings, or as :func:`identify`.
     """
     if len(recordings) < 2:
-        raise ValueError("one log alone cannot be held out: give two or more")
+        raise RefusedError("one log alone cannot be held out: give two or more")
     if scale != "gains":
         arm = ArmModel(arm.robot, identify(arm, recordings, scale=scale).arm.drive_gain)
     calibrated, found = Subsets(replace(arm, friction=None), recordings, data), []
@@ -287,7 +288,7 @@ def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
     the joints whose current does.
 
     Raises:
-        ValueError: no joint's current follows the torque: wrong joints, signs or units.
+        RefusedError: no joint's current follows the torque: wrong joints, signs or units.
     """
     torque, current = [], []
     for trace in traces:
@@ -301,7 +302,7 @@ def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
     alike = both / np.sqrt((a**2).sum(axis=0) * (b**2).sum(axis=0) + 1e-12)
     sure = np.abs(alike) > 0.5
     if not sure.any():
-        raise ValueError(
+        raise RefusedError(
             "no joint's current follows the torque that its motion needs: check the order of the "
             "joints, signs and units, or give --gains"
         )

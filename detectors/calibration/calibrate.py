@@ -28,6 +28,7 @@ from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel
 from tauguard.detectors.estimation.velocity import SLOWEST, SensorNoise
 from tauguard.detectors.events import free_rows
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Default friction columns.
@@ -95,7 +96,7 @@ def calibrate(
         The calibrated arm with its friction model and noise levels.
 
     Raises:
-        ValueError: no collision-free rows, or a trace of another arm.
+        ArgumentError: no collision-free rows, or a trace of another arm.
     """
     priors = priors or Priors()
     model = friction or arm.friction or DEFAULT
@@ -103,10 +104,12 @@ def calibrate(
     kept = list(traces)
     for trace in kept:
         if len(trace.joint_names) != robot.joints:
-            raise ValueError(f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}")
+            raise ArgumentError(
+                f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}"
+            )
     data = [_columns(trace, arm, model) for trace in kept]
     if sum(len(one.current) for one in data) < 200:
-        raise ValueError(
+        raise ArgumentError(
             "calibrate: fewer than 200 collision-free rows; give 4 s of motion or more"
         )
     system, solution, level = _solved(data, robot, model, priors)

@@ -13,6 +13,7 @@ from tauguard.detectors.calibration.recording import Recording, cut, moves, movi
 from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import LOG_GAIN, intervals, lagged, low_pass
+from tauguard.findings import RefusedError
 from tauguard.traces.trace import Trace
 
 FAST = 0.05  # least speed of a checked joint [rad/s]
@@ -42,7 +43,7 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
         logs: by name, collision-free.
 
     Raises:
-        ValueError: names log and joints.
+        RefusedError: names log and joints.
     """
     for name, recording in logs.items():
         if not moves(recording.trace):
@@ -50,7 +51,7 @@ def check_signs(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
         drags = drag(arm.robot, recording.trace, np.sign(arm.drive_gain))
         pairs = zip(arm.robot.joint_names, drags, strict=True)
         if against := [joint for joint, value in pairs if value < AGAINST]:
-            raise ValueError(
+            raise RefusedError(
                 f"{name}: friction would push {', '.join(against)}: the sign of the current or "
                 "torque, or of the velocity, is opposite to the robot file's; for currents, a "
                 "negative number in --gains or in current_scale of the column map turns it, for "
@@ -104,10 +105,10 @@ def check_order(arm: ArmModel, logs: Mapping[str, Recording]) -> None:
     """Refuse logs in which the columns of two joints are exchanged, or one joint's are negated.
 
     Raises:
-        ValueError: names the joints, see :func:`misread`.
+        RefusedError: names the joints, see :func:`misread`.
     """
     if found := misread(arm, logs):
-        raise ValueError(found)
+        raise RefusedError(found)
 
 
 def misread(arm: ArmModel, logs: Mapping[str, Recording]) -> str:
@@ -230,19 +231,19 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
         traces: their positions are used.
 
     Raises:
-        ValueError: the ratio of the gravity torques is outside its limits.
+        RefusedError: the ratio of the gravity torques is outside its limits.
     """
     poses = np.concatenate([trace.q[:: max(1, len(trace.q) // 100)] for trace in traces])
     needed, shown = gravity_torque(file, poses), gravity_torque(found, poses)
     need, has = (float(np.sqrt((torque**2).mean())) for torque in (needed, shown))
     if has >= 1e-6 and (needed * shown).sum() < 0:
-        raise ValueError(
+        raise RefusedError(
             "the logs show torques that pull with gravity instead of holding the arm: check the "
             "signs of the currents or torques, and of the gains"
         )
     if has < 1e-6 or LIGHTEST < has / max(need, 1e-9) < HEAVIEST:
         return
-    raise ValueError(
+    raise RefusedError(
         f"the logs show {has:.3g} N m against gravity (root mean square), the robot file's arm "
         f"needs {need:.3g} N m: the file of another arm, gains that are wrong, the order of the "
         "joints, or torques given as currents (--torque)"
@@ -288,7 +289,7 @@ def check_torques(
         touched: True if there can be contacts in these rows.
 
     Raises:
-        ValueError: an unexplained fraction above ``REFUSED``.
+        RefusedError: an unexplained fraction above ``REFUSED``.
     """
     if not rows.any():
         return ()
@@ -308,7 +309,7 @@ def check_torques(
         "joints)"
     )
     if fraction > REFUSED:
-        raise ValueError(
+        raise RefusedError(
             f"{said}: check the unit of the currents (milliamperes?), their signs, the order of "
             "the joints, the gains and the robot file"
         )

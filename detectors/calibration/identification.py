@@ -36,6 +36,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.physical_consistency import solve_physically_consistent
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers, mass_matrix
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.findings import ArgumentError
 
 #: Friction columns of a real geared joint: presliding of several lengths, Stribeck friction,
 #: viscous friction that saturates at high speed, and load-dependent friction. A torque per ampere
@@ -178,8 +179,8 @@ def identify(
         least: least total motion of the recordings [s]; smaller for parts of longer logs.
 
     Raises:
-        ValueError: unknown ``scale``, "payload" without a known load, too little motion, or a log
-            of another arm.
+        ArgumentError: unknown ``scale``, "payload" without a known load, too little motion, or a
+            log of another arm.
     """
     _check(recordings, arm.robot, scale)
     check_length(recordings, least)
@@ -220,7 +221,7 @@ class Subsets:
         """The arm identified from the recordings with these indices.
 
         Raises:
-            ValueError: as :func:`identify`.
+            ArgumentError: as :func:`identify`.
         """
         own, data = [self._recordings[k] for k in use], [self._data[k] for k in use]
         return identify(self._arm, own, friction=self._friction, data=data, least=least).arm
@@ -317,15 +318,15 @@ def _spread(matrix: Array, deviations: Array, joints: int) -> Array:
 
 def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:
     if scale not in ("gains", "payload", "masses"):
-        raise ValueError(f"scale {scale!r}: expected gains, payload or masses")
+        raise ArgumentError(f"scale {scale!r}: expected gains, payload or masses")
     if not recordings:
-        raise ValueError("no recordings to identify from")
+        raise ArgumentError("no recordings to identify from")
     if scale == "payload" and not any(r.load and r.load.mass > 0 for r in recordings):
-        raise ValueError("scale payload: no recording has a known load above 0 kg")
+        raise ArgumentError("scale payload: no recording has a known load above 0 kg")
     for recording in recordings:
         joints = len(recording.trace.joint_names)
         if joints != robot.joints:
-            raise ValueError(f"a log of {joints} joints, the robot has {robot.joints}")
+            raise ArgumentError(f"a log of {joints} joints, the robot has {robot.joints}")
 
 
 def _result(

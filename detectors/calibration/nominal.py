@@ -13,6 +13,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import PLAIN_GAIN, observe
+from tauguard.findings import ArgumentError
 from tauguard.models import (
     Drive,
     Robot,
@@ -38,10 +39,10 @@ def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
     """The arm model before training, from the attachments of the first recording.
 
     Raises:
-        ValueError: no nominal arm is attached.
+        ArgumentError: no nominal arm is attached.
     """
     if "arm.xml" not in traces[0].attachments:
-        raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
+        raise ArgumentError("no arm.xml attached: train on recordings that tauguard simulated")
     return _believed(*_attached(traces[0]))
 
 
@@ -49,13 +50,13 @@ def _attached(trace: Trace) -> tuple[str, Drive]:
     """MJCF and nominal drive of the arm of a trace."""
     attached = trace.attachments
     if "arm.xml" not in attached:
-        raise ValueError("no arm.xml attached to the trace: name its robot, robot='ur5e'")
+        raise ArgumentError("no arm.xml attached to the trace: name its robot, robot='ur5e'")
     name = trace.meta.get("arm", "cura6")
     if "drive.json" in attached:
         return attached["arm.xml"], drive_of(attached["drive.json"])
     if name in cura6.NAMES:
         return attached["arm.xml"], cura6_drive(name)
-    raise ValueError(
+    raise ArgumentError(
         f"arm {name}: an earlier version of tauguard made these recordings without the numbers "
         "of the drive (drive.json); make them again"
     )
@@ -65,7 +66,7 @@ def nominal_design(name: str = "cura6") -> ArmModel:
     """The arm model before training of an arm given by its name.
 
     Raises:
-        ValueError: no such arm.
+        ArgumentError: no such arm.
     """
     scene = compose(SceneSpec(arm=name))
     return _believed(scene.arm_xml, scene.facts.drive)
@@ -80,7 +81,7 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
         gain: gain of the observer [1/s], a number or one per joint.
 
     Raises:
-        ValueError: neither ``robot`` nor an attached arm, or a robot with other joints.
+        ArgumentError: neither ``robot`` nor an attached arm, or a robot with other joints.
         FileNotFoundError: no such robot.
     """
     if robot is None:
@@ -89,7 +90,7 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
         scene = compose(SceneSpec(arm=robot), visuals=False)
         xml, drive = scene.arm_xml, scene.facts.nominal
     if len(drive.gain) != trace.q.shape[1]:
-        raise ValueError(
+        raise ArgumentError(
             f"robot: {len(drive.gain)} joints, the trace has {trace.q.shape[1]}: "
             f"{', '.join(trace.joint_names)}"
         )

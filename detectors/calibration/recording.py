@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: A joint moves in a log if its speed is above this in some sample [rad/s].
@@ -30,13 +31,13 @@ class Load:
     """In the last link's frame [m]. None: unknown; it is identified with the arm's parameters."""
 
     def __post_init__(self) -> None:
-        """``ValueError`` for a mass below 0 or numbers that are not finite."""
+        """``ArgumentError`` for a mass below 0 or numbers that are not finite."""
         if not (np.isfinite(self.mass) and self.mass >= 0):
-            raise ValueError(f"load: {self.mass} kg, expected 0 or more")
+            raise ArgumentError(f"load: {self.mass} kg, expected 0 or more")
         if self.centre is not None and not (
             len(self.centre) == 3 and np.isfinite(self.centre).all()
         ):
-            raise ValueError(f"load: centre {self.centre}, expected three finite numbers [m]")
+            raise ArgumentError(f"load: centre {self.centre}, expected three finite numbers [m]")
 
 
 @dataclass(frozen=True)
@@ -75,16 +76,16 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
         margin: time at the beginning of the log that is always left out [s].
 
     Raises:
-        ValueError: no joint moves, or only within ``margin``.
+        ArgumentError: no joint moves, or only within ``margin``.
     """
     moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
     if not len(moves):
-        raise ValueError(f"no joint moves faster than {MOVING} rad/s")
+        raise ArgumentError(f"no joint moves faster than {MOVING} rad/s")
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     rows[moves[0] : moves[-1] + 1] = True
     rows &= trace.t >= trace.t[0] + margin
     if not rows.any():
-        raise ValueError(
+        raise ArgumentError(
             f"no motion is left without the first {margin:g} s of the log: give a longer log"
         )
     return rows
@@ -100,11 +101,11 @@ def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
     """Refuse less motion than ``least`` [s].
 
     Raises:
-        ValueError: there is less motion; the message says how much.
+        ArgumentError: there is less motion; the message says how much.
     """
     if (seconds := motion_length(recordings)) < least:
         still = "" if seconds else "no joint moves: "
-        raise ValueError(
+        raise ArgumentError(
             f"{still}{int(10 * seconds) / 10:g} s of motion in all, in each log from the first to "
             f"the last: {least:g} s are the least, two minutes are good"
         )

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.findings import ArgumentError
 from tauguard.models.link_surface import LinkSurface
 
 #: Equally likely standard deviations of the force along the normal, in the prior [N].
@@ -40,12 +41,12 @@ def link_poses(robot: RobotNumbers, q: ArrayLike) -> LinkPoses:
     """Forward kinematics at ``q`` [rad], shape (n,).
 
     Raises:
-        ValueError: another shape, or numbers that are not finite.
+        ArgumentError: another shape, or numbers that are not finite.
     """
     n = robot.joints
     at = np.asarray(q, dtype=np.float64)
     if at.shape != (n,) or not np.isfinite(at).all():
-        raise ValueError(f"q: shape {at.shape}, expected ({n},) finite numbers")
+        raise ArgumentError(f"q: shape {at.shape}, expected ({n},) finite numbers")
     rotation, origin = np.empty((n, 3, 3)), np.empty((n, 3))
     moved_by = np.eye(n, dtype=np.bool_)
     for i in range(n):
@@ -109,11 +110,11 @@ class ContactBelief:
         """Mean force [N] of a contact on a link, and the surface point next to its mean point [m].
 
         Raises:
-            ValueError: a link without surface.
+            ArgumentError: a link without surface.
         """
         rows = np.flatnonzero(self.link == link)
         if not len(rows):
-            raise ValueError(f"link {link}: no surface was sampled there")
+            raise ArgumentError(f"link {link}: no surface was sampled there")
         weight = self.probability[rows] + 1e-300
         weight = weight / weight.sum()
         force, middle = weight @ self.force[rows], weight @ self.point[rows]
@@ -141,14 +142,14 @@ def contact_belief(
         noise: standard deviation of the residual without contact [N m], shape (n,).
 
     Raises:
-        ValueError: shapes that do not fit, noise that is not above 0, a surface of another arm.
+        ArgumentError: shapes that do not fit, noise that is not above 0, a surface of another arm.
     """
     n = robot.joints
     y, sigma = np.asarray(residual, dtype=float), np.asarray(noise, dtype=float)
     if y.shape != (n,) or sigma.shape != (n,) or not np.isfinite(y).all() or not (sigma > 0).all():
-        raise ValueError(f"residual, noise: expected ({n},) finite numbers, noise above 0")
+        raise ArgumentError(f"residual, noise: expected ({n},) finite numbers, noise above 0")
     if surface.link.max() >= n:
-        raise ValueError(f"the surface has link {surface.link.max() + 1}, the robot {n} joints")
+        raise ArgumentError(f"the surface has link {surface.link.max() + 1}, the robot {n} joints")
     poses = link_poses(robot, q)
     turn = poses.rotation[surface.link]
     point = poses.origin[surface.link] + np.einsum("kij,kj->ki", turn, surface.point)
@@ -260,10 +261,10 @@ def isolate(
         The belief, with the points and forces of the last sample.
 
     Raises:
-        ValueError: no sample, or shapes that do not fit.
+        ArgumentError: no sample, or shapes that do not fit.
     """
     if not len(q) or not len(q) == len(residual) == len(noise):
-        raise ValueError(
+        raise ArgumentError(
             f"q, residual, noise: {len(q)}, {len(residual)} and {len(noise)} moments, "
             "expected as many of each, at least one"
         )

@@ -25,6 +25,7 @@ from tauguard.detectors.diagnosis.severity import Severity, severity
 from tauguard.detectors.diagnosis.tool_contact import tool_severity
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.findings import ArgumentError
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
@@ -103,12 +104,12 @@ def diagnose(
         A diagnosis for each alarm, in order.
 
     Raises:
-        ValueError: no collision shapes, or another arm.
+        ArgumentError: no collision shapes, or another arm.
     """
     found = detection or alarm.detect(trace)
     if robot is None:
         if "arm.xml" not in trace.attachments:
-            raise ValueError("the trace has no arm.xml: give a robot file with collision shapes")
+            raise ArgumentError("the trace has no arm.xml: give a robot file with collision shapes")
         robot = trace.attachments["arm.xml"]
     surface = robot if isinstance(robot, LinkSurface) else link_surface(robot)
     return Diagnoser.of(alarm.detector.arm, surface).diagnose(trace, found.alarms)

@@ -17,6 +17,7 @@ from tauguard.detectors.dynamics.robot import momentum_regressor
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Alarm, Trace
 
 #: Largest observer gain, as a fraction of the sample rate.
@@ -110,12 +111,14 @@ class PostAlarmWindows:
                 [s].
 
         Raises:
-            ValueError: ``start`` is not within the trace.
+            ArgumentError: ``start`` is not within the trace.
         """
         trace, known, lag = self.trace, self._estimate, 1 / self._gain
         after = max(after, LAGS * lag)
         if not trace.t[0] <= start <= trace.t[-1]:
-            raise ValueError(f"start {start} s: the trace goes from {trace.t[0]} to {trace.t[-1]}")
+            raise ArgumentError(
+                f"start {start} s: the trace goes from {trace.t[0]} to {trace.t[-1]}"
+            )
         assert known.unknowns is not None
         begin, first, at, last = np.searchsorted(
             trace.t, (start - before - SETTLED * lag, start - before, start, start + after)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import same_rows
+from tauguard.findings import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +44,21 @@ class FrictionModel:
     """Weights [N m per unit of the column], shape (n, columns)."""
 
     def __post_init__(self) -> None:
-        """Check all fields: ``ValueError`` names the field."""
+        """Check all fields: ``ArgumentError`` names the field."""
         for name in ("bristles", "stops", "stribeck", "slopes", "loaded"):
             widths = tuple(float(w) for w in getattr(self, name))
             if not all(np.isfinite(w) and w > 0 for w in widths):
-                raise ValueError(f"FrictionModel.{name}: {widths}, expected widths above 0")
+                raise ArgumentError(f"FrictionModel.{name}: {widths}, expected widths above 0")
             object.__setattr__(self, name, widths)
         if not self.bristles and not self.stops:
-            raise ValueError("FrictionModel: at least one bristle or one stop is needed")
+            raise ArgumentError("FrictionModel: at least one bristle or one stop is needed")
         weights = np.array(self.weights, dtype=np.float64, ndmin=2)
         cycles = np.array(self.cycles, dtype=np.float64, ndmin=2)
         if not (np.isfinite(weights).all() and np.isfinite(cycles).all()):
-            raise ValueError("FrictionModel: weights and cycles must be finite")
+            raise ArgumentError("FrictionModel: weights and cycles must be finite")
         object.__setattr__(self, "cycles", cycles)
         if weights.size and weights.shape[1] != self.columns:
-            raise ValueError(
+            raise ArgumentError(
                 f"FrictionModel.weights: {weights.shape[1]} columns, expected {self.columns}"
             )
         object.__setattr__(self, "weights", weights)
@@ -77,7 +78,9 @@ class FrictionModel:
     def basis(self, joints: int) -> _observer.FrictionBasis:
         """The native form of the columns."""
         if self.cycles.size and len(self.cycles) != joints:
-            raise ValueError(f"FrictionModel.cycles: {len(self.cycles)} rows for {joints} joints")
+            raise ArgumentError(
+                f"FrictionModel.cycles: {len(self.cycles)} rows for {joints} joints"
+            )
         return _observer.FrictionBasis(
             list(self.bristles),
             list(self.stops),
@@ -118,7 +121,7 @@ class FrictionModel:
         """Friction torque of a motion [N m], shape (T, n); positive at positive velocity."""
         columns = self.evaluate(q, qd, tau, load)
         if self.weights.shape != columns.shape[1:]:
-            raise ValueError(
+            raise ArgumentError(
                 f"FrictionModel.weights: shape {self.weights.shape}, "
                 f"expected {columns.shape[1:]}: identify them first"
             )

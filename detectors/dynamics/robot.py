@@ -14,6 +14,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.physical_consistency import inertial_numbers, pseudo_inertia
 from tauguard.detectors.frozen import Frozen
+from tauguard.findings import ArgumentError
 
 #: Inertial numbers per link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
 INERTIAL = 10
@@ -40,8 +41,8 @@ class RobotNumbers(Frozen):
         """Check shapes and freeze the arrays.
 
         Raises:
-            ValueError: a shape that does not fit, a number that is not finite, a parent that does
-                not come before its child; the message names the field.
+            ArgumentError: a shape that does not fit, a number that is not finite, a parent that
+                does not come before its child; the message names the field.
         """
         n = len(self.joint_names)
         shapes = {
@@ -59,15 +60,17 @@ class RobotNumbers(Frozen):
         for name, (dtype, shape) in kinds.items():
             value: NDArray[Any] = np.array(getattr(self, name), dtype=dtype, order="C")
             if value.shape != shape:
-                raise ValueError(
+                raise ArgumentError(
                     f"RobotNumbers.{name}: shape {value.shape}, expected {shape} for {n} joints"
                 )
             if not np.isfinite(value).all():
-                raise ValueError(f"RobotNumbers.{name}: every number must be finite")
+                raise ArgumentError(f"RobotNumbers.{name}: every number must be finite")
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         if ((self.parent < -1) | (self.parent >= np.arange(n))).any():
-            raise ValueError("RobotNumbers.parent: a joint's parent must come before it (base: -1)")
+            raise ArgumentError(
+                "RobotNumbers.parent: a joint's parent must come before it (base: -1)"
+            )
 
     @property
     def joints(self) -> int:
@@ -104,12 +107,12 @@ class RobotNumbers(Frozen):
             model: a fixed base, and joints with one degree of freedom each.
 
         Raises:
-            ValueError: a joint of another kind; the message names it.
+            ArgumentError: a joint of another kind; the message names it.
         """
         joints = list(range(1, model.njoints))
         for i in joints:
             if model.joints[i].nv != 1:
-                raise ValueError(
+                raise ArgumentError(
                     f"joint {model.names[i]}: {model.joints[i].shortname()} has "
                     f"{model.joints[i].nv} degrees of freedom; expected revolute or prismatic"
                 )
@@ -131,7 +134,7 @@ def _motion_axis(joint: Any) -> Array:
     """The joint's constant motion subspace (linear, angular), shape (6,)."""
     kind = joint.shortname()
     if "Helical" in kind or "Mimic" in kind:
-        raise ValueError(f"{kind}: expected a revolute or prismatic joint")
+        raise ArgumentError(f"{kind}: expected a revolute or prismatic joint")
     data = joint.createData()
     joint.calc(data, *_neutral(joint))
     subspace = np.asarray(data.S() if callable(data.S) else data.S, dtype=float)
@@ -149,16 +152,16 @@ def rows(name: str, value: ArrayLike, joints: int) -> Array:
     """``value`` as a C-contiguous float64 array of shape (T, joints).
 
     Raises:
-        ValueError: another shape, or an entry that is not finite; names the first bad row.
+        ArgumentError: another shape, or an entry that is not finite; names the first bad row.
     """
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+        raise ArgumentError(f"{name}: not an array of numbers ({error})") from None
     if array.ndim != 2 or array.shape[1] != joints:
-        raise ValueError(f"{name}: shape {array.shape}, expected (samples, {joints})")
+        raise ArgumentError(f"{name}: shape {array.shape}, expected (samples, {joints})")
     if not np.isfinite(array).all():
-        raise ValueError(f"{name}: not finite in row {np.argwhere(~np.isfinite(array))[0][0]}")
+        raise ArgumentError(f"{name}: not finite in row {np.argwhere(~np.isfinite(array))[0][0]}")
     return array
 
 
@@ -167,7 +170,7 @@ def same_rows(joints: int, **arrays: ArrayLike) -> list[Array]:
     checked = [rows(name, value, joints) for name, value in arrays.items()]
     if len({len(array) for array in checked}) > 1:
         lengths = ", ".join(f"{k} {len(v)}" for k, v in zip(arrays, checked, strict=True))
-        raise ValueError(f"numbers of samples differ: {lengths}")
+        raise ArgumentError(f"numbers of samples differ: {lengths}")
     return checked
 
 
@@ -251,9 +254,9 @@ def momentum_regressor(
     """
     q, qd = same_rows(robot.joints, q=q, qd=qd)
     if link is not None and not 0 <= link < robot.joints:
-        raise ValueError(f"link: {link}, expected 0 to {robot.joints - 1}")
+        raise ArgumentError(f"link: {link}, expected 0 to {robot.joints - 1}")
     if not 1 <= count <= INERTIAL:
-        raise ValueError(f"count: {count}, expected 1 to {INERTIAL}")
+        raise ArgumentError(f"count: {count}, expected 1 to {INERTIAL}")
     columns = INERTIAL * robot.joints if link is None else count
     p, beta = np.empty((*q.shape, columns)), np.empty((*q.shape, columns))
     if link is None:

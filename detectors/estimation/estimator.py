@@ -19,6 +19,7 @@ from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import PLAIN_GAIN, intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
+from tauguard.findings import ArgumentError
 
 #: Number of unknowns per joint: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3
@@ -62,11 +63,11 @@ class Unknowns:
     s_j the standard deviation that the uncertain payload gives it."""
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check: ``ArgumentError``."""
         for name, least in (("noise_inflation", 1.0), ("transition", 0.0), ("started", 0.0)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
-                raise ValueError(f"{name} {value}: expected a number, {least:g} or more")
+                raise ArgumentError(f"{name} {value}: expected a number, {least:g} or more")
 
     @classmethod
     def for_detection(cls) -> Unknowns:
@@ -122,20 +123,22 @@ class ArmModel:
     """Standard deviation of the residual without collision, by motion. None: ``noise``."""
 
     def __post_init__(self) -> None:
-        """Check shapes: ``ValueError`` names the field."""
+        """Check shapes: ``ArgumentError`` names the field."""
         joints = self.robot.joints
         gain = np.asarray(self.drive_gain, dtype=np.float64)
         if gain.shape != (joints,) or not np.isfinite(gain).all():
-            raise ValueError(f"drive_gain: shape {gain.shape}, expected ({joints},) finite numbers")
+            raise ArgumentError(
+                f"drive_gain: shape {gain.shape}, expected ({joints},) finite numbers"
+            )
         object.__setattr__(self, "drive_gain", gain)
         noise = np.ones(joints) if self.noise is None else per_joint("noise", self.noise, joints)
         object.__setattr__(self, "noise", noise)
         if self.friction is not None and len(self.friction.weights) != joints:
-            raise ValueError(
+            raise ArgumentError(
                 f"friction: weights of {len(self.friction.weights)} joints, the robot has {joints}"
             )
         if self.sensors is not None and len(self.sensors.position) != joints:
-            raise ValueError(
+            raise ArgumentError(
                 f"sensors: noise of {len(self.sensors.position)} joints, the robot has {joints}"
             )
 
@@ -247,13 +250,13 @@ class Estimator:
         """Process one sample. ``out``, shape (6, n): residual, unexplained, four rows of motion.
 
         Raises:
-            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+            ArgumentError: wrong shapes or numbers that are not finite; the state is as before.
         """
         try:
             step = self.dt if dt is None else dt
             self.native.step(q, qd, current, step, out[0], out[1], out[2:])
         except TypeError:
             joints = self.arm.robot.joints
-            raise ValueError(
+            raise ArgumentError(
                 f"q, qd, current: expected float64 arrays of shape ({joints},)"
             ) from None

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows, same_rows
+from tauguard.findings import ArgumentError
 
 #: Default, for reports and recordings.
 PLAIN_GAIN = 100.0
@@ -30,15 +31,15 @@ def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
     """``value`` as one positive number per joint, shape (joints,).
 
     Raises:
-        ValueError: another shape, or a number that is not finite and above 0.
+        ArgumentError: another shape, or a number that is not finite and above 0.
     """
     array = np.asarray(value, dtype=np.float64)
     if array.ndim == 0:
         array = np.full(joints, float(array))
     if array.shape != (joints,):
-        raise ValueError(f"{name}: shape {array.shape}, expected one number or ({joints},)")
+        raise ArgumentError(f"{name}: shape {array.shape}, expected one number or ({joints},)")
     if not (np.isfinite(array).all() and (array > 0).all()):
-        raise ValueError(f"{name}: {array.tolist()}, every entry must be finite and above 0")
+        raise ArgumentError(f"{name}: {array.tolist()}, every entry must be finite and above 0")
     return np.ascontiguousarray(array)
 
 
@@ -50,18 +51,18 @@ def intervals(t: ArrayLike, samples: int) -> Array:
         samples: how many rows the signals have.
 
     Raises:
-        ValueError: times that do not fit or do not increase; names the row.
+        ArgumentError: times that do not fit or do not increase; names the row.
     """
     times = np.asarray(t, dtype=np.float64)
     if times.ndim == 0:
         if not (np.isfinite(times) and times > 0):
-            raise ValueError(f"t: interval {times}, expected a number above 0")
+            raise ArgumentError(f"t: interval {times}, expected a number above 0")
         return np.full(max(samples - 1, 0), float(times))
     if times.shape != (samples,):
-        raise ValueError(f"t: shape {times.shape}, expected ({samples},)")
+        raise ArgumentError(f"t: shape {times.shape}, expected ({samples},)")
     dt = np.diff(times)
     if not (dt > 0).all():
-        raise ValueError(f"t: not increasing at row {int(np.flatnonzero(~(dt > 0))[0]) + 1}")
+        raise ArgumentError(f"t: not increasing at row {int(np.flatnonzero(~(dt > 0))[0]) + 1}")
     return dt
 
 
@@ -112,7 +113,7 @@ def observe(
         Residual [N m], the estimate of ``tau_ext``, shape (T, n); the first row is zero.
 
     Raises:
-        ValueError: shapes that differ, values that are not finite, times that do not increase.
+        ArgumentError: shapes that differ, values that are not finite, times that do not increase.
     """
     q, qd, tau = same_rows(robot.joints, q=q, qd=qd, tau=tau)
     dt = intervals(t, len(q))
@@ -159,7 +160,7 @@ class MomentumObserver:
         """Restore a state of :meth:`get_state`.
 
         Raises:
-            ValueError: a state of an arm with other joints.
+            ArgumentError: a state of an arm with other joints.
         """
         self.native.restore(state.tolist())
 
@@ -184,7 +185,7 @@ class MomentumObserver:
             Residual [N m], shape (n,).
 
         Raises:
-            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+            ArgumentError: wrong shapes or numbers that are not finite; the state is as before.
         """
         if out is None:
             out = np.empty_like(self.gain)
@@ -196,5 +197,5 @@ class MomentumObserver:
                 out[:] = 0.0
         except TypeError:
             n = self.robot.joints
-            raise ValueError(f"q, qd, tau: expected float64 arrays of shape ({n},)") from None
+            raise ArgumentError(f"q, qd, tau: expected float64 arrays of shape ({n},)") from None
         return out

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Random walk of the acceleration in the filter [rad/s^2 per root second]. A larger value detects
@@ -31,14 +32,14 @@ class SensorNoise:
     velocity: Array  #: [rad/s], shape (n,)
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError`` for values that are not above 0, or different lengths."""
+        """Check: ``ArgumentError`` for values that are not above 0, or different lengths."""
         for name in ("position", "velocity"):
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.ndim != 1 or not (np.isfinite(value).all() and (value > 0).all()):
-                raise ValueError(f"SensorNoise.{name}: expected one number above 0 per joint")
+                raise ArgumentError(f"SensorNoise.{name}: expected one number above 0 per joint")
             object.__setattr__(self, name, value)
         if len(self.position) != len(self.velocity):
-            raise ValueError("SensorNoise: position and velocity of different numbers of joints")
+            raise ArgumentError("SensorNoise: position and velocity of different numbers of joints")
 
     @classmethod
     def measured(cls, traces: Sequence[Trace]) -> SensorNoise:

@@ -12,6 +12,7 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.evaluation.card_page import times
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import friction_levels
+from tauguard.findings import RefusedError
 from tauguard.report import poisson_rate
 
 #: Largest accepted RMS error of a calibration in a held-out log, in friction levels of the joint.
@@ -30,14 +31,14 @@ def check_own_alarms(logs: Sequence[CrossValidatedLog], asked: float = ASKED) ->
         asked: accepted false alarms per hour.
 
     Raises:
-        ValueError: the rate is above ``asked`` with 97.5 % confidence.
+        RefusedError: the rate is above ``asked`` with 97.5 % confidence.
     """
     alarms, seconds = sum(len(log.alarms) for log in logs), sum(log.seconds for log in logs)
     low = poisson_rate(alarms, seconds / 3600)["low"]
     if low is None or low <= asked:
         return
     own = ", ".join(f"{log.name}: {times(log)}" for log in logs if log.alarms)
-    raise ValueError(
+    raise RefusedError(
         f"{alarms} alarms in {seconds / 60:.1f} min of collision-free logs, each log judged by "
         f"thresholds from the others ({own}): at least {low:.0f} an hour where {asked:g} are "
         "accepted; if something touched the arm at these times, leave out these logs or cut out "
@@ -49,11 +50,11 @@ def check_own_error(logs: Sequence[CrossValidatedLog]) -> None:
     """Refuse logs whose residual exceeds the other logs' bounds for half of the time in motion.
 
     Raises:
-        ValueError: names the logs.
+        RefusedError: names the logs.
     """
     if beyond := [log for log in logs if log.level > 1]:
         own = ", ".join(f"{log.name} (median {log.level:.1f} times the bound)" for log in beyond)
-        raise ValueError(
+        raise RefusedError(
             "with bounds from the other logs, the residual exceeds its bound for half of the time "
             f"in which joints move, in {own}; possible causes: a load that was not given, or a "
             "motion that the others do not show"
@@ -72,7 +73,7 @@ def check_held_out(
         held: held-out RMS residual of each recording without a load [N m], shape (n,) each.
 
     Raises:
-        ValueError: names joint, log, error and friction level of the largest excess.
+        RefusedError: names joint, log, error and friction level of the largest excess.
     """
     if not len(held):
         return
@@ -81,7 +82,7 @@ def check_held_out(
     over = np.where(laden[:, None], 0.0, np.asarray(held) / level)
     log, joint = divmod(int(np.argmax(over)), over.shape[1])
     if over[log, joint] > HELD_OUT:
-        raise ValueError(
+        raise RefusedError(
             f"predicted by the other logs, {arm.robot.joint_names[joint]} in {names[log]} has a "
             f"torque error of {held[log][joint]:.3g} N m (root mean square), more than "
             f"{HELD_OUT:g} times its friction of {level[joint]:.3g} N m; possible causes: poses or "

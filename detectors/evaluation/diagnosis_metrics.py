@@ -16,6 +16,7 @@ from tauguard.detectors.diagnosis.diagnosis import Diagnosis, diagnose
 from tauguard.detectors.evaluation.matching import Matching, match_detection
 from tauguard.detectors.events import detection_window
 from tauguard.detectors.samples import check_interval
+from tauguard.findings import ArgumentError
 from tauguard.models import link_surface
 from tauguard.report import rate as wilson
 from tauguard.traces.trace import Collision, Detection, Trace, Truth
@@ -31,7 +32,7 @@ def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, 
     that time, they are the collision's own force and point.
 
     Raises:
-        ValueError: the trace has no truth.
+        ArgumentError: the trace has no truth.
     """
     truth = _truth(trace)
     first, last = np.searchsorted(trace.t, (time - LAG, time))
@@ -44,7 +45,7 @@ def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, 
 
 def _truth(trace: Trace) -> Truth:
     if trace.truth is None:
-        raise ValueError("trace has no truth to match a diagnosis with")
+        raise ArgumentError("trace has no truth to match a diagnosis with")
     return trace.truth
 
 
@@ -83,7 +84,7 @@ class TrueSeverity:
         """The severity of a collision until the time ``until`` [s].
 
         Raises:
-            ValueError: the trace has no truth.
+            ArgumentError: the trace has no truth.
         """
         first, last = np.searchsorted(trace.t, (collision.onset, min(collision.end, until)))
         force = _truth(trace).contact_vector[first : max(last, first + 1)]
@@ -108,7 +109,7 @@ def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Matche
     the window are left out. An alarm in no window is false.
 
     Raises:
-        ValueError: the trace has no truth.
+        ArgumentError: the trace has no truth.
     """
     collisions = _truth(trace).collisions
     matched, used = [], set()
@@ -206,11 +207,11 @@ def judge_recording(alarm: CollisionAlarm, name: str, trace: Trace) -> JudgedRec
     """Detect in a recording and match with its truth.
 
     Raises:
-        ValueError: no truth, another sample rate, or other joints; the last two give ``name``.
+        ArgumentError: no truth, another sample rate, or other joints; the last two give ``name``.
     """
     check_interval(name, trace, alarm.detector.dt)
     if trace.joint_names != (own := alarm.detector.arm.robot.joint_names):
-        raise ValueError(
+        raise ArgumentError(
             f"{name} has joints {', '.join(trace.joint_names)}, the model {', '.join(own)}"
         )
     found = alarm.detect(trace)

@@ -15,6 +15,7 @@ import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.events import CASE_SECONDS, Interval, detection_window, occupied
+from tauguard.findings import ArgumentError
 from tauguard.report import poisson_rate
 from tauguard.report import rate as wilson
 from tauguard.traces.trace import STRATA, Alarm, Collision, Detection, Trace, stratum
@@ -46,7 +47,7 @@ def match(alarms: Sequence[Alarm], collisions: Sequence[Collision], span: Interv
     """
     begin, end = span
     if not begin <= end:
-        raise ValueError(f"span {span} s: expected begin <= end")
+        raise ArgumentError(f"span {span} s: expected begin <= end")
     inside = [c for c in collisions if begin <= c.onset <= end]
     inner = [a for a in alarms if begin <= a.start <= end]
     delays: list[float | None] = []
@@ -96,12 +97,12 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
         skip: time at the beginning that does not count [s].
 
     Raises:
-        ValueError: the trace has no truth, or the detection belongs to another trace.
+        ArgumentError: the trace has no truth, or the detection belongs to another trace.
     """
     if trace.truth is None:
-        raise ValueError("trace has no truth to match a detection with")
+        raise ArgumentError("trace has no truth to match a detection with")
     if detection.t.shape != trace.t.shape:
-        raise ValueError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
+        raise ArgumentError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
     span = float(min(trace.t[0] + skip, trace.t[-1])), float(trace.t[-1])
     return match(detection.alarms, trace.truth.collisions, span)
 
@@ -110,7 +111,8 @@ def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:
     """A detector's alarms on recordings, matched with their truth, one recording at a time.
 
     Raises:
-        ValueError: a trace without truth, or with other joints or sample rate than the detector's.
+        ArgumentError: a trace without truth, or with other joints or sample rate than the
+            detector's.
     """
     return [match_detection(alarm.detect(trace), trace, alarm.settle) for trace in traces]
 

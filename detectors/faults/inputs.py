@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array, runs
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimator, Unknowns
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Rate of the observer whose residual is used [1/s].
@@ -80,7 +81,7 @@ class TorqueCheck:
             dt: time since the last sample [s] (default: the constructor's).
 
         Raises:
-            ValueError: wrong shapes or numbers that are not finite.
+            ArgumentError: wrong shapes or numbers that are not finite.
         """
         self.observer.step(q, qd, current, self._out, dt)
         number, joint, value = self.native.step(self._out[0], current, dt or self._dt)
@@ -181,10 +182,10 @@ class UsualInput:
             arm: calibrated arm (default: limits of the torques stay the general ones).
 
         Raises:
-            ValueError: no traces, or a trace of fewer than two samples.
+            ArgumentError: no traces, or a trace of fewer than two samples.
         """
         if not traces or any(len(trace.t) < 2 for trace in traces):
-            raise ValueError("no traces, or one of fewer than 2 samples: nothing to learn from")
+            raise ArgumentError("no traces, or one of fewer than 2 samples: nothing to learn from")
         dt = float(np.median([trace.dt for trace in traces]))
         window = max(2, round(SPAN / dt))
         usual = cls(
@@ -317,7 +318,7 @@ class FaultCheck:
             current: [A], shape (n,).
 
         Raises:
-            ValueError: another number of joints.
+            ArgumentError: another number of joints.
         """
         number, joint, value = self.native.step(t, q, qd, current)
         return input_fault(self.usual, number, joint, value) if number else None

@@ -12,6 +12,7 @@ from tauguard.detectors import _observer
 from tauguard.detectors.calibration.recording import LoadDeviation, Recording
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
+from tauguard.findings import ArgumentError
 
 #: More rows than this are thinned out.
 ROWS = 2000
@@ -37,7 +38,7 @@ def upper_quantile(
         Shape (k,).
 
     Raises:
-        ValueError: the programme has no solution, because numbers are not finite.
+        ArgumentError: the programme has no solution, because numbers are not finite.
     """
     from scipy.optimize import linprog
 
@@ -56,7 +57,7 @@ def upper_quantile(
         method="highs",
     )
     if found.x is None:
-        raise ValueError(f"quantile regression: {found.message}")
+        raise ArgumentError(f"quantile regression: {found.message}")
     cost = found.ineqlin.marginals
     coefficients: Array = np.maximum(prior - (cost[:k] - cost[k:]), 0.0)
     return coefficients
@@ -112,11 +113,11 @@ class Bound:
     in motion, shape (3, n)."""
 
     def __post_init__(self) -> None:
-        """Refuse ``fast`` and ``hard`` that are not finite or not above 0: ``ValueError``."""
+        """Refuse ``fast`` and ``hard`` that are not finite or not above 0: ``ArgumentError``."""
         for name in ("fast", "hard"):
             own = getattr(self, name)
             if not (np.isfinite(own) & (own > 0)).all():
-                raise ValueError(f"{name} {own}: expected finite numbers above 0")
+                raise ArgumentError(f"{name} {own}: expected finite numbers above 0")
 
     @classmethod
     def prior(cls, friction: Array, static: Array, low: Array, high: Array) -> Bound:

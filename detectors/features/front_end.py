@@ -25,6 +25,7 @@ from tauguard.detectors.estimation.velocity import SLOWEST
 from tauguard.detectors.events import undisturbed_rows
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_trace, common_interval
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 
@@ -39,9 +40,11 @@ class Scaling(Frozen):
     compress: bool = False  #: compress by asinh
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check: ``ArgumentError``."""
         if not self.joints or not (self.units > 0 and np.isfinite(self.factor)):
-            raise ValueError(f"Scaling: {self}, expected some joints, units > 0, a finite factor")
+            raise ArgumentError(
+                f"Scaling: {self}, expected some joints, units > 0, a finite factor"
+            )
 
     @property
     def numbers(self) -> tuple[list[int], list[float], float, float, bool]:
@@ -82,7 +85,7 @@ class NativeStream:
         try:
             return self.native.step(q, qd, current, self._dt if dt is None else dt)
         except TypeError:
-            raise ValueError(
+            raise ArgumentError(
                 f"q, qd, current: expected float64 arrays of shape ({self.native.joints},)"
             ) from None
 
@@ -112,8 +115,8 @@ class FrontEndSettings:
         Equal settings return their last result again if traces and arm are the same objects.
 
         Raises:
-            ValueError: traces of different arms or rates, or without collision-free motion, or no
-                joint of ``joints`` exists.
+            ArgumentError: traces of different arms or rates, or without collision-free motion, or
+                no joint of ``joints`` exists.
         """
         given = (*traces, arm)
         known, found = _FITTED.get(self, ((), None))
@@ -129,11 +132,11 @@ class FrontEndSettings:
         dt, count = common_interval(traces, arm.robot.joint_names), arm.robot.joints
         joints = tuple(j - 1 for j in self.joints if 1 <= j <= count)
         if not joints:
-            raise ValueError(f"joints {self.joints}: expected some of 1 to {count}")
+            raise ArgumentError(f"joints {self.joints}: expected some of 1 to {count}")
         thin = max(1, round(THIN / dt))
         free = [np.flatnonzero(rows)[::thin] for rows in undisturbed_rows(traces, self.settle)]
         if not sum(len(rows) for rows in free):
-            raise ValueError(
+            raise ArgumentError(
                 f"no collision-free motion after the first {self.settle:g} s of any trace"
             )
         if self.calibrate:
@@ -173,11 +176,15 @@ class FrontEnd(Frozen):
     dt: float  #: sample interval [s]
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check: ``ArgumentError``."""
         if not (self.dt > 0 and self.gain > 0 and self.settle >= 0):
-            raise ValueError(f"dt {self.dt}, gain {self.gain}, settle {self.settle}: out of range")
+            raise ArgumentError(
+                f"dt {self.dt}, gain {self.gain}, settle {self.settle}: out of range"
+            )
         if not self.joints or not 0 <= min(self.joints) <= max(self.joints) < self.arm.robot.joints:
-            raise ValueError(f"joints {self.joints}: expected some of 0 to below the arm's number")
+            raise ArgumentError(
+                f"joints {self.joints}: expected some of 0 to below the arm's number"
+            )
 
     def estimator(self) -> Estimator:
         """A new estimator of this arm."""
@@ -188,7 +195,7 @@ class FrontEnd(Frozen):
         """The estimate of a trace, cached as long as the trace exists.
 
         Raises:
-            ValueError: another arm or another rate.
+            ArgumentError: another arm or another rate.
         """
         front, known = _ESTIMATES.get(id(trace), (None, None))
         if front is self and known is not None:

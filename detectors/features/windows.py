@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import _kernel
 from tauguard.detectors.estimation.observer import intervals, lagged
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Length and sample interval of the dissertation's window [s].
@@ -32,7 +33,7 @@ class WindowShape:
     def at(cls, dt: float) -> WindowShape:
         """The dissertation's window, in whole samples of ``dt`` seconds."""
         if not dt > 0:
-            raise ValueError(f"dt {dt} s: expected above 0")
+            raise ArgumentError(f"dt {dt} s: expected above 0")
         lag = max(1, round(INTERVAL / dt))
         return cls(lag, max(1, round(WINDOW / (lag * dt))) + 1)
 
@@ -163,7 +164,7 @@ def draw_windows(
     """Random windows and targets, a fraction :data:`STRUCK` of them from collisions.
 
     Raises:
-        ValueError: no collision or no free motion in the traces.
+        ArgumentError: no collision or no free motion in the traces.
     """
     x, y = [], []
     for name, fraction in (("collision", STRUCK), ("free", 1 - STRUCK)):
@@ -171,7 +172,7 @@ def draw_windows(
         total = sum(int(m.sum()) for m in masks)
         if total == 0:
             what = "collision" if name == "collision" else "collision-free row"
-            raise ValueError(f"the training traces contain no {what}: both kinds are needed")
+            raise ArgumentError(f"the training traces contain no {what}: both kinds are needed")
         picks = np.sort(rng.choice(total, min(total, round(count * fraction)), replace=False))
         start = 0
         for p, mask in zip(prepared, masks, strict=True):

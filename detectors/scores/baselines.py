@@ -20,6 +20,7 @@ from tauguard.detectors.features.front_end import (
     OnFrontEnd,
     Scaling,
 )
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 
@@ -44,7 +45,7 @@ class MovingThresholds:
         """Calibrate the arm, fit the noise model and compute each joint's quantile.
 
         Raises:
-            ValueError: traces of different arms or rates, or without collision-free motion.
+            ArgumentError: traces of different arms or rates, or without collision-free motion.
         """
         front = self.front.fit(traces, arm)
         scaling = self.scaling(front)
@@ -81,9 +82,9 @@ class FittedThresholds(OnFrontEnd):
     name: str
 
     def __post_init__(self) -> None:
-        """Check: ``ValueError``."""
+        """Check: ``ArgumentError``."""
         if self.limits.shape != (len(self.scaling.joints),) or not (self.limits > 0).all():
-            raise ValueError("limits: expected one number above 0 per joint")
+            raise ArgumentError("limits: expected one number above 0 per joint")
 
     def scores(self, trace: Trace) -> Array:
         """The largest ratio over the joints, shape (T,)."""

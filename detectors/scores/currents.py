@@ -15,6 +15,7 @@ from tauguard.detectors.events import free_rows
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_trace, common_interval
 from tauguard.detectors.scores.network import Network
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 
@@ -129,7 +130,7 @@ class CurrentNetwork:
         because errors are largest at fast starts and stops, which are rare.
 
         Raises:
-            ValueError: traces of different arms or rates, or without collision-free motion.
+            ArgumentError: traces of different arms or rates, or without collision-free motion.
         """
         inputs = Inputs(self.lags, self.memory, common_interval(traces, arm.robot.joint_names))
         x, y = [], []
@@ -148,7 +149,7 @@ class CurrentNetwork:
         rng = np.random.default_rng([self.seed, 7])
         free = [np.flatnonzero(free_rows(trace, self.settle)) for trace in traces]
         if not sum(len(rows) for rows in free):
-            raise ValueError("no collision-free motion in the traces")
+            raise ArgumentError("no collision-free motion in the traces")
         lively = [
             np.sqrt(np.abs(inputs.acceleration(trace)[rows]).sum(axis=1) + STILL)
             for trace, rows in zip(traces, free, strict=True)

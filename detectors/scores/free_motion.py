@@ -56,6 +56,7 @@ from tauguard.detectors.features.motion_regimes import (
 )
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_joints
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Confirmation time of an alarm [s]: 0, because scores include the confirmation.
@@ -159,11 +160,11 @@ class FittedFreeMotion(Frozen):
         """Ratios, bounds and residuals of a trace.
 
         Raises:
-            ValueError: other joints than the arm's.
+            ArgumentError: other joints than the arm's.
         """
         joints = self.arm.robot.joints
         if len(trace.joint_names) != joints:
-            raise ValueError(
+            raise ArgumentError(
                 f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
             )
         ratio, bound, residual, qdd, shaken, around, rest, hides = (
@@ -194,13 +195,15 @@ class FreeMotion:
             arm: nominal numbers and drive gains; the gains are not identified.
 
         Raises:
-            ValueError: no or too little motion, or other joints.
+            ArgumentError: no or too little motion, or other joints.
         """
         recordings = [
             r for r in map(_recording, traces) if not (r.trace.truth and r.trace.truth.collisions)
         ]
         if traces and not recordings:
-            raise ValueError("no trace without collisions: this detector learns from free motion")
+            raise ArgumentError(
+                "no trace without collisions: this detector learns from free motion"
+            )
         check_joints([r.trace for r in recordings], arm.robot.joint_names)
         parts = pieces(recordings, FOLDS)
         moving = [r for r in parts if moves(r.trace)]
@@ -226,10 +229,10 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     Its bounds come from the calmest pieces of the logs, so contacts in these logs raise alarms.
 
     Raises:
-        ValueError: logs that are too short.
+        ArgumentError: logs that are too short.
     """
     if (length := sum(float(r.trace.t[-1] - r.trace.t[0]) for r in recordings)) < LEAST_STANDING:
-        raise ValueError(
+        raise ArgumentError(
             f"no joint moves in these logs, and they are too short, {length:.1f} s in all: "
             f"{LEAST_STANDING:g} s are the least, ten are good"
         )
@@ -241,7 +244,7 @@ def standing_detector(arm: ArmModel, recordings: Sequence[Recording]) -> FittedF
     judged = [with_load_of(r, prior).judge(r.trace) for r in recordings]
     noise = np.fmin(_noise(judged, np.full(n, np.nan)), CALM * _calmest(judged, n))
     if not np.isfinite(noise).all():
-        raise ValueError(
+        raise ArgumentError(
             "no log is free of motion for long enough: give one of two seconds or more"
         )
     noise = np.maximum(noise, max(QUIETEST * float(noise.max()), 1e-6))

@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from tauguard.arrays import Array
 from tauguard.detectors import _kernel
 from tauguard.detectors.frozen import Frozen
+from tauguard.findings import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +28,13 @@ class KernelMachine(Frozen):
     sigma: float
 
     def __post_init__(self) -> None:
-        """Check the shapes and sigma: ``ValueError`` names what does not fit."""
+        """Check the shapes and sigma: ``ArgumentError`` names what does not fit."""
         if self.vectors.ndim != 2 or self.weights.shape != self.vectors.shape[:1]:
-            raise ValueError(f"vectors {self.vectors.shape}, weights {self.weights.shape}: differ")
+            raise ArgumentError(
+                f"vectors {self.vectors.shape}, weights {self.weights.shape}: differ"
+            )
         if not (np.isfinite(self.sigma) and self.sigma > 0):
-            raise ValueError(f"sigma: {self.sigma}, expected above 0")
+            raise ArgumentError(f"sigma: {self.sigma}, expected above 0")
 
     @cached_property
     def native(self) -> _kernel.KernelSum:
@@ -51,7 +54,7 @@ class KernelMachine(Frozen):
         See :func:`reduced_set`.
 
         Raises:
-            ValueError: a count outside 1 to the number of vectors.
+            ArgumentError: a count outside 1 to the number of vectors.
         """
         vectors, weights = reduced_set(self.vectors, self.weights, self.sigma, count)
         return KernelMachine(vectors, weights, self.intercept, self.sigma)
@@ -72,9 +75,11 @@ def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int =
     left = np.ascontiguousarray(a, dtype=np.float64)
     right = np.ascontiguousarray(b, dtype=np.float64)
     if left.ndim != 2 or right.ndim != 2 or left.shape[1] != right.shape[1]:
-        raise ValueError(f"a, b: shapes {left.shape} and {right.shape}, expected (N, d) and (M, d)")
+        raise ArgumentError(
+            f"a, b: shapes {left.shape} and {right.shape}, expected (N, d) and (M, d)"
+        )
     if not sigma > 0:
-        raise ValueError(f"sigma: {sigma}, expected above 0")
+        raise ArgumentError(f"sigma: {sigma}, expected above 0")
     out = np.empty((len(left), len(right)))
     _kernel.gram(left, right, float(sigma), out, threads)
     return out
@@ -138,11 +143,11 @@ def reduced_set(
         vectors depend linearly on the picked ones.
 
     Raises:
-        ValueError: a count outside 1 to S.
+        ArgumentError: a count outside 1 to S.
     """
     total = len(vectors)
     if not 1 <= count <= total:
-        raise ValueError(f"count: {count}, expected 1 to the {total} support vectors there are")
+        raise ArgumentError(f"count: {count}, expected 1 to the {total} support vectors there are")
     kernel = srq_kernel(vectors, vectors, sigma)
     values = kernel @ coefficients
     left, distance = values.copy(), np.ones(total)

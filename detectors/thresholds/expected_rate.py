@@ -27,6 +27,7 @@ from tauguard.detectors.thresholds.tail_model import (
     shape_error,
     tail_fraction,
 )
+from tauguard.findings import ArgumentError
 from tauguard.report import poisson_rate, two_digits
 
 #: Bounds of the tail's shape unless the peaks show an end of the tail; then the lowest is LOWEST.
@@ -51,10 +52,10 @@ class ExpectedRate:
         """The rates from scores of collision-free episodes.
 
         Raises:
-            ValueError: no episodes.
+            ArgumentError: no episodes.
         """
         if not scores:
-            raise ValueError("no collision-free motion to estimate a rate of false alarms from")
+            raise ArgumentError("no collision-free motion to estimate a rate of false alarms from")
         blocks = tuple(np.sort(one.blocks()[0]) for one in scores)
         highest = np.array([one.peak for one in scores])
         hours = np.array([one.seconds for one in scores]) / 3600

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP, find_alarms, free_rows
+from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
 
 #: Time for which the recent speed includes a motion [s], because stiction acts after a stop.
@@ -43,7 +44,7 @@ def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
 def memory_samples(dt: float, memory: float = MEMORY) -> int:
     """Number of samples within ``memory``, at least 1; times in s."""
     if not (dt > 0 and np.isfinite(memory) and memory >= 0):
-        raise ValueError(f"dt {dt}, memory {memory} s: expected above 0, and 0 or more")
+        raise ArgumentError(f"dt {dt}, memory {memory} s: expected above 0, and 0 or more")
     return max(1, round(memory / dt))
 
 
@@ -62,12 +63,12 @@ class SpeedNormalisation:
     unit: Array  #: mean excess of the peaks that exceed ``base``, above 0, shape (K,)
 
     def __post_init__(self) -> None:
-        """Check shapes and values: ``ValueError``."""
+        """Check shapes and values: ``ArgumentError``."""
         shapes = [np.shape(value) for value in (self.speed, self.base, self.unit)]
         if len(shapes[0]) != 1 or not shapes[0][0] or len(set(shapes)) != 1:
-            raise ValueError(f"speed, base, unit: shapes {shapes}, expected (K,) each, K > 0")
+            raise ArgumentError(f"speed, base, unit: shapes {shapes}, expected (K,) each, K > 0")
         if not ((np.diff(self.speed) >= 0).all() and (self.unit > 0).all()):
-            raise ValueError("speed, unit: expected rising speeds and units above 0")
+            raise ArgumentError("speed, unit: expected rising speeds and units above 0")
 
     @classmethod
     def fit(cls, peaks: ArrayLike, speeds: ArrayLike) -> SpeedNormalisation:
@@ -78,17 +79,17 @@ class SpeedNormalisation:
             speeds: recent speed at this score [rad/s], shape (B,).
 
         Raises:
-            ValueError: no blocks, shapes that differ, or numbers that are not finite.
+            ArgumentError: no blocks, shapes that differ, or numbers that are not finite.
         """
         from sklearn.isotonic import IsotonicRegression
 
         value, speed = np.asarray(peaks, dtype=np.float64), np.asarray(speeds, dtype=np.float64)
         if value.shape != speed.shape or value.ndim != 1 or not len(value):
-            raise ValueError(
+            raise ArgumentError(
                 f"peaks, speeds: shapes {value.shape} and {speed.shape}, expected (B,) twice, B > 0"
             )
         if not (np.isfinite(value).all() and np.isfinite(speed).all()):
-            raise ValueError("peaks, speeds: expected finite numbers only")
+            raise ArgumentError("peaks, speeds: expected finite numbers only")
         bins = int(np.clip(len(value) // FEWEST, 1, BINS))
         parts = np.array_split(np.argsort(speed, kind="stable"), bins)
         base = [float(np.quantile(value[part], 1 - TAIL)) for part in parts]
@@ -149,11 +150,11 @@ class FreeScores:
             settle: settling time of the detector [s].
 
         Raises:
-            ValueError: the trace ends before the detector has settled.
+            ArgumentError: the trace ends before the detector has settled.
         """
         rows = np.flatnonzero(free_rows(trace, settle) & (level > -np.inf))
         if not len(rows):
-            raise ValueError(
+            raise ArgumentError(
                 f"an episode of {trace.t[-1] - trace.t[0]:g} s: no collision-free motion after the "
                 f"{settle:g} s that the detector needs to settle"
             )

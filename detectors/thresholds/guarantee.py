@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.findings import ArgumentError
 
 #: Alarms per episode are counted at a threshold that COUNTED episodes exceed, or FRACTION of all
 #: episodes if that number is smaller.
@@ -54,7 +55,7 @@ def guaranteed_threshold(
             which the guarantee holds, between 0 and 1.
 
     Raises:
-        ValueError: bad arguments, or too few episodes; the message says how many are enough.
+        ArgumentError: bad arguments, or too few episodes; the message says how many are enough.
     """
     check_guarantee([e.seconds for e in episodes], per_hour, confidence)
     count = len(episodes)
@@ -85,14 +86,14 @@ def check_guarantee(seconds: Sequence[float], per_hour: float, confidence: float
         confidence: between 0 and 1.
 
     Raises:
-        ValueError: bad arguments, or too few episodes; the message says how many are enough.
+        ArgumentError: bad arguments, or too few episodes; the message says how many are enough.
     """
     if not per_hour > 0:
-        raise ValueError(f"per_hour: {per_hour}, expected above 0")
+        raise ArgumentError(f"per_hour: {per_hour}, expected above 0")
     if not 0 < confidence < 1:
-        raise ValueError(f"confidence: {confidence}, expected between 0 and 1")
+        raise ArgumentError(f"confidence: {confidence}, expected between 0 and 1")
     if not seconds:
-        raise ValueError("no episodes to calibrate on")
+        raise ArgumentError("no episodes to calibrate on")
     count, hours = len(seconds), sum(seconds) / 3600
     alpha = min(1.0, per_hour * hours / count)
     if allowed_episodes(count, alpha, confidence) < 0:

@@ -13,6 +13,7 @@ from tauguard.detectors.thresholds.free_scores import (
     SpeedNormalisation,
     speed_normalisation,
 )
+from tauguard.findings import ArgumentError
 
 #: The tail's shape unless the peaks show another one. For two detectors on 26 simulated arms, the
 #: estimated shapes have means of 0.18 and 0.20 and standard deviations of 0.12, of which chance
@@ -103,10 +104,10 @@ def tail_level(peaks: Array, allowed: float, count: int, usual: float = USUAL_SH
         usual: shape of the tail unless the peaks show another one.
 
     Raises:
-        ValueError: no peaks, or ``allowed`` not above 0.
+        ArgumentError: no peaks, or ``allowed`` not above 0.
     """
     if not (len(peaks) and allowed > 0):
-        raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
+        raise ArgumentError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
     if allowed >= max(min(count, len(peaks) - 1), 1):
         return float(peaks[min(int(allowed), len(peaks) - 1)])
     return Tail.of(peaks, count, usual=usual).level(allowed)
@@ -138,10 +139,12 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
         per_hour: accepted false alarms per hour.
 
     Raises:
-        ValueError: no scores, or ``per_hour`` not above 0.
+        ArgumentError: no scores, or ``per_hour`` not above 0.
     """
     if not (len(scores) and per_hour > 0):
-        raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
+        raise ArgumentError(
+            f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0"
+        )
     peaks = np.sort(np.concatenate([(one.floor or one).blocks()[0] for one in scores]))[::-1]
     hours = sum(one.seconds for one in scores) / 3600
     interval = max(one.interval for one in scores)

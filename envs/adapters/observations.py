@@ -11,6 +11,7 @@ from tauguard.arrays import Array
 from tauguard.envs.gym.base import arm_env
 from tauguard.envs.gym.rendering import Camera
 from tauguard.envs.gym.settings import DETECTORS, one_of
+from tauguard.findings import ArgumentError
 
 #: Bound of the residual in the observation [N m].
 RESIDUAL_BOUND = 1e4
@@ -48,14 +49,14 @@ class CameraObservation(gymnasium.ObservationWrapper[Any, Any, Any], RecordConst
             width: width of the pictures [px].
 
         Raises:
-            ValueError: an unknown mode, or a height or width below 1.
+            ArgumentError: an unknown mode, or a height or width below 1.
             RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         RecordConstructorArgs.__init__(self, mode=mode, height=height, width=width)
         gymnasium.ObservationWrapper.__init__(self, env)
         one_of("mode", mode, MODES)
         if min(height, width) < 1:
-            raise ValueError(f"height {height}, width {width}: expected 1 or more pixels")
+            raise ArgumentError(f"height {height}, width {width}: expected 1 or more pixels")
         self._arm = arm_env(env)
         self._shape, self._mode = (height, width), mode
         self._camera = Camera(self._arm.compiled, self._arm.batch.datas[0], height, width)
@@ -98,7 +99,7 @@ class DetectorObservation(gymnasium.ObservationWrapper[Array, Array, Array], Rec
             detector: as the keyword ``detector`` of environments; ``None``: the environment's own.
 
         Raises:
-            ValueError: there is no detector, or it was trained on another arm or sample rate.
+            ArgumentError: there is no detector, or it was trained on another arm or sample rate.
         """
         RecordConstructorArgs.__init__(self, detector=detector)
         gymnasium.ObservationWrapper.__init__(self, env)
@@ -106,7 +107,7 @@ class DetectorObservation(gymnasium.ObservationWrapper[Array, Array, Array], Rec
         if detector is not None:
             inner.batch.attach(detector)
         elif inner.compiled.settings.detector is None:
-            raise ValueError(
+            raise ArgumentError(
                 "detector: the environment has none; give one to the wrapper or gymnasium.make: "
                 f"{', '.join(DETECTORS)}, or the path of a trained detector"
             )

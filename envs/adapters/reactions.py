@@ -11,6 +11,7 @@ from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.settings import one_of
+from tauguard.findings import ArgumentError
 
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
 #: Trigger of a reaction: the detector's alarm, or the true contact, which no real robot measures.
@@ -62,7 +63,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             deceleration: deceleration of every joint [rad/s^2] (default: the arm's own limits).
 
         Raises:
-            ValueError: an unknown reaction or trigger, or trigger "alarm" without a detector.
+            ArgumentError: an unknown reaction or trigger, or trigger "alarm" without a detector.
         """
         RecordConstructorArgs.__init__(
             self, reaction=reaction, trigger=trigger, deceleration=deceleration
@@ -72,7 +73,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         one_of("trigger", trigger, TRIGGERS)
         self._arm: ArmEnv = arm_env(env)
         if trigger == "alarm" and self._arm.batch.sensing is None:
-            raise ValueError("trigger 'alarm': the environment has no detector; pass detector=")
+            raise ArgumentError("trigger 'alarm': the environment has no detector; pass detector=")
         self.reaction, self.trigger = reaction, trigger
         compiled = self._arm.compiled
         n = len(compiled.scene.joint_names)

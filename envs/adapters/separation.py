@@ -12,6 +12,7 @@ from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.placing import carried
 from tauguard.envs.gym.settings import positive
+from tauguard.findings import ArgumentError
 
 #: Largest distance that is computed [m].
 FAR = 3.0
@@ -50,7 +51,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
             hysteresis: the arm moves on at this distance above S [m].
 
         Raises:
-            ValueError: a number below 0, or an environment without body regions.
+            ArgumentError: a number below 0, or an environment without body regions.
         """
         RecordConstructorArgs.__init__(
             self,
@@ -65,11 +66,11 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         for name in ("reaction_time", "intrusion", "uncertainty", "hysteresis"):
             value = locals()[name]
             if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} {value}: expected 0 or more")
+                raise ArgumentError(f"{name} {value}: expected 0 or more")
         self._arm: ArmEnv = arm_env(env)
         compiled = self._arm.compiled
         if not compiled.regions:
-            raise ValueError("no body regions to keep away from: name some with obstacles=")
+            raise ArgumentError("no body regions to keep away from: name some with obstacles=")
         self._terms = (approach_speed, reaction_time, intrusion + uncertainty, hysteresis)
         model = compiled.scene.model
         self._geoms = [

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tauguard.envs.episodes.motions import check_load, check_percent
+from tauguard.findings import ArgumentError
 from tauguard.models import Mismatch, SceneObject
 from tauguard.traces import KINDS
 
@@ -42,19 +43,19 @@ class CollisionPlan:
     force: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names what is wrong and what would work."""
+        """Check the values: ``ArgumentError`` names what is wrong and what would work."""
         if self.kind not in KINDS:
-            raise ValueError(f"kind {self.kind!r}: expected one of {', '.join(KINDS)}")
+            raise ArgumentError(f"kind {self.kind!r}: expected one of {', '.join(KINDS)}")
         if self.link < 1:
-            raise ValueError(f"link {self.link}: links are counted from 1")
+            raise ArgumentError(f"link {self.link}: links are counted from 1")
         if not 0 < self.duration < math.inf:
-            raise ValueError(f"duration {self.duration}: expected seconds above 0")
+            raise ArgumentError(f"duration {self.duration}: expected seconds above 0")
         if self.strength is not None and not math.isfinite(self.strength):
-            raise ValueError(f"strength {self.strength}: expected a finite number")
+            raise ArgumentError(f"strength {self.strength}: expected a finite number")
         for name, unit in (("severity", "N m"), ("force", "N")):
             span = getattr(self, name)
             if span is not None and not 0 < span[0] < span[1]:
-                raise ValueError(f"{name} {span}: expected 0 < low < high [{unit}]")
+                raise ArgumentError(f"{name} {span}: expected 0 < low < high [{unit}]")
 
 
 @dataclass(frozen=True)
@@ -83,22 +84,22 @@ class Episode:
     objects: tuple[SceneObject, ...] = ()  #: your own objects around the arm
 
     def __post_init__(self) -> None:
-        """Check the values: ``ValueError`` names what is wrong and what would work."""
+        """Check the values: ``ArgumentError`` names what is wrong and what would work."""
         for name in ("seconds", "timestep"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
-                raise ValueError(f"{name} {value}: expected more than 0 and finite")
+                raise ArgumentError(f"{name} {value}: expected more than 0 and finite")
         if self.seconds < 2 * self.timestep:
-            raise ValueError(f"seconds {self.seconds}: expected two steps of {self.timestep} s")
+            raise ArgumentError(f"seconds {self.seconds}: expected two steps of {self.timestep} s")
         if self.temperature is not None and not math.isfinite(self.temperature):
-            raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
+            raise ArgumentError(f"temperature {self.temperature}: expected a finite number of degC")
         check_percent(self.speed)
         for load in (self.payload_g, *(pick.payload_g for pick in self.picks)):
             check_load(load)
         times = [plan.time for plan in self.collisions] + [pick.time for pick in self.picks]
         for time in times:
             if not 0 <= time < self.seconds:
-                raise ValueError(f"time {time}: outside the episode (0 to {self.seconds} s)")
+                raise ArgumentError(f"time {time}: outside the episode (0 to {self.seconds} s)")
 
     def to_json(self) -> str:
         """The episode as JSON text, for :meth:`from_json`."""
@@ -112,15 +113,15 @@ class Episode:
         """The episode in a text of :meth:`to_json`.
 
         Raises:
-            ValueError: not JSON, or an unknown key.
+            ArgumentError: not JSON, or an unknown key.
         """
         try:
             values: dict[str, Any] = json.loads(text)
         except json.JSONDecodeError as error:
-            raise ValueError(f"episode: not JSON ({error})") from None
+            raise ArgumentError(f"episode: not JSON ({error})") from None
         known = {f.name for f in dataclasses.fields(cls)}
         if unknown := sorted(values.keys() - known):
-            raise ValueError(f"episode: unknown keys {unknown}; known: {sorted(known)}")
+            raise ArgumentError(f"episode: unknown keys {unknown}; known: {sorted(known)}")
         values["collisions"] = tuple(
             CollisionPlan(
                 **{**c, **{k: tuple(c[k]) for k in ("severity", "force") if c.get(k) is not None}}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array, in_a_line
+from tauguard.findings import ArgumentError
 
 #: Peak velocity and peak acceleration of 10 s^3 - 15 s^4 + 6 s^5 for s from 0 to 1.
 _PEAK_VELOCITY = 1.875
@@ -41,17 +42,18 @@ def point_to_point(
         dt: sample interval [s].
 
     Raises:
-        ValueError: lengths that do not match, a duration that is not above 0, or a negative dwell.
+        ArgumentError: lengths that do not match, a duration that is not above 0, or a negative
+            dwell.
     """
     points = np.asarray(waypoints, dtype=float)
     spans, pauses = np.asarray(durations, dtype=float), np.asarray(dwells, dtype=float)
     if len(spans) != len(points) - 1 or len(pauses) != len(points):
-        raise ValueError(
+        raise ArgumentError(
             f"{len(points)} waypoints need {len(points) - 1} durations and {len(points)} dwells, "
             f"not {len(spans)} and {len(pauses)}"
         )
     if (spans <= 0).any() or (pauses < 0).any():
-        raise ValueError("durations must be positive and dwells not negative")
+        raise ArgumentError("durations must be positive and dwells not negative")
     blocks: list[tuple[Array, Array, Array]] = []
     for i in range(len(points)):
         rest = np.repeat(points[i : i + 1], round(pauses[i] / dt), axis=0)
@@ -84,17 +86,17 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
 
 
 def check_load(grams: float) -> None:
-    """Raise a ``ValueError`` unless ``grams`` is a possible payload."""
+    """Raise an ``ArgumentError`` unless ``grams`` is a possible payload."""
     if not 0 <= grams <= 1e6:
         why = "" if grams > 0 else "a load has 0 or more grams; "
-        raise ValueError(f"payload_g {grams}: {why}expected 0 to 1,000,000 grams")
+        raise ArgumentError(f"payload_g {grams}: {why}expected 0 to 1,000,000 grams")
 
 
 def check_percent(speed: float) -> None:
-    """Raise a ``ValueError`` unless ``speed`` is a percentage above 1, so not a fraction."""
+    """Raise an ``ArgumentError`` unless ``speed`` is a percentage above 1, so not a fraction."""
     if not 1 < speed <= 100:
         hint = f"; for {100 * speed:g} percent say {100 * speed:g}" if 0 < speed <= 1 else ""
-        raise ValueError(
+        raise ArgumentError(
             f"speed {speed}: expected percent of the largest joint speeds, above 1 and at most 100"
             f"{hint}"
         )
@@ -129,7 +131,7 @@ def random_motion(
         dt: sample interval [s].
 
     Raises:
-        ValueError: a speed outside (1, 100], or too few allowed poses in ``space``.
+        ArgumentError: a speed outside (1, 100], or too few allowed poses in ``space``.
     """
     check_percent(speed)
     points = [_free_point(rng, space)]
@@ -154,7 +156,7 @@ def _free_point(rng: np.random.Generator, space: Workspace) -> Array:
         q = rng.uniform(space.low, space.high)
         if space.allowed(q):
             return q
-    raise ValueError("no allowed pose found in 1000 draws: widen the workspace")
+    raise ArgumentError("no allowed pose found in 1000 draws: widen the workspace")
 
 
 def _next_point(rng: np.random.Generator, space: Workspace, start: Array) -> Array:
@@ -168,4 +170,4 @@ def _next_point(rng: np.random.Generator, space: Workspace, start: Array) -> Arr
             continue
         if all(space.allowed(start + (target - start) * s) for s in np.linspace(0.125, 1, 8)):
             return target
-    raise ValueError("no allowed path found in 1000 draws: widen the workspace")
+    raise ArgumentError("no allowed path found in 1000 draws: widen the workspace")

@@ -21,6 +21,7 @@ from tauguard.envs.episodes.loop import AlongMotion, Rollout, SimulationLoop
 from tauguard.envs.episodes.motions import Workspace, random_motion
 from tauguard.envs.episodes.poses import Poses
 from tauguard.envs.episodes.striking import Striking, Window
+from tauguard.findings import ArgumentError
 from tauguard.models import (
     Clamp,
     Drive,
@@ -345,15 +346,15 @@ def simulate(
 
     Raises:
         SimulationDiverged: a joint position is not finite, or a velocity is beyond 1000 rad/s.
-        ValueError: an unknown checker or part.
+        ArgumentError: an unknown checker or part.
     """
     return Simulation(episode, nominal, checkers, without).run()
 
 
 def _known(name: str | Checker) -> str | Checker:
-    """``name``; raises ``ValueError`` if no checker has this name."""
+    """``name``; raises ``ArgumentError`` if no checker has this name."""
     from tauguard.contacts import registered  # takes long to import
 
     if isinstance(name, str) and name not in registered():
-        raise ValueError(f"checker {name!r}: expected one of {', '.join(registered())}")
+        raise ArgumentError(f"checker {name!r}: expected one of {', '.join(registered())}")
     return name

@@ -16,6 +16,7 @@ from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
 from tauguard.envs.gym.task import Task, build
+from tauguard.findings import ArgumentError
 from tauguard.models import Scene
 
 DIVERGED_REASON = (
@@ -72,7 +73,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             **keywords: see :class:`tauguard.envs.gym.settings.Settings`.
 
         Raises:
-            ValueError: an unknown keyword or a value out of range; the message says what would
+            ArgumentError: an unknown keyword or a value out of range; the message says what would
                 work.
             FileNotFoundError: no such robot file.
         """
@@ -130,7 +131,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             options: values by name that replace this episode's draws of ``randomize``.
 
         Raises:
-            ValueError: ``options`` has a name that ``randomize`` lacks, or a value out of range.
+            ArgumentError: ``options`` has a name that ``randomize`` lacks, or a value out of range.
         """
         check_options(options or {}, self.compiled.settings.randomize or {})
         super().reset(seed=seed)
@@ -145,14 +146,14 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """Apply an action for one control step; entries beyond [-1, 1] count as -1 and 1.
 
         Raises:
-            ValueError: an action of another shape, or with entries that are not finite.
+            ArgumentError: an action of another shape, or with entries that are not finite.
         """
         if not self._was_reset:
             raise gymnasium.error.ResetNeeded("call reset before step")
         batch, task = self.batch, self.task
         values = np.array(action, np.float64)
         if values.shape != self._shape:
-            raise ValueError(
+            raise ArgumentError(
                 f"action: shape {values.shape}, expected {self._shape}: "
                 f"{', '.join(entry.name for entry in batch.actions)}"
             )
@@ -183,10 +184,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """Restore a state of :meth:`get_state`; the same actions then give the same bits again.
 
         Raises:
-            ValueError: the state is of another environment, or not from :meth:`get_state`.
+            ArgumentError: the state is of another environment, or not from :meth:`get_state`.
         """
         if not isinstance(state, dict) or not {"memory", "task", "rng", "begun"} <= state.keys():
-            raise ValueError("state: expected what get_state() gave")
+            raise ArgumentError("state: expected what get_state() gave")
         self.batch.set_state(0, state)
         self.task.memory[:] = state["memory"]
         self.task.set_state(state["task"])
@@ -260,11 +261,13 @@ def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     """The arm environment inside ``env``.
 
     Raises:
-        ValueError: there is none.
+        ArgumentError: there is none.
     """
     inner = env.unwrapped
     if not isinstance(inner, ArmEnv):
-        raise ValueError(f"{inner}: expected an environment of tauguard, such as tauguard/Reach-v0")
+        raise ArgumentError(
+            f"{inner}: expected an environment of tauguard, such as tauguard/Reach-v0"
+        )
     return inner
 
 

@@ -23,6 +23,7 @@ from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
 from tauguard.envs.gym.sensing import Sensing, listener_factory
 from tauguard.envs.gym.step_checks import StepChecks
 from tauguard.envs.plant import make_plant
+from tauguard.findings import ArgumentError
 from tauguard.models import Person
 
 
@@ -244,21 +245,21 @@ class Batch:
         """Restore what :meth:`get_state` returned.
 
         Raises:
-            ValueError: the state is of another scene, or not from :meth:`get_state`. The copy is
+            ArgumentError: the state is of another scene, or not from :meth:`get_state`. The copy is
                 then unchanged, unless the state's arrays are damaged.
         """
         if not isinstance(state, dict) or not state.keys() >= KEYS:
-            raise ValueError("state: expected what get_state() gave")
+            raise ArgumentError("state: expected what get_state() gave")
         if state["scene"] != self._scene:
-            raise ValueError("state: of another scene")
+            raise ArgumentError("state: of another scene")
         listener = self.sensing[i].detector if self.sensing else None
         own = listener.get_state() if listener else None
         if (state["detector"] is None) != (own is None):
-            raise ValueError("state: of an environment with another detector")
+            raise ArgumentError("state: of an environment with another detector")
         self._apply_drawn(i, {name: values.copy() for name, values in state["drawn"].items()})
         data, model = self.datas[i], self.model(i)
         if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):
-            raise ValueError("state: of another scene")
+            raise ArgumentError("state: of another scene")
         self.plants[i].restore(state["plant"].tolist())
         mujoco.mj_setState(model, data, state["physics"], STATE)
         for name, values in state["derived"].items():

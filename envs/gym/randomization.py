@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.findings import ArgumentError
 from tauguard.models import Drive, Person, Scene
 from tauguard.models.obstacles import pair_weights
 from tauguard.models.payload import keep_stiffness, load_body
@@ -99,16 +100,16 @@ def distributions(given: Mapping[str, Any]) -> dict[str, Distribution]:
     """Check the keyword ``randomize``, and convert its values to distributions.
 
     Raises:
-        ValueError: an unknown name or a value out of range; the message says what would work.
+        ArgumentError: an unknown name or a value out of range; the message says what would work.
     """
     if not isinstance(given, Mapping):
-        raise ValueError(
+        raise ArgumentError(
             f"randomize: a {type(given).__name__}; expected a dict such as {{'mass': (0.9, 1.1)}}"
         )
     found: dict[str, Distribution] = {}
     for name, value in given.items():
         if name not in PARAMETERS:
-            raise ValueError(f"randomize: {name!r}; expected some of {', '.join(PARAMETERS)}")
+            raise ArgumentError(f"randomize: {name!r}; expected some of {', '.join(PARAMETERS)}")
         spread = _distribution(name, value)
         _in_range(f"randomize: {name}", name, np.array(spread.ends()))
         found[name] = spread
@@ -121,7 +122,7 @@ def _distribution(name: str, value: Any) -> Distribution:
     else:
         pair = _numbers(value)
         if len(pair) not in (1, 2):
-            raise ValueError(
+            raise ArgumentError(
                 f"randomize: {name} {value!r}; expected a number, (low, high), or a Uniform, "
                 "Normal or Choice of tauguard.envs.gym.randomization"
             )
@@ -133,7 +134,7 @@ def _distribution(name: str, value: Any) -> Distribution:
         )
     low, high = spread.ends()
     if not low <= high:
-        raise ValueError(f"randomize: {name} from {low} to {high}; expected low <= high")
+        raise ArgumentError(f"randomize: {name} from {low} to {high}; expected low <= high")
     return spread
 
 
@@ -149,7 +150,7 @@ def _numbers(value: Any) -> Array:
 def _in_range(where: str, name: str, values: Array) -> None:
     low, high = PARAMETERS[name].low, PARAMETERS[name].high
     if not (np.isfinite(values) & (values >= low) & (values <= high)).all():
-        raise ValueError(f"{where} {values.tolist()}: expected {low:g} to {high:g}")
+        raise ArgumentError(f"{where} {values.tolist()}: expected {low:g} to {high:g}")
 
 
 def check_names(
@@ -158,13 +159,13 @@ def check_names(
     """Check that the scene has what ``randomize`` draws.
 
     Raises:
-        ValueError: a quantity of people without a person, or stature with checkers.
+        ArgumentError: a quantity of people without a person, or stature with checkers.
     """
     for name in names:
         if name in _OF_PERSON and not people:
-            raise ValueError(f"randomize: {name!r} without a person; add obstacles=('person',)")
+            raise ArgumentError(f"randomize: {name!r} without a person; add obstacles=('person',)")
         if name == "stature" and checkers:
-            raise ValueError(
+            raise ArgumentError(
                 "randomize: 'stature' with checkers: they support only one size of the person"
             )
 
@@ -173,17 +174,17 @@ def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -
     """Check the names and values of ``reset(options=...)``.
 
     Raises:
-        ValueError: a name that ``randomize`` lacks, or a value out of range.
+        ArgumentError: a name that ``randomize`` lacks, or a value out of range.
     """
     for name, value in given.items():
         if name not in known:
             hint = f"expected some of {', '.join(known)}" if known else "there are none"
             if name in PARAMETERS:
                 hint += f"; name it in randomize= first, such as randomize={{{name!r}: (1, 1)}}"
-            raise ValueError(f"options: unknown {name!r}; {hint}")
+            raise ArgumentError(f"options: unknown {name!r}; {hint}")
         numbers = _numbers(value)
         if not len(numbers):
-            raise ValueError(f"options: {name} {value!r}; expected a number, or one per joint")
+            raise ArgumentError(f"options: {name} {value!r}; expected a number, or one per joint")
         _in_range(f"options: {name}", name, numbers)
 
 
@@ -204,7 +205,7 @@ def draw(
         if name in stated:
             own = _numbers(stated[name])
             if len(own) not in (1, size):
-                raise ValueError(f"options: {name}: {len(own)} values; expected 1 or {size}")
+                raise ArgumentError(f"options: {name}: {len(own)} values; expected 1 or {size}")
             values = np.resize(own, size)
         found[name] = values
     return found

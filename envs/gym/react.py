@@ -15,6 +15,7 @@ from tauguard.envs.gym.compiled import find_tools, tool_position
 from tauguard.envs.gym.placing import Layout
 from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
+from tauguard.findings import ArgumentError
 from tauguard.models import BodyProxy, Person, Scene
 
 #: Lengths of the path before and behind the tool's place at home [m].
@@ -45,11 +46,11 @@ class React(Task):
         """Find the path.
 
         Raises:
-            ValueError: there is no body region.
+            ArgumentError: there is no body region.
         """
         super().__init__(batch)
         if not batch.compiled.regions:
-            raise ValueError("obstacles (): expected a body region to strike, such as 'chest'")
+            raise ArgumentError("obstacles (): expected a body region to strike, such as 'chest'")
         scene, layout = batch.compiled.scene, batch.compiled.layout
         self._scratch = mujoco.MjData(scene.model)
         self._meeting, self.along = home_swing(scene, layout.own)

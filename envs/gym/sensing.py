@@ -24,6 +24,7 @@ from tauguard.detectors.samples import same_rate
 from tauguard.envs.gym.actions import observation_table
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.settings import DETECTORS
+from tauguard.findings import ArgumentError
 from tauguard.models import Drive, pin_model
 from tauguard.models.left_over import Player
 
@@ -174,9 +175,9 @@ class AlarmListener:
         """See :class:`Listener`.
 
         Raises:
-            ValueError: always; a trained detector's stream cannot be stored.
+            ArgumentError: always; a trained detector's stream cannot be stored.
         """
-        raise ValueError(
+        raise ArgumentError(
             f"detector {self.name}: a trained detector cannot go into a snapshot; expected "
             f"{', '.join(DETECTORS)} or None"
         )
@@ -224,7 +225,7 @@ def listener_factory(compiled: CompiledScene, wanted: object) -> Callable[[], Li
         wanted: a name, the path of a model file, a ``CollisionAlarm``, or None.
 
     Raises:
-        ValueError: ``wanted`` is no detector, or was trained on another arm or sample rate.
+        ArgumentError: ``wanted`` is no detector, or was trained on another arm or sample rate.
     """
     if wanted is None:
         return None
@@ -245,9 +246,9 @@ def listener_factory(compiled: CompiledScene, wanted: object) -> Callable[[], Li
         try:
             wanted = load_model(wanted)
         except ValueError as error:
-            raise ValueError(f"detector {error}") from None
+            raise ArgumentError(f"detector {error}") from None
     if not isinstance(wanted, CollisionAlarm):
-        raise ValueError(
+        raise ArgumentError(
             f"detector: a {type(wanted).__name__}; expected {', '.join(DETECTORS)}, the path of a "
             "trained detector, or a tauguard.detectors.CollisionAlarm"
         )
@@ -258,11 +259,11 @@ def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
     """Check that the alarm has the scene's number of joints and sample rate; returns it."""
     joints, own = alarm.detector.arm.robot.joints, len(compiled.scene.joint_names)
     if joints != own:
-        raise ValueError(
+        raise ArgumentError(
             f"detector: trained on {joints} joints, the scene has {own}; train one on this arm"
         )
     if not same_rate(compiled.settings.timestep, alarm.detector.dt):
-        raise ValueError(
+        raise ArgumentError(
             f"detector: needs a sample every {1e3 * alarm.detector.dt:g} ms, but the scene's time "
             f"step is {1e3 * compiled.settings.timestep:g} ms; train one at this rate"
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from tauguard.envs.episodes.motions import check_load
 from tauguard.envs.gym.randomization import distributions
+from tauguard.findings import ArgumentError
 from tauguard.models import (
     BODY_REGIONS,
     BodyProxy,
@@ -93,10 +94,10 @@ class Settings:
     contact_area: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the values; a ``ValueError`` names the wrong one and what would work."""
+        """Check the values; an ``ArgumentError`` names the wrong one and what would work."""
         for name, (kind, words) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                raise ValueError(f"{name} {getattr(self, name)!r}: expected {words}")
+                raise ArgumentError(f"{name} {getattr(self, name)!r}: expected {words}")
         one_of("control", self.control, CONTROLS)
         one_of("integrator", self.integrator, tuple(INTEGRATORS))
         for name in ("timestep", "control_rate"):
@@ -106,7 +107,7 @@ class Settings:
                 positive(name, getattr(self, name))
         steps = 1 / (self.control_rate * self.timestep)
         if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
-            raise ValueError(
+            raise ArgumentError(
                 f"control_rate {self.control_rate} Hz at a timestep of {self.timestep} s: "
                 f"{steps:g} physics steps per action; expected a whole number, 1 or more"
             )
@@ -114,7 +115,7 @@ class Settings:
         if isinstance(self.mismatch, int):
             object.__setattr__(self, "mismatch", Mismatch(seed=self.mismatch))
         if not (self.mismatch is None or isinstance(self.mismatch, Mismatch)):
-            raise ValueError(f"mismatch {self.mismatch!r}: expected a Mismatch, a seed, or None")
+            raise ArgumentError(f"mismatch {self.mismatch!r}: expected a Mismatch, a seed, or None")
         for name in ("obstacles", "checkers"):
             value = getattr(self, name)
             one = isinstance(value, str | BodyProxy | Person)
@@ -126,7 +127,7 @@ class Settings:
             object.__setattr__(self, "detector", os.fspath(self.detector))
         named = isinstance(self.detector, str) and self.detector not in DETECTORS
         if named and not os.path.isfile(self.detector):
-            raise ValueError(
+            raise ArgumentError(
                 f"detector {self.detector!r}: no such model file; expected "
                 f"{', '.join(DETECTORS)}, the path of a trained detector, or None"
             )
@@ -141,14 +142,14 @@ class Settings:
         """The settings of an environment: its defaults, replaced by the user's keywords.
 
         Raises:
-            ValueError: an unknown keyword; the message lists the known ones.
+            ArgumentError: an unknown keyword; the message lists the known ones.
         """
         known = [field.name for field in fields(cls)]
         for name in given:
             if name not in known:
                 near = difflib.get_close_matches(name, known, n=1)
                 hint = f"did you mean {near[0]}? " if near else ""
-                raise ValueError(f"keyword {name!r}: {hint}expected one of {', '.join(known)}")
+                raise ArgumentError(f"keyword {name!r}: {hint}expected one of {', '.join(known)}")
         return cls(**{**defaults, **given})
 
 
@@ -156,9 +157,9 @@ def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
     known = (PERSON, *BODY_REGIONS)
     for item in obstacles:
         if not isinstance(item, BodyProxy | Person) and item not in known:
-            raise ValueError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
+            raise ArgumentError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
     if obstacles.count(PERSON) > 1:
-        raise ValueError("obstacles: 'person' twice; add further people as Person(position=...)")
+        raise ArgumentError("obstacles: 'person' twice; add further people as Person(position=...)")
 
 
 def _objects(value: Any) -> tuple[SceneObject, ...]:
@@ -167,20 +168,20 @@ def _objects(value: Any) -> tuple[SceneObject, ...]:
     found = (value,) if isinstance(value, SceneObject) else tuple(value)
     for item in found:
         if not isinstance(item, SceneObject):
-            raise ValueError(f"objects: {item!r}; expected SceneObjects, or a TOML file of them")
+            raise ArgumentError(f"objects: {item!r}; expected SceneObjects, or a TOML file of them")
     names = [item.name for item in found]
     if len(set(names)) < len(names):
-        raise ValueError(f"objects: {', '.join(names)}; expected each name once")
+        raise ArgumentError(f"objects: {', '.join(names)}; expected each name once")
     return found
 
 
 def one_of(name: str, value: object, known: tuple[str, ...]) -> None:
-    """Raise a ``ValueError`` that lists ``known`` if ``value`` is not among them."""
+    """Raise an ``ArgumentError`` that lists ``known`` if ``value`` is not among them."""
     if value not in known:
-        raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
+        raise ArgumentError(f"{name} {value!r}: expected one of {', '.join(known)}")
 
 
 def positive(name: str, value: float) -> None:
-    """Raise a ``ValueError`` unless ``value`` is finite and above 0."""
+    """Raise an ``ArgumentError`` unless ``value`` is finite and above 0."""
     if not (np.isfinite(value) and value > 0):
-        raise ValueError(f"{name} {value}: expected a finite number above 0")
+        raise ArgumentError(f"{name} {value}: expected a finite number above 0")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tauguard.contacts import Checker, State, checker, registered
 from tauguard.contacts.checker import reported
 from tauguard.envs.gym.compiled import CompiledScene
+from tauguard.findings import ArgumentError
 
 
 class StepChecks:
@@ -25,11 +26,13 @@ class StepChecks:
         """Make the checkers.
 
         Raises:
-            ValueError: a name that is not registered, or a geom that a checker cannot handle.
+            ArgumentError: a name that is not registered, or a geom that a checker cannot handle.
         """
         for name in names:
             if name not in registered():
-                raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")
+                raise ArgumentError(
+                    f"checkers {name!r}: expected some of {', '.join(registered())}"
+                )
         self._model = compiled.scene.model
         self._scratch = mujoco.MjData(self._model)
         self._checkers: list[Checker] = [checker(name, self._model) for name in names]

@@ -26,6 +26,7 @@ from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
 from tauguard.envs.gym.task import Task, build
+from tauguard.findings import ArgumentError
 
 
 class VectorArmEnv(VectorEnv[Array, Array, Array]):
@@ -59,9 +60,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             **keywords: as for the single environment.
         """
         if num_envs < 1:
-            raise ValueError(f"num_envs {num_envs}: expected 1 or more")
+            raise ArgumentError(f"num_envs {num_envs}: expected 1 or more")
         if threads < 0:
-            raise ValueError(f"threads {threads}: expected 0 (all processors) or more")
+            raise ArgumentError(f"threads {threads}: expected 0 (all processors) or more")
         if render_mode is not None:
             one_of("render_mode", render_mode, RENDER_MODES)
         self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads
@@ -92,13 +93,13 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         try:
             check_options(stated, self.compiled.settings.randomize or {})
         except ValueError as error:
-            raise ValueError(f"{error}, or reset_mask") from None
+            raise ArgumentError(f"{error}, or reset_mask") from None
         if isinstance(seed, list):
             seeds = seed
         else:
             seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: {len(seeds)} entries, expected {self.num_envs}")
+            raise ArgumentError(f"seed: {len(seeds)} entries, expected {self.num_envs}")
         for i, one in enumerate(seeds):
             if one is not None or not self._seeded:
                 self._rngs[i] = seeding.np_random(one)[0]
@@ -114,7 +115,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
         if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,)):
-            raise ValueError(f"reset_mask: expected a bool array of shape ({self.num_envs},)")
+            raise ArgumentError(f"reset_mask: expected a bool array of shape ({self.num_envs},)")
         return mask.astype(np.bool_)
 
     def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
@@ -128,12 +129,12 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         """Apply one action to every copy.
 
         Raises:
-            ValueError: actions of another shape, or with entries that are not finite.
+            ArgumentError: actions of another shape, or with entries that are not finite.
         """
         batch = self.batch
         values = np.ascontiguousarray(actions, dtype=np.float64)
         if values.shape != self.action_space.shape:
-            raise ValueError(
+            raise ArgumentError(
                 f"actions: shape {values.shape}, expected {self.action_space.shape}: "
                 "one row per copy"
             )

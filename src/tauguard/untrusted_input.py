@@ -1,4 +1,4 @@
-"""Read untrusted files: every error in a file becomes a ``ValueError`` of one line."""
+"""Read untrusted files: every error in a file becomes a ``FileError`` of one line."""
 
 import contextlib
 import json
@@ -6,18 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tauguard.findings import FileError
+
 #: Largest size of a text file [bytes]: settings, column maps, robot descriptions.
 MOST_TEXT = 1 << 26
 
 
 @contextlib.contextmanager
 def reading(path: str | Path, expected: str = "") -> Iterator[None]:
-    """Turn every error that the content of ``path`` causes in this block into a ``ValueError``.
+    """Turn every error that the content of ``path`` causes in this block into a ``FileError``.
 
     The message is one line and begins with the path; ``expected`` describes a valid file.
 
     Raises:
-        ValueError: the content cannot be read (the cause is chained), or ``path`` is a device such
+        FileError: the content cannot be read (the cause is chained), or ``path`` is a device such
             as ``/dev/zero``, which may be endless.
         OSError: as raised in the block.
     """
@@ -30,19 +32,19 @@ def reading(path: str | Path, expected: str = "") -> Iterator[None]:
         said = str(error)
         if said.startswith(str(path)):
             raise
-        raise ValueError(_line(path, said, expected)) from error
+        raise FileError(_line(path, said, expected)) from error
     except (RecursionError, MemoryError) as error:
         kind = "nested too deep" if isinstance(error, RecursionError) else "too large"
-        raise ValueError(_line(path, kind, expected)) from error
+        raise FileError(_line(path, kind, expected)) from error
     except Exception as error:
         said = f"damaged ({type(error).__name__}: {str(error)[:200]})"
-        raise ValueError(_line(path, said, expected)) from error
+        raise FileError(_line(path, said, expected)) from error
 
 
 def check_no_device(path: str | Path) -> None:
-    """Raise ``ValueError`` for a device such as ``/dev/zero``, which may be endless."""
+    """Raise ``FileError`` for a device such as ``/dev/zero``, which may be endless."""
     if Path(path).is_char_device():
-        raise ValueError(f"{path}: a device; expected a file")
+        raise FileError(f"{path}: a device; expected a file")
 
 
 def _line(path: str | Path, said: str, expected: str) -> str:
@@ -53,17 +55,17 @@ def read_text(path: str | Path) -> str:
     """A text file of at most :data:`MOST_TEXT` bytes, UTF-8.
 
     Raises:
-        ValueError: the file is longer, or not text.
+        FileError: the file is longer, or not text.
         OSError: missing or unreadable.
     """
     with open(path, "rb") as stream:
         data = stream.read(MOST_TEXT + 1)
     if len(data) > MOST_TEXT:
-        raise ValueError(f"{path}: more than {MOST_TEXT >> 20} MiB; expected a smaller text file")
+        raise FileError(f"{path}: more than {MOST_TEXT >> 20} MiB; expected a smaller text file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ValueError(
+        raise FileError(
             f"{path}: not a text file ({error.reason} at byte {error.start})"
         ) from error
 
@@ -72,7 +74,7 @@ def read_json(path: str | Path) -> Any:
     """The content of a JSON file; depth and length are bounded.
 
     Raises:
-        ValueError: the file is not JSON, or nested too deep.
+        FileError: the file is not JSON, or nested too deep.
         OSError: the file is missing or unreadable.
     """
     with reading(path, "expected JSON"):

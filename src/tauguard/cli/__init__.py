@@ -1,8 +1,8 @@
 """The command line: one file per command; heavy imports are inside the command.
 
 A command is a module ``tauguard.cli.<name>`` with a function ``command`` whose signature tyro
-turns into flags. It raises ``ValueError`` or ``OSError`` with one helpful line for bad input (exit
-code 2), and ``SystemExit`` with another code if a script needs to distinguish outcomes.
+turns into flags. It raises ``ArgumentError`` or ``OSError`` with one helpful line for bad input
+(exit code 2), and ``SystemExit`` with another code if a script needs to distinguish outcomes.
 """
 
 import difflib
@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 
 from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
+from tauguard.findings import ArgumentError
 
 COMMANDS = {
     "demo": "simulate an arm, train a detector, detect collisions, write a recording",
@@ -124,10 +125,10 @@ def said(error: Exception) -> str:
 
 
 def expect(flag: str, value: float, least: float, most: float = float("inf")) -> None:
-    """Raise ``ValueError`` if a flag's number is NaN or outside ``least`` to ``most``."""
+    """Raise ``ArgumentError`` if a flag's number is NaN or outside ``least`` to ``most``."""
     if not least <= value <= most:
         wanted = f"{least:g} or more" if most == float("inf") else f"{least:g} to {most:g}"
-        raise ValueError(f"{flag} {value:g}: expected {wanted}")
+        raise ArgumentError(f"{flag} {value:g}: expected {wanted}")
 
 
 def fail(message: str, code: int = 2) -> None:

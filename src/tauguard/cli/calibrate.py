@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from tauguard.datasets.columns import AS_IS, Reading
+from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
@@ -78,7 +79,9 @@ def command(
     beside = robot if robot.exists() else Path(robot.name)  # a named arm: the working folder
     robot = bodies_file(robot)
     if gains and scale in ("masses", "payload"):
-        raise ValueError(f"--gains cannot be combined with --scale {scale}, which finds the gains")
+        raise ArgumentError(
+            f"--gains cannot be combined with --scale {scale}, which finds the gains"
+        )
     given = free_logs(logs, robot, columns, gains, payload, torque, scale, reading)
     found, held = identified(given, accept)
     names, recordings = list(given.logs), list(given.logs.values())
@@ -102,7 +105,7 @@ def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, li
     Each RMS has shape (n,). With too few logs to leave one out, the list is empty.
 
     Raises:
-        ValueError: exchanged joints, bodies other than those of the robot file, a wrong load, or
+        ArgumentError: exchanged joints, bodies other than those of the robot file, a wrong load, or
             bursts of torque, unless ``accept`` names the check.
     """
     from tauguard.cli.free_logs import explain, run_check

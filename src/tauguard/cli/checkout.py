@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import tauguard
+from tauguard.findings import ArgumentError
 
 #: Commands that `python -m studies` runs.
 STUDY_COMMANDS = ("bench", "report")
@@ -16,11 +17,11 @@ def run_studies(name: str, args: Sequence[str]) -> int:
     """Run a command of ``studies`` in a separate process and return its exit code.
 
     Raises:
-        ValueError: there is no checkout, because tauguard is installed without its sources.
+        ArgumentError: there is no checkout, because tauguard is installed without its sources.
     """
     root = checkout()
     if root is None:
-        raise ValueError(
+        raise ArgumentError(
             "the studies are in the source distribution, not in an installed package: "
             "unpack `pip download --no-binary tauguard --no-deps tauguard` and run this there"
         )

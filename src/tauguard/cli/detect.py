@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from tauguard.datasets.columns import AS_IS, Reading
+from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,9 +97,9 @@ def command(
     from tauguard.untrusted_input import check_no_device
 
     if out is not None and out.exists() and not out.is_dir():
-        raise ValueError(f"--out {out}: is a file; expected a folder")
+        raise ArgumentError(f"--out {out}: is a file; expected a folder")
     if model is not None and (quiet is not None or gains):
-        raise ValueError(
+        raise ArgumentError(
             "--quiet and --gains cannot be combined with --model: they are for training"
         )
     robot = bodies_file(robot)
@@ -128,11 +129,11 @@ def command(
 
 
 def refuse_touched(log: Path, read: Log, quiet: float) -> None:
-    """Raise ``ValueError`` if labels mark a contact in the first ``quiet`` seconds."""
+    """Raise ``ArgumentError`` if labels mark a contact in the first ``quiet`` seconds."""
     begin = read.trace.t[0]
     early = [start - begin for start, _ in read.touched or () if start < begin + quiet]
     if early:
-        raise ValueError(
+        raise ArgumentError(
             f"{log}: a column labels a contact {early[0]:.2f} s after the beginning, within the "
             f"first {quiet:g} s (--quiet), on which the detector is trained; give a "
             "shorter --quiet, or a --model"
@@ -162,7 +163,7 @@ def trained(
     trace = matched(read.trace, arm.robot.joint_names)
     print_notes(linear_axes(arm.robot, {log: read}))
     if is_torque(trace) and not (arm.drive_gain == 1).all():
-        raise ValueError(f"the log holds torques, {model} was trained on currents")
+        raise ArgumentError(f"the log holds torques, {model} was trained on currents")
     for check in (check_signs, check_order):
         try:
             check(arm, {log: Recording(trace)})
@@ -196,7 +197,7 @@ def trained_on_beginning(
     trace = matched(read.trace, numbers.joint_names)
     length = float(trace.t[-1] - trace.t[0])
     if not 0 < quiet < length:
-        raise ValueError(
+        raise ArgumentError(
             f"--quiet {quiet:g}: expected above 0 and below the log's {length:.1f} s; or train on "
             "logs of free motion (`tauguard train --free`) and give --model"
         )
@@ -207,7 +208,7 @@ def trained_on_beginning(
         arm, source = free_arm(robot, numbers, first, gains)
         detector = free_detector(arm, first)
     except ValueError as error:
-        raise ValueError(
+        raise ArgumentError(
             f"{log}, its first {quiet:g} s (--quiet): {error}; or did something touch the arm in "
             "this time? If not, train with `tauguard train --free`, which has --accept"
         ) from None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -54,11 +56,11 @@ def command(
     wrong = None
     if alarms is not None:
         if data is None or detector is not None or events is not None:
-            raise ValueError("--alarms goes with --data, and not with --detector or --events")
+            raise ArgumentError("--alarms goes with --data, and not with --detector or --events")
         parts = of_file(data, alarms, splits)
     else:
         if (traces is None) == (data is None):
-            raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
+            raise ArgumentError("give --traces (a folder of recordings) or --data (a dataset)")
         alarm = loaded(model, detector)
         wrong = None if events is None else EventFolder(events, late, alarm)
         parts = of_model(alarm, traces, data, splits, wrong)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.detectors import ArmModel, RobotNumbers
@@ -40,7 +42,7 @@ def free_logs(
     """Read and check logs and print notes; the arguments are those of the commands.
 
     Raises:
-        ValueError: as raised by the called functions.
+        ArgumentError: as raised by the called functions.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import moving, read_logs, with_loads
@@ -76,7 +78,7 @@ def free_arm(
     """The initial arm model of a training on free logs, and the source of its gains, as text.
 
     Raises:
-        ValueError: gains that do not fit the arm, or torques of the wrong sign.
+        ArgumentError: gains that do not fit the arm, or torques of the wrong sign.
     """
     from tauguard.datasets.real_arms import known_arm
     from tauguard.detectors.calibration.checks import check_signs
@@ -97,8 +99,8 @@ def free_detector(
         accept: names of checks and logs to accept; None: the command has no --accept.
 
     Raises:
-        ValueError: too little motion, exchanged joints, another arm's gravity torques, much torque
-            that is not explained, or bursts of torque, as contacts cause them.
+        ArgumentError: too little motion, exchanged joints, another arm's gravity torques, much
+            torque that is not explained, or bursts of torque, as contacts cause them.
     """
     from tauguard.detectors.calibration.checks import check_order, check_weight
     from tauguard.detectors.scores.free_motion import FreeMotion
@@ -127,7 +129,7 @@ def explain(
         accept: names of checks and logs to accept; None: the command has no --accept.
 
     Raises:
-        ValueError: the model explains too little torque, or torque has bursts like a contact's.
+        ArgumentError: the model explains too little torque, or torque has bursts like a contact's.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.real_arms import calibration_notes
@@ -148,7 +150,7 @@ def run_check(name: str, accept: Collection[str] | None, check: Callable[[], Non
     ``accept`` is None if the command has no such flag: the error is then raised unchanged.
 
     Raises:
-        ValueError: the message of the check and the flag that accepts it.
+        ArgumentError: the message of the check and the flag that accepts it.
     """
     from tauguard.cli.help_text import print_notes
 
@@ -158,7 +160,7 @@ def run_check(name: str, accept: Collection[str] | None, check: Callable[[], Non
         if accept is None:
             raise
         if name not in accept:
-            raise ValueError(
+            raise ArgumentError(
                 f"{error}; to use the logs all the same, add --accept {name}"
             ) from None
         print_notes([f"accepted as --accept {name} says: {error}"])

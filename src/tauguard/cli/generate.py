@@ -6,6 +6,8 @@ from typing import Annotated
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 
 def command(
     config: Annotated[str, tyro.conf.Positional],
@@ -34,9 +36,9 @@ def command(
     from tauguard.datasets.workers import Terminated
 
     if workers is not None and workers < 1:
-        raise ValueError(f"--workers {workers}: expected 1 or more")
+        raise ArgumentError(f"--workers {workers}: expected 1 or more")
     if ray is not None and workers is not None:
-        raise ValueError("give either --workers (this machine) or --ray (a cluster)")
+        raise ArgumentError("give either --workers (this machine) or --ray (a cluster)")
     configuration = load(config)
     if quick:
         configuration = configuration.quick()

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from tauguard.findings import ArgumentError
+
 
 def command(
     adapter: tuple[str, ...] = (),
@@ -22,11 +24,11 @@ def command(
 
     cases = [one for one in load_cases() if not case or one.name.startswith(case)]
     if not cases:
-        raise ValueError(f"case {', '.join(case)}: no case has a name that begins so")
+        raise ArgumentError(f"case {', '.join(case)}: no case has a name that begins so")
     rows = run(cases, adapters(adapter))
     if not rows:
         kinds = ", ".join(dict.fromkeys(one.kind for one in cases))
-        raise ValueError(f"none of the libraries answers cases of this kind ({kinds})")
+        raise ArgumentError(f"none of the libraries answers cases of this kind ({kinds})")
     shown = ("case", "library", "expected", "answer", "right", "wrong")
     print(table([{key: row[key] for key in shown} for row in rows]))
     print("\n" + table(verdicts(rows)))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -42,13 +44,13 @@ def command(
     from tauguard.report import write_json
 
     if (mcap or robot) is not None and episode is None:
-        raise ValueError("--mcap and --robot need --episode")
+        raise ArgumentError("--mcap and --robot need --episode")
     if episode is not None:
         simulate_again(folder, episode, mcap, robot)
         return
     damaged = dict(inspection.verified(folder)) if verify else None
     if damaged and HEAD in damaged:
-        raise ValueError(f"{folder}: " + "; ".join(f"{k}: {v}" for k, v in damaged.items()))
+        raise ArgumentError(f"{folder}: " + "; ".join(f"{k}: {v}" for k, v in damaged.items()))
     report = inspection.report(folder)
     report["damaged"] = damaged
     report["unchecked"] = inspection.unchecked(folder) if verify else []

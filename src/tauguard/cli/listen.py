@@ -8,6 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -73,21 +75,23 @@ def command(
     robot = bodies_file(robot)
     sources = (ur is not None, play is not None, stdin, ros is not None)
     if sum(sources) != 1:
-        raise ValueError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")
+        raise ArgumentError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")
     if ur is not None and torque:
-        raise ValueError("--torque cannot be combined with --ur, whose controller sends currents")
+        raise ArgumentError(
+            "--torque cannot be combined with --ur, whose controller sends currents"
+        )
     shown = None if rerun in (None, "view") else Path(str(rerun))
     if shown is not None and shown.suffix != ".rrd":
-        raise ValueError(f"--rerun {rerun}: expected `view`, or a file that ends with .rrd")
+        raise ArgumentError(f"--rerun {rerun}: expected `view`, or a file that ends with .rrd")
     for name, path in (("--json", json), ("--record", record), ("--rerun", shown)):
         if path is not None and not path.absolute().parent.is_dir():
-            raise ValueError(f"{name} {path}: the folder {path.parent} does not exist")
+            raise ArgumentError(f"{name} {path}: the folder {path.parent} does not exist")
     expect("--seconds", seconds, 0)
     expect("--reconnect", reconnect, 0)
     expect("--port", port, 1, 65535)
     alarm = with_load(load_model(model), model, payload, torque)
     if alarm.inputs is None:
-        raise ValueError(f"{model}: has no limits of usual samples; train the detector anew")
+        raise ArgumentError(f"{model}: has no limits of usual samples; train the detector anew")
     check_robot(robot_numbers(robot), robot, alarm.detector.arm.robot, model)
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)
@@ -122,25 +126,27 @@ def with_load(
     """The detector for an arm with this load.
 
     Raises:
-        ValueError: ``torque``, although the detector was trained on currents.
+        ArgumentError: ``torque``, although the detector was trained on currents.
     """
     from tauguard.datasets.arm_logs import parse_load
     from tauguard.detectors.alarms.training import carrying
 
     if torque and not (alarm.detector.arm.drive_gain == 1).all():
-        raise ValueError(f"--torque: {model} was trained on currents")
+        raise ArgumentError(f"--torque: {model} was trained on currents")
     return alarm if payload is None else carrying(alarm, parse_load(payload))
 
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
-    """Raise ``ValueError`` if joints or sample rate differ from those of training."""
+    """Raise ``ArgumentError`` if joints or sample rate differ from those of training."""
     from tauguard.detectors.samples import same_rate
 
     joints, dt = alarm.detector.arm.robot.joints, alarm.detector.dt
     if len(source.joint_names) != joints:
-        raise ValueError(f"the source has {len(source.joint_names)} joints, {model} has {joints}")
+        raise ArgumentError(
+            f"the source has {len(source.joint_names)} joints, {model} has {joints}"
+        )
     if not same_rate(1 / source.rate, dt):
-        raise ValueError(
+        raise ArgumentError(
             f"the source gives {source.rate:.0f} samples a second, {model} was trained at "
             f"{1 / dt:.0f}: train a detector on logs of that rate"
         )
@@ -307,7 +313,9 @@ def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
     from tauguard.traces import Detection, write_mcap
 
     if len(session.rows) < 2:
-        raise ValueError(f"--record {path}: fewer than 2 samples were received; nothing is written")
+        raise ArgumentError(
+            f"--record {path}: fewer than 2 samples were received; nothing is written"
+        )
     trace, up = session.trace(), np.array(session.alarms)
     detection = Detection(
         detector=alarm.detector.name,

@@ -9,6 +9,8 @@ from urllib.parse import quote
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 
 def command(
     path: Annotated[Path, tyro.conf.Positional],
@@ -97,7 +99,7 @@ def serve(shown: Path, port: int) -> None:
     if shown.is_dir() and not (shown / "index.html").exists():
         there = ", ".join(sorted(str(file) for file in shown.glob("*.rrd"))[:3])
         own = f"name one of its recordings ({there}), or " if there else ""
-        raise ValueError(
+        raise ArgumentError(
             f"{shown}: no index.html in it; {own}the folder of `tauguard evaluate --events FOLDER`"
         )
     with BrowserReplay(folder, port) as replay:

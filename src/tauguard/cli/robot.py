@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.models import Facts, Scene
 
@@ -53,13 +55,13 @@ def command(
         row = ROBOTS.get(robot)
         model = row.menagerie if row is not None else robot
         if robot in NAMED or model is None:
-            raise ValueError(f"--download: {robot} is not in mujoco-menagerie")
+            raise ArgumentError(f"--download: {robot} is not in mujoco-menagerie")
         from tauguard.extras import extra
 
         try:
             menagerie_file(model, download=True)
         except ModuleNotFoundError:
-            raise ValueError(f"--download needs mujoco-menagerie: {extra('arms')}") from None
+            raise ArgumentError(f"--download needs mujoco-menagerie: {extra('arms')}") from None
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     scene = compose(SceneSpec(arm=robot), visuals=False)
     gains = Gains.for_scene(scene)
@@ -87,7 +89,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
     """Run the trial and print a line for each environment.
 
     Raises:
-        ValueError: ``pictures`` need OpenGL, which is missing; raised before the trial.
+        ArgumentError: ``pictures`` need OpenGL, which is missing; raised before the trial.
         SystemExit: an environment does not pass.
     """
     from tauguard.envs.gym.trial import picture, try_arm
@@ -98,7 +100,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         try:
             check_opengl()
         except RuntimeError as error:
-            raise ValueError(f"--pictures: {error}") from None
+            raise ArgumentError(f"--pictures: {error}") from None
     rows = try_arm(robot, episodes, seed)
     tried = [
         {

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.envs import Episode
 
@@ -65,13 +67,13 @@ def command(
     from tauguard.report import write_json
 
     if episodes < 1:
-        raise ValueError(f"--episodes {episodes}: expected 1 or more")
+        raise ArgumentError(f"--episodes {episodes}: expected 1 or more")
     if min(collisions, free) < 0:
-        raise ValueError(f"--collisions {collisions}, --free {free}: expected 0 or more")
+        raise ArgumentError(f"--collisions {collisions}, --free {free}: expected 0 or more")
     expect("--workers", 1 if workers is None else workers, 1)
     expect("--mismatch-seed", mismatch_seed or 0, 0)
     if not speeds or payloads_g == ():
-        raise ValueError("--speeds and --payloads-g: expected at least one number after each")
+        raise ArgumentError("--speeds and --payloads-g: expected at least one number after each")
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     if payloads_g is None:
         scale = torque_scale(robot)

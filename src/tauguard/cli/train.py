@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from tauguard.datasets.columns import AS_IS, Reading
+from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -85,7 +86,7 @@ def command(
     """
     _check_flags({name for name, value in locals().items() if value != DEFAULTS[name]})
     if folds is not None and folds < 1:
-        raise ValueError(f"--folds {folds}: expected 1 or more")
+        raise ArgumentError(f"--folds {folds}: expected 1 or more")
     target = _target(model)
     rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
     if traces is not None:
@@ -96,7 +97,7 @@ def command(
 
         twin_contacts(twin, free, target, columns, detector, rate, torque, reading)
     elif robot is None:
-        raise ValueError("--free needs --robot")
+        raise ArgumentError("--free needs --robot")
     else:
         from tauguard.models.robot import bodies_file
 
@@ -112,27 +113,27 @@ OF_TWIN = ("columns", "detector", "torque", "reading")
 
 
 def _check_flags(given: Collection[str]) -> None:
-    """Raise ``ValueError`` if flags are ``given`` that do not go together."""
+    """Raise ``ArgumentError`` if flags are ``given`` that do not go together."""
 
     def among(names: Sequence[str]) -> str:
         found = ", ".join(f"--{name}" for name in names if name in given)
         return found.replace("--reading", "--mend or --resample")
 
     if ("traces" in given) == ("free" in given):
-        raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
+        raise ArgumentError("give --traces (labelled recordings) or --free (collision-free logs)")
     twin, traces = "twin" in given, "traces" in given
     others = [name for name in (*OF_TRACES, *OF_FREE) if name not in OF_TWIN]
     if twin and (traces or among(others)):
-        raise ValueError(
+        raise ArgumentError(
             "--twin goes with --free, --columns, --detector, --torque, "
             "--false-alarms-per-hour, --mend and --resample only"
         )
     if not traces and not twin and (wrong := among(OF_TRACES)):
-        raise ValueError(f"{wrong}: go with --traces only")
+        raise ArgumentError(f"{wrong}: go with --traces only")
     if traces and (wrong := among(OF_FREE)):
-        raise ValueError(f"{wrong}: with --free only, not with --traces")
+        raise ArgumentError(f"{wrong}: with --free only, not with --traces")
     if "confidence" in given and "calibration" not in given:
-        raise ValueError("--confidence belongs to a guarantee: give --calibration")
+        raise ArgumentError("--confidence belongs to a guarantee: give --calibration")
 
 
 def _target(model: Path | None) -> Path:
@@ -169,7 +170,7 @@ def labelled_motion(
     # Check inputs and guarantee first, because the training takes minutes.
     method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
-        raise ValueError(
+        raise ArgumentError(
             f"--calibration {calibration}: the same folder as --traces; give other recordings"
         )
     free = labelled(calibration) if calibration is not None else []
@@ -249,7 +250,7 @@ def validated_logs(
         accept: names of logs to keep in any case.
 
     Raises:
-        ValueError: a name in ``accept`` is not that of a log.
+        ArgumentError: a name in ``accept`` is not that of a log.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import log_named

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tauguard.findings import ArgumentError
+
 if TYPE_CHECKING:
     from tauguard.datasets.columns import Reading
     from tauguard.traces import Trace
@@ -42,7 +44,7 @@ def twin_contacts(
         reading: how logs are read.
 
     Raises:
-        ValueError: ``twin`` is not a twin's file, or the logs have another rate or arm.
+        ArgumentError: ``twin`` is not a twin's file, or the logs have another rate or arm.
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_logs
@@ -60,13 +62,13 @@ def twin_contacts(
     arm = load_arm(bodies_file(twin))
     sensors = robot.drive.sensors
     if arm is None or sensors is None or sensors.left_over is None:
-        raise ValueError(f"--twin {twin}: not a file that `tauguard twin` wrote")
+        raise ArgumentError(f"--twin {twin}: not a file that `tauguard twin` wrote")
     method = make_detector(detector)
     read = read_logs(free, columns, bodies_file(twin), torque, reading)
     print_notes(read.notes)
     for name, trace in read.traces.items():
         if not same_rate(trace.dt, 1 / sensors.rate):
-            raise ValueError(
+            raise ArgumentError(
                 f"{name}: {1 / trace.dt:.4g} samples a second, the twin has "
                 f"{sensors.rate:.4g}; expected logs of that rate, or --resample {sensors.rate:.4g}"
             )

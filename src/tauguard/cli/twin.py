@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from tauguard.datasets.columns import AS_IS, Reading
+from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
@@ -71,7 +72,7 @@ def command(
     from tauguard.twin.description import write_twin
 
     if out.suffix != ".toml":
-        raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        raise ArgumentError(f"--out {out}: expected a name that ends in .toml")
     robot = bodies_file(robot)
     given, left = without_odd_logs(
         free_logs(logs, robot, columns, gains, payload, torque, reading=reading)
@@ -107,7 +108,7 @@ def without_odd_logs(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
     """Logs that a calibration from the other logs predicts, and a note on each log left out.
 
     Raises:
-        ValueError: logs of two arms.
+        ArgumentError: logs of two arms.
     """
     from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.identification import identify
@@ -136,7 +137,7 @@ def twin_from(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
     found = identify(given.arm, used, scale=given.scale)
     bare = [r.trace for r in used if _unloaded(r)]
     if not bare:
-        raise ValueError("all logs carry a load: a twin needs at least one without")
+        raise ArgumentError("all logs carry a load: a twin needs at least one without")
     twin = identify_twin(found.arm, bare, limit / abs(found.arm.drive_gain))
     return replace(twin, intervals={"inertial": WIDE * found.inertial_error})
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 
 def command(
     recording: Annotated[Path, tyro.conf.Positional],
@@ -54,5 +56,5 @@ def command(
     try:
         count = write_video(target, pictures, rate)
     except RuntimeError as error:  # no OpenGL
-        raise ValueError(str(error)) from None
+        raise ArgumentError(str(error)) from None
     print(f"{target}  ({count} frames, {target.stat().st_size / 1e6:.1f} MB)")

@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import tyro
 
+from tauguard.findings import ArgumentError
+
 #: Keywords that may have several values, separated by commas.
 LISTS = ("obstacles", "checkers")
 #: Policies that need no file.
@@ -49,9 +51,9 @@ def command(
     name = environment if environment.startswith("tauguard/") else f"tauguard/{environment}"
     if name not in ENVIRONMENTS:
         known = ", ".join(one.removeprefix("tauguard/") for one in ENVIRONMENTS)
-        raise ValueError(f"environment {environment!r}: expected one of {known}")
+        raise ArgumentError(f"environment {environment!r}: expected one of {known}")
     if not seconds > 0:
-        raise ValueError(f"seconds {seconds}: expected above 0")
+        raise ArgumentError(f"seconds {seconds}: expected above 0")
     keywords, learned = parsed(set), None
     if policy not in WORDS:
         learned = policy_of(policy, name)
@@ -59,7 +61,9 @@ def command(
         keywords = own | keywords
     if policy == "target":
         if keywords.get("control", "cartesian") != "cartesian":
-            raise ValueError("policy target needs control=cartesian; use --policy random or still")
+            raise ArgumentError(
+                "policy target needs control=cartesian; use --policy random or still"
+            )
         keywords["control"] = "cartesian"
     env = gymnasium.make(name, **keywords)
     if reaction is not None:
@@ -75,14 +79,14 @@ def command(
 
 
 def policy_of(file: str, name: str) -> Any:
-    """The policy in a file; ``ValueError`` if it was trained in another environment."""
+    """The policy in a file; ``ArgumentError`` if it was trained in another environment."""
     from tauguard.envs.policies import MlpPolicy
 
     if not Path(file).is_file():
-        raise ValueError(f"policy {file}: no such file; expected one, or {', '.join(WORDS)}")
+        raise ArgumentError(f"policy {file}: no such file; expected one, or {', '.join(WORDS)}")
     policy = MlpPolicy.load(file)
     if (trained := policy.environment.get("id", name).removeprefix("tauguard:")) != name:
-        raise ValueError(f"policy {file}: it was trained in {trained}, not in {name}")
+        raise ArgumentError(f"policy {file}: it was trained in {trained}, not in {name}")
     return policy
 
 
@@ -92,7 +96,7 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
     for item in settings:
         name, sign, text = item.partition("=")
         if not sign:
-            raise ValueError(f"--set {item}: expected NAME=VALUE, as in detector=observer")
+            raise ArgumentError(f"--set {item}: expected NAME=VALUE, as in detector=observer")
         try:
             found[name] = ast.literal_eval(text)
         except (ValueError, SyntaxError):
