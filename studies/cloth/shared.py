@@ -71,6 +71,6 @@ def recorded() -> Path | None:
     if missing:
         raise ValueError(
             f"TAUGUARD_DATA: {folder} lacks files in {', '.join(missing)}; "
-            "docs/notes/2026-11-23-cloth.md names their origin (unset: no recorded data)"
+            "docs/notes/cloth.md names their origin (unset: no recorded data)"
         )
     return Path(named)

@@ -12,7 +12,7 @@ calibration, and with Franka's estimate and the torque thresholds of libfranka's
 
 The results are optimistic: the constants of the bound were chosen on the logs of UR10e, UR5, UR3
 and the Panda. On a new arm they are a little worse.
-docs/notes/2026-11-24-touches.md lists what was compared.
+docs/notes/real_arms.md has the figures.
 """
 
 from collections.abc import Callable, Mapping

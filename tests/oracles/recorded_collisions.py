@@ -2,7 +2,7 @@
 
 Sample-Scalable-CCD-Data (Belgrod et al. 2023) lists the collisions of whole frames, and
 Sample-Queries (Wang et al. 2021) labels single queries; both used exact arithmetic. The files lie
-in the folder ``ccd`` of the data (docs/notes/2026-11-23-cloth.md names their origin).
+in the folder ``ccd`` of the data (docs/notes/cloth.md names their origin).
 """
 
 from __future__ import annotations
