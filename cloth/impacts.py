@@ -44,7 +44,8 @@ class Impacts:
     Attributes:
         hit: Whether there is contact within the step. Shape (N,).
         toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
-        point: The point of contact at that time; NaN without a hit. Shape (N, 3).
+        point: The point of contact at that time; NaN without a hit. On edges that meet along a
+            segment it is the middle of this segment. Shape (N, 3).
         normal: Unit normal at that time: of the face by its winding, (f1 - f0) x (f2 - f0), or of
             both edges, (ea1 - ea0) x (eb1 - eb0). Its sign does not tell from which side the
             features approach. With a ``min_distance`` it is not the direction between the features.
@@ -52,9 +53,9 @@ class Impacts:
             (N, 3).
         weights: Barycentric weights of the contact point: (1, w0, w1, w2) for the vertex and the
             vertices of the face, or (1 - s, s, 1 - t, t) for the ends of both edges, shape (N, 4).
-            For a point and the ends of an edge shape (N, 3), for two points (N, 2).
-
-    If coordinates exceed 1e75 or are all below 1e-60, normal and weights can be zero or NaN.
+            For a point and the ends of an edge shape (N, 3), for two points (N, 2). Without a
+            ``min_distance`` both features have their weighted point at ``point``, except for their
+            movement in 1e-9 of the step and rounding.
     """
 
     hit: NDArray[np.bool_]

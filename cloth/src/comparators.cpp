@@ -143,7 +143,7 @@ void compare(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator 
       hit[first + i] = toi <= 1;
       if (!hit[first + i]) continue;
       out.toi[first + i] = toi;
-      if (out.point) describe<vf>(x, part + 4 * i, toi, out, first + i);
+      if (out.point) describe<vf>(x, part + 4 * i, toi, 0, out, first + i);
     }
   }
 }

@@ -74,7 +74,7 @@ SpareArray<Hit> in_order(const std::vector<Part>& parts, std::size_t features, i
 // refers to `a` and the second to `b`; in a vertex-face pair the first number is the vertex itself.
 template <bool vf>
 void describe_all(const Ends& x, const Features& a, const Features& b, const SpareArray<Hit>& hits,
-                  int threads, Collisions& out) {
+                  double distance, int threads, Collisions& out) {
   constexpr std::size_t grain = 2048;
   const ImpactArrays impacts{out.toi.data(), out.point.data(), out.normal.data(),
                              out.weights.data()};
@@ -97,12 +97,13 @@ void describe_all(const Ends& x, const Features& a, const Features& b, const Spa
       out.pairs[2 * i] = hit.first();
       out.pairs[2 * i + 1] = hit.second();
       out.toi[i] = hit.toi;
-      describe<vf>(x, row, hit.toi, impacts, i);
+      describe<vf>(x, row, hit.toi, distance, impacts, i);
     }
   });
 }
 
-Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<Part>& parts) {
+Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, double distance,
+                     const std::vector<Part>& parts) {
   Collisions all;
   for (const auto& part : parts) {
     all.stats += part.stats;
@@ -118,7 +119,8 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
   all.point = {ccd.spare(), 3 * n};
   all.normal = {ccd.spare(), 3 * n};
   all.weights = {ccd.spare(), 4 * n};
-  (vf ? describe_all<true> : describe_all<false>)(ccd.ends(), a, b, hits, ccd.threads(), all);
+  (vf ? describe_all<true> : describe_all<false>)(ccd.ends(), a, b, hits, distance, ccd.threads(),
+                                                  all);
   return all;
 }
 
@@ -134,11 +136,11 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, doub
       [=](const Ends& x, const std::int32_t* rows, std::size_t n, std::uint8_t* hit,
           ImpactArrays impacts,
           Stats& stats) { solve(x, rows, n, method, min_distance, hit, impacts, stats, axes); },
-      limit);
+      limit, min_distance);
 }
 
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& narrow_phase,
-                           std::size_t limit) {
+                           std::size_t limit, double min_distance) {
   std::vector<Part> parts(ccd.chunks(kind));
   std::atomic<std::size_t> found{0};
   const auto start = std::chrono::steady_clock::now();
@@ -161,7 +163,7 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& 
     part.hits.insert(part.hits.end(), answers.hits, answers.hits + hits);
     part.narrow_s += seconds(begin, std::chrono::steady_clock::now());
   });
-  Collisions all = described(ccd, kind, parts);
+  Collisions all = described(ccd, kind, min_distance, parts);
   all.total_s = seconds(start, std::chrono::steady_clock::now());
   return all;
 }

@@ -29,6 +29,6 @@ using NarrowPhase = std::function<void(const Ends& x, const std::int32_t* rows, 
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
                            std::size_t limit);
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& narrow_phase,
-                           std::size_t limit);
+                           std::size_t limit, double min_distance = 0);
 
 }  // namespace tauguard::cloth

@@ -239,7 +239,7 @@ void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method
     for (int i = 0; out.point && i < count; ++i) {
       if (!hit[first + i]) continue;
       out.toi[first + i] = toi[i];
-      describe<vf>(x, part + 4 * i, toi[i], out, first + i);
+      describe<vf>(x, part + 4 * i, toi[i], distance, out, first + i);
     }
   }
 }
