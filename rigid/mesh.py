@@ -41,7 +41,8 @@ class MeshContacts:
     Attributes:
         pose: The row of the pose. Shape (M,).
         faces: Face of this mesh and face of the other. Shape (M, 2).
-        point: The middle of the triangles' intersection, in this mesh's frame. Shape (M, 3).
+        point: A point of both triangles, in general position the middle of their intersection, in
+            this mesh's frame. Shape (M, 3).
         normal: Direction of the shortest translation of the other mesh's triangle that separates
             the two triangles. Unit vector. Shape (M, 3).
         penetration: Length of this translation; 0 if the triangles just touch. Shape (M,), m.

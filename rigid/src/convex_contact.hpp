@@ -44,6 +44,12 @@ class ContactFeature {
       std::swap(rest, before);
       cut(before, cutter[i], cutter[(i + 1) % cutter.size()], tolerance, &rest);
     }
+    for (int end = 0; end < 2 && cutter.size() == 2 && !rest.empty(); ++end) {
+      // A segment also ends at a line across each of its ends.
+      const Point2 &x = cutter[end], &y = cutter[1 - end];
+      std::swap(rest, before);
+      cut(before, x, {x[0] + (y[1] - x[1]), x[1] - (y[0] - x[0])}, tolerance, &rest);
+    }
     if (!rest.empty()) return mean(rest);
     const Point2 x = mean(a.polygon), y = mean(b.polygon);
     return {0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1])};

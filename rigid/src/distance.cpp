@@ -115,11 +115,6 @@ TAUGUARD_FLAT bool separating_direction(const PointList& a, const PointList& b, 
   return *separation > 0;
 }
 
-Vec3 middle_point(const PointList& a, const PointList& b) {
-  const Nearest near = nearest(a, b);
-  return 0.5 * (near.a + near.b);
-}
-
 TAUGUARD_FLAT Nearest nearest(const PointList& a, const PointList& b) {
   ToRounding watch;
   const Simplex<Rows> s = descend_hulls(a, b, watch);

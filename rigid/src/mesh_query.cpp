@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tauguard/geometry/feature_gap.hpp"
+
 namespace tauguard::rigid {
 
 FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch) {
@@ -14,6 +16,8 @@ FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& 
 }
 
 namespace {
+
+using geometry::Vec3;
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -49,10 +53,44 @@ void separate(const Triangle& a, const Triangle& b, const double* axis, double s
   for (int k = 0; k < 3; ++k) c.normal[k] = sign * axis[k] / length;
 }
 
+// A common point of triangles that touch or are coplanar: the mean of all nearest points of two
+// edges, or of a corner and a triangle, whose distance is only rounding.
+void touching_point(const Triangle& a, const Triangle& b, double* point) {
+  const Triangle* both[2] = {&a, &b};
+  Vec3 corner[2][3], sum{}, nearest{};
+  double n = 0, size = 0, least = INFINITY;
+  const Vec3 origin = geometry::load(a.v[0]);
+  for (int side = 0; side < 2; ++side)
+    for (int i = 0; i < 3; ++i) {
+      corner[side][i] = geometry::load(both[side]->v[i]) - origin;
+      size = std::max(size, geometry::largest(corner[side][i]));
+    }
+  const double enough = 0x1p-46 * size;
+  const auto take = [&](const Vec3& at, double gap) {
+    if (gap <= enough) sum = sum + at, ++n;
+    if (gap < least) least = gap, nearest = at;
+  };
+  for (int side = 0; side < 2; ++side)
+    for (const Vec3& x : corner[side]) {
+      const auto& y = corner[1 - side];
+      const auto gap = geometry::point_triangle(x, y[0], y[1], y[2]);
+      take(x, gap.size(gap.shortest(enough)));
+    }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Vec3 *x = corner[0], *y = corner[1];
+      const auto gap = geometry::segments(x[i], x[(i + 1) % 3], y[j], y[(j + 1) % 3]);
+      const auto at = gap.shortest(enough);
+      take(x[i] + at.u * gap.q, gap.size(at));
+    }
+  const Vec3 mean = origin + (n > 0 ? (1 / n) * sum : nearest);
+  std::copy(mean.begin(), mean.end(), point);
+}
+
 // The mean of the points where edges of one triangle pierce the other. In general position it is
 // the middle of the common segment.
 void common_point(const Triangle& a, const Triangle& b, double* point) {
-  double sum[3] = {}, lo[3] = {}, n = 0;
+  double sum[3] = {}, n = 0;
   for (int side = 0; side < 2; ++side) {
     const Triangle &t = side ? b : a, &s = side ? a : b;
     double u[3], v[3], normal[3];
@@ -72,14 +110,7 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
     for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
     return;
   }
-  // Coplanar triangles or touching edges: take the middle of the overlap of both bounding boxes.
-  for (int k = 0; k < 3; ++k) {
-    lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
-                     std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));
-    const double hi = std::min(std::max({a.v[0][k], a.v[1][k], a.v[2][k]}),
-                               std::max({b.v[0][k], b.v[1][k], b.v[2][k]}));
-    point[k] = 0.5 * (lo[k] + hi);
-  }
+  touching_point(a, b, point);
 }
 
 Contact describe(const Triangle& a, const Triangle& b) {

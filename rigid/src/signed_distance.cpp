@@ -170,15 +170,22 @@ struct ExactDistance {
   int sign;  // of the distance minus both radii
 };
 
-ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
-                          const Dyadic& radii) {
-  const std::int64_t e = exponent(nearest.numerator), d = nearest.denominator.floor_log2();
-  const Vec3 v = scaled(nearest.numerator, e);
-  const double length = norm(v), denominator = nearest.denominator.scaled(-d).to_double();
+// The point of a that is nearest to b.
+Vec3 point_of_a(const ExactNearest<Dyadic>& nearest, const Points<double>& a) {
+  const std::int64_t d = nearest.denominator.floor_log2();
+  const double denominator = nearest.denominator.scaled(-d).to_double();
   Vec3 point{};
   for (std::size_t k = 0; k < nearest.pairs.size(); ++k)
     point =
         point + (nearest.weights[k].scaled(-d).to_double() / denominator) * a[nearest.pairs[k][0]];
+  return point;
+}
+
+ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
+                          const Dyadic& radii) {
+  const std::int64_t e = exponent(nearest.numerator), d = nearest.denominator.floor_log2();
+  const Vec3 v = scaled(nearest.numerator, e), point = point_of_a(nearest, a);
+  const double length = norm(v), denominator = nearest.denominator.scaled(-d).to_double();
   const Vec3 n = (1 / length) * v;
   const double distance = power(length / denominator, e - d);
   const Dyadic reach = radii * nearest.denominator;
@@ -200,7 +207,8 @@ ExactDistance exact_depth(const Vector3<Dyadic>& facet, const Dyadic& height,
 }
 
 ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
-                             const Points<double>& a, const Points<double>& b, const Dyadic& radii,
+                             const Points<double>& a, const Points<double>& b,
+                             const ExactNearest<Dyadic>& nearest, const Dyadic& radii,
                              double size) {
   using Polytope = ExpandingPolytope<Dyadic, PointDifferences<Dyadic>>;
   Polytope polytope(PointDifferences<Dyadic>(x, y));
@@ -209,7 +217,7 @@ ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
   if (is_zero(facet)) facet = {Dyadic(), Dyadic(), Dyadic(-1.0)};
   if (answer != Polytope::Answer::flat)
     return exact_depth(facet, polytope.nearest.offset, a, b, radii, size);
-  const Vec3 normal = scaled(facet, exponent(facet)), point = middle_point(a, b);
+  const Vec3 normal = scaled(facet, exponent(facet)), point = point_of_a(nearest, a);
   return {{0.0, point, point, (1 / norm(normal)) * normal}, radii.is_zero() ? 0 : -1};
 }
 
@@ -231,7 +239,7 @@ ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std
     return exact_depth(facets.normal, facets.height, a, b, radii, size);
   const ExactNearest<Dyadic> nearest = exact_nearest(x, y, a, b);
   if (!is_zero(nearest.numerator)) return exact_apart(nearest, a, radii);
-  return exact_together(x, y, a, b, radii, size);
+  return exact_together(x, y, a, b, nearest, radii, size);
 }
 
 // The result for bodies grown by balls. If `known`, `sign` is the exact sign of the distance.

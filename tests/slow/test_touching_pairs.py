@@ -1,6 +1,5 @@
 """A million degenerate pairs of each kind: all are hits, and their weights reach the contact."""
 
-import numpy as np
 import pytest
 
 from oracles.touching_pairs import KINDS, gap_of_weights, touching

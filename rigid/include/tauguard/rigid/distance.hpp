@@ -19,9 +19,6 @@ struct Nearest {
 };
 Nearest nearest(const PointList& a, const PointList& b);
 
-// A common point of the hulls if they meet, otherwise the middle of their nearest points.
-Vec3 middle_point(const PointList& a, const PointList& b);
-
 // Writes the unit direction from a to b along which the hulls are furthest apart, and the
 // separation along it. Returns false if the hulls meet.
 bool separating_direction(const PointList& a, const PointList& b, Vec3* n, double* separation);
