@@ -23,6 +23,7 @@ PRODUCT = {
     "replay",
     "live",
     "twin",
+    "benchmark",
 }
 ALLOWED = {
     "geometry": set(),
@@ -37,6 +38,7 @@ ALLOWED = {
     "replay": {"traces", "models", "detectors", "report"},
     "live": {"detectors", "traces"},
     "twin": {"detectors", "models", "traces"},
+    "benchmark": {"datasets", "detectors", "models", "traces", "report"},
     "report": set(),
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "hard_cases"},

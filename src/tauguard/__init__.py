@@ -2,7 +2,7 @@
 
 Import the sub-package that you need: ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``, ``report``,
-``hard_cases``, ``twin``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
+``hard_cases``, ``twin``, ``benchmark``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
 
 After ``import tauguard``, ``gymnasium.make("tauguard/Reach-v0")`` makes an environment. The others
 are ``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
@@ -30,9 +30,8 @@ register_environments()
 
 #: Packages that are loaded at their first use.
 _PACKAGES = (
-    "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases", "live",
-    "models", "replay", "report", "rigid", "traces",
-    "twin",
+    "benchmark", "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases",
+    "live", "models", "replay", "report", "rigid", "traces", "twin",
 )  # fmt: skip
 _FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.calibration.nominal"}
 

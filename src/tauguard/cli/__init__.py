@@ -17,6 +17,7 @@ from tauguard.findings import ArgumentError
 
 COMMANDS = {
     "demo": "simulate an arm, train a detector, detect collisions, write a recording",
+    "data": "list and download published logs of real arms",
     "calibrate": "identify friction, inertia and drive gains of a real arm from free logs",
     "twin": "identify a simulated copy of a real arm from free logs",
     "detect": "find collisions in the log of a real arm",
