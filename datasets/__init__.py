@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
+    from tauguard.datasets.arm_logs import read_log, read_logs, simulated
     from tauguard.datasets.columns import PRESETS, ColumnMap
     from tauguard.datasets.configuration import Configuration, Split
     from tauguard.datasets.configuration import load as load_configuration
     from tauguard.datasets.generation import generate_dataset
-    from tauguard.datasets.logs import Log, read_log
     from tauguard.datasets.plans import (
         SPEEDS,
         TRAINING_PAYLOADS,
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from tauguard.datasets.recordings import simulate_all, write_dataset
 
 __all__ = [
-    "PRESETS", "SPEEDS", "TRAINING_PAYLOADS", "ColumnMap", "Configuration", "DemoPlan", "Log",
+    "PRESETS", "SPEEDS", "TRAINING_PAYLOADS", "ColumnMap", "Configuration", "DemoPlan",
     "Split", "collision_plans", "demo_plan", "free_episodes", "generate_dataset",
-    "load_configuration", "read", "read_log", "simulate_all", "struck_episodes", "write_dataset",
+    "load_configuration", "read", "read_log", "read_logs", "simulate_all", "simulated",
+    "struck_episodes", "write_dataset",
 ]  # fmt: skip
 
 __getattr__ = on_demand(__name__)

@@ -1,25 +1,36 @@
-"""Read the logs of one real arm for the commands: files, joints, units and loads."""
+"""Read logs of one arm: files or arrays, joints, units and loads."""
+
+from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.datasets.columns import ANGLES, AS_IS, Reading, column_map
+from tauguard.datasets.columns import ANGLES, ColumnMap, changed_fields, column_map
 from tauguard.datasets.log_checks import saturated
-from tauguard.datasets.logs import Log, read_log
-from tauguard.datasets.real_arms import is_torque, of_log, robot_numbers, unnamed
+from tauguard.datasets.logs import read_file
 from tauguard.detectors import RobotNumbers
-from tauguard.detectors.calibration.recording import Load, Recording, moves
-from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
-from tauguard.detectors.features.motion_regimes import SEEN, unseen, unseen_text
-from tauguard.findings import LogError
-from tauguard.traces import Trace
+from tauguard.detectors.calibration.joints import (
+    is_torque,
+    linear_axes,
+    matched,
+    of_log,
+    robot_numbers,
+)
+from tauguard.findings import ArgumentError, Finding, Findings, LogError, cause, note
+from tauguard.traces.logs import Load, Log, Logs, log_named
 from tauguard.traces.resample import averaged
+from tauguard.traces.trace import Trace
+from tauguard.untrusted_input import check_no_device
+
+#: A load: kg, or kg and its centre [m]; None: unknown.
+LoadLike = Load | float | tuple[float, Sequence[float]] | None
+#: A column map, the name of a preset, "auto", or the path of a map's JSON file.
+Columns = ColumnMap | str | Path | None
 
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
 HEAVIEST = 100.0
@@ -30,13 +41,148 @@ NEARBY = 0.5
 ALIKE = 3.0
 
 
-@dataclass(frozen=True)
-class ArmLogs:
-    """Logs of one arm, and the numbers of the robot that they were recorded on."""
+def read_log(
+    path: str | Path,
+    columns: Columns = None,
+    *,
+    robot: str | Path | None = None,
+    joint_names: Sequence[str] | None = None,
+    payload: LoadLike = 0.0,
+    torque: bool = False,
+    mend: str | Collection[str] = (),
+    resample: float = 0.0,
+) -> Log:
+    """Read a log of a real arm, which may show contacts.
 
-    traces: dict[str, Trace]  #: by file name, joints in the robot's order
-    numbers: RobotNumbers  #: the robot's numbers for the joints that the logs have
-    notes: tuple[str, ...]  #: one line for each repair and each joint that is held fixed
+    Args:
+        path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
+            system with ``JointState`` messages, whose ``effort`` is taken as current [A].
+        columns: columns of a CSV file: a :class:`ColumnMap`, the path of a JSON file with its
+            fields, the name of a preset (see ``PRESETS``), or "auto" to recognise columns by names
+            and values. By default the header line must be that of a preset.
+        robot: URDF or MJCF file of the arm, or a name in ``models.ROBOTS``. With ``columns="auto"``
+            it finds columns that are named after its joints.
+        joint_names: names of the joints in the order of the columns (default: the map's names, the
+            messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
+        payload: the load that the arm carried, see :data:`LoadLike`.
+        torque: currents or efforts of the file are joint torques [N m].
+        mend: units and repairs of a CSV file, see :meth:`ColumnMap.mended`.
+        resample: average the log down to this rate [Hz]; 0: unchanged.
+
+    Returns:
+        The log with its joints in the file's order. The text of each finding begins with the file's
+        name. Only faults that ``mend`` names, or the column map's ``repair``, are repaired.
+
+    Raises:
+        LogError: a missing column, a bad number, a cut-off row, time that does not increase, a
+            gap, angles in degrees, or velocities that do not fit the positions. The message names
+            file, row or line, and what would work.
+        ArgumentError: the robot file or another argument cannot be used.
+        OSError: the file is missing or cannot be read.
+    """
+    from tauguard.models.robot import bodies_file
+
+    file = None if robot is None else bodies_file(Path(robot))
+    check_no_device(path)
+    numbers = None if file is None else robot_numbers(file)
+    columns = column_map(columns)
+    joints = _joints_to_find(columns, numbers)
+    log = _read(Path(path), columns, torque, _words(mend), resample, joints, joint_names)
+    return dataclasses.replace(log, load=load_of(payload), robot=file, numbers=numbers)
+
+
+def read_logs(
+    logs: str | Path | Sequence[str | Path],
+    columns: Columns = None,
+    *,
+    robot: str | Path | None = None,
+    arm: str | None = None,
+    payload: Mapping[str, LoadLike] | None = None,
+    torque: bool = False,
+    mend: str | Collection[str] = (),
+    resample: float = 0.0,
+) -> Logs:
+    """Read logs of one arm: free motion of a real arm, or labelled recordings of a simulated one.
+
+    Args:
+        logs: files, or folders that hold them; names of files differ. Without ``robot``, a folder
+            of labelled MCAP recordings, or a dataset, whose first split is read.
+        columns: as for :func:`read_log`.
+        robot: URDF or MJCF file of the arm, or a name in ``models.ROBOTS``. The logs then have to
+            show free motion. Without it, the arm is attached to the recordings.
+        arm: without ``robot``, in a dataset with several arms, the one whose episodes are read.
+        payload: loads that were carried, by the log's name, with or without its extension; other
+            logs have no load.
+        torque: the logs hold joint torques [N m] in place of currents.
+        mend: units and repairs of CSV files, see :meth:`ColumnMap.mended`.
+        resample: average the logs down to this rate [Hz]; 0: unchanged.
+
+    Returns:
+        The logs by file name, with joints in the robot's order.
+
+    Raises:
+        LogError: labelled contacts, a saturated current, currents in one log and torques in
+            another, or an error of :func:`read_log`; with a finding for each log.
+        MismatchError: joints that the robot does not have.
+        ArgumentError: a payload of no log, or another argument that cannot be used.
+        FileError: without ``robot``, no recordings, or one without truth.
+        OSError: a file is missing or cannot be read.
+    """
+    from tauguard.models.robot import bodies_file
+
+    paths = [Path(log) for log in ([logs] if isinstance(logs, str | Path) else logs)]
+    if robot is None:
+        from tauguard.datasets.recordings import labelled
+
+        return simulated(trace for path in paths for trace in labelled(path, arm))
+    file = bodies_file(Path(robot))
+    files = log_files(paths)
+    numbers, words, columns = robot_numbers(file), _words(mend), column_map(columns)
+    joints = _joints_to_find(columns, numbers)
+
+    def one(path: Path, word: tuple[str, ...] = ()) -> Log:
+        return _read(path, columns, torque, (*words, *word), resample, joints)
+
+    decided = columns != "auto" or not ANGLES.keys().isdisjoint(words)
+    read = _each(files, one) if decided else of_one_unit(files, one)
+    _refuse(touch for log in read.values() for touch in _labelled_contacts(log))
+    numbers, findings = of_log(numbers, next(iter(read.values())).trace.joint_names, file)
+    notes = _gathered({name: log.findings for name, log in read.items()}, len(read))
+    findings = Findings([*notes, *findings, *linear_axes(numbers, read)])
+    traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
+    _refuse(peak for name, trace in traces.items() for peak in _saturated(name, trace))
+    if len({is_torque(trace) for trace in traces.values()}) > 1:
+        text = "some logs hold currents, others torques: give logs of one kind"
+        raise LogError(cause("torques", text, *traces))
+    loads = loads_of(payload or {}, list(traces))
+    whole = {
+        name: dataclasses.replace(
+            log, trace=traces[name], load=loads[name], robot=file, numbers=numbers
+        )
+        for name, log in read.items()
+    }
+    return Logs(whole, file, numbers, findings)
+
+
+def simulated(traces: Iterable[Trace]) -> Logs:
+    """Recordings of a simulated arm, which is attached to each trace, as logs of an unknown load.
+
+    Args:
+        traces: of one arm, as from ``envs.simulate`` or ``datasets.read``. The name of a log is
+            its file or episode in ``meta``, or its number.
+
+    Raises:
+        ArgumentError: no traces, or traces of different joints.
+    """
+    logs: dict[str, Log] = {}
+    for number, trace in enumerate(traces):
+        name = trace.meta.get("log") or trace.meta.get("episode") or str(number)
+        name = f"{name} ({number})" if name in logs else name
+        logs[name] = Log(trace, None, name, as_read="simulated")
+    return Logs(logs)
+
+
+# -- files -----------------------------------------------------------------------------------------
 
 
 def log_files(logs: Sequence[Path]) -> list[Path]:
@@ -59,35 +205,35 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     return files
 
 
-def read_one(
-    log: Path,
-    columns: str | None,
-    torque: bool = False,
-    reading: Reading | None = None,
+def _joints_to_find(columns: Columns, numbers: RobotNumbers | None) -> tuple[str, ...]:
+    """Joints after which columns may be named."""
+    return numbers.joint_names if numbers is not None and columns in ("auto", None) else ()
+
+
+def _words(mend: str | Collection[str]) -> tuple[str, ...]:
+    words = (mend,) if isinstance(mend, str) else tuple(mend)
+    for word in words:
+        changed_fields(word)
+    return words
+
+
+def _read(
+    path: Path,
+    columns: ColumnMap | str | None,
+    torque: bool,
+    mend: tuple[str, ...],
+    resample: float,
     joints: Sequence[str] = (),
+    joint_names: Sequence[str] | None = None,
 ) -> Log:
-    """Read one log, with joints in the file's order; each note begins with the file's name.
-
-    Args:
-        log: CSV or MCAP.
-        columns: preset or JSON file of a column map.
-        torque: whether the log's currents or efforts are joint torques [N m].
-        reading: repairs and sample rate (default: the log unchanged).
-        joints: the robot's joints, after which columns may be named.
-
-    Raises:
-        LogError: as :func:`~tauguard.datasets.logs.read_log`.
-    """
-    reading = reading or AS_IS
-    read = read_log(log, column_map(columns), None, reading.mend, joints)
-    if reading.resample != 0:
-        read = reduced(read, reading.resample)
-    trace, notes = read.trace, read.notes
-    if torque:
-        notes = tuple(n.replace("taken as current [A]", "joint torque [N m]") for n in notes)
-        trace = dataclasses.replace(trace, meta={**trace.meta, "effort": "torque"})
-    notes = tuple(f"{log.name}: {note}" for note in notes)
-    return dataclasses.replace(read, trace=trace, notes=notes)
+    """A log with its joints in the file's order; each finding begins with the file's name."""
+    log = read_file(path, columns, joint_names, mend, joints, torque)
+    if resample != 0:
+        log = reduced(log, resample)
+    findings = (
+        dataclasses.replace(note, text=f"{path.name}: {note.text}") for note in log.findings
+    )
+    return dataclasses.replace(log, findings=Findings(findings))
 
 
 def reduced(log: Log, hz: float) -> Log:
@@ -99,56 +245,26 @@ def reduced(log: Log, hz: float) -> Log:
     own = log.trace.dt
     try:
         trace = averaged(log.trace, hz)
-    except ValueError as error:
-        raise LogError(f"--resample {hz:g}: {error}") from None
-    note = (
+    except ArgumentError as error:
+        raise LogError(cause("resample", f"`resample={hz:g}`: {error}")) from None
+    text = (
         f"{1 / own:.3g} Hz averaged down to {hz:g} Hz: alarms come {500 / hz - 500 * own:.3g} ms "
         f"later, and a contact of less than {1e3 / hz:.3g} ms looks weaker"
     )
-    return dataclasses.replace(log, trace=trace, notes=(*log.notes, note))
+    findings = Findings([*log.findings, note("resampled", text)])
+    return dataclasses.replace(log, trace=trace, findings=findings)
 
 
-def read_logs(
-    logs: Sequence[Path],
-    columns: str | None,
-    robot: Path,
-    torque: bool = False,
-    reading: Reading | None = None,
-) -> ArmLogs:
-    """Read logs of one arm that show free motion, from which a detector or calibration learns.
-
-    Args:
-        logs: files or folders.
-        columns: preset or JSON file of a column map.
-        robot: URDF or MJCF file of the arm.
-        torque: whether the logs hold joint torques [N m] in place of currents.
-        reading: repairs and sample rate (default: the logs unchanged).
-
-    Raises:
-        LogError: labelled contacts, a saturated current, currents in one log and torques in
-            another, joints that the robot does not have, or an error of :func:`read_one`.
-    """
-    files, reading = log_files(logs), reading or AS_IS
-    numbers = robot_numbers(robot)
-    joints = numbers.joint_names if columns in ("auto", None) else ()
-
-    def one(path: Path, word: tuple[str, ...] = ()) -> Log:
-        mended = dataclasses.replace(reading, mend=(*reading.mend, *word))
-        return read_one(path, columns, torque, mended, joints)
-
-    decided = columns != "auto" or not ANGLES.keys().isdisjoint(reading.mend)
-    read = {path.name: one(path) for path in files} if decided else of_one_unit(files, one)
-    for name, log in read.items():
-        _refuse_touched(name, log)
-    notes = _gathered(read)
-    numbers, held = of_log(numbers, next(iter(read.values())).trace.joint_names, robot)
-    held += linear_axes(numbers, read)
-    traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
-    for name, trace in traces.items():
-        _refuse_saturated(name, trace)
-    if len({is_torque(trace) for trace in traces.values()}) > 1:
-        raise LogError("some logs hold currents, others torques: give logs of one kind")
-    return ArmLogs(traces, numbers, (*notes, *held))
+def _each(files: Sequence[Path], one: Callable[[Path], Log]) -> dict[str, Log]:
+    """Logs by file name; a ``LogError`` has the findings of all files that cannot be read."""
+    read, errors = {}, {}
+    for path in files:
+        try:
+            read[path.name] = one(path)
+        except LogError as error:
+            errors[str(path)] = error.findings
+    _refuse(_gathered(errors, len(files)))
+    return read
 
 
 def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log]:
@@ -168,25 +284,33 @@ def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log
     for path in files:
         try:
             read[path.name] = one(path)
-        except ValueError as error:  # perhaps because the unit is open
-            doubts[path.name] = error
+        except LogError as error:  # perhaps because the unit is open
+            doubts[str(path)] = error.findings
     maps = {name: log.columns for name, log in read.items() if log.columns is not None}
-    if len({found.q for found in maps.values()}) != 1:
-        if doubts:
-            raise next(iter(doubts.values()))
+    if len({columns.q for columns in maps.values()}) != 1:
+        _refuse(_gathered(doubts, len(files)))
         return read
-    degrees = {name: read[name] for name, found in maps.items() if found.degrees}
+    degrees = {name: read[name] for name, columns in maps.items() if columns.degrees}
     radians = [name for name in maps if degrees and name not in degrees]
-    for name in radians:
-        _refuse_radians(name, read[name].trace.q, degrees)
+    _refuse(f for name in radians for f in _in_radians(name, read[name].trace.q, degrees))
     for path in files:
-        if path.name in doubts or path.name in radians:
+        if str(path) in doubts or path.name in radians:
             read[path.name] = one(path, ("deg" if degrees else "rad",))
     return {path.name: read[path.name] for path in files}
 
 
-def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
-    """Raise ``LogError`` if positions [rad] fit those of other logs, but not as degrees.
+def _refuse(findings: Iterable[Finding]) -> None:
+    """Raise ``LogError`` with all findings, if one of them is an error."""
+    every = list(findings)
+    if any(finding.severity == "error" for finding in every):
+        raise LogError(*every)
+
+
+# -- checks of logs of free motion -----------------------------------------------------------------
+
+
+def _in_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> list[Finding]:
+    """An error if positions [rad] fit those of other logs, but not as degrees.
 
     They do not fit as degrees if at least two joints, and more than as radians, were where the
     other logs never are, or if half of the joints as radians travel as far as in the other logs.
@@ -200,173 +324,102 @@ def _refuse_radians(name: str, q: Array, degrees: Mapping[str, Log]) -> None:
     ]
     ratio = (high - low) / np.maximum((most - least).max(axis=0), 1e-9)
     alike = int(((ratio > 1 / ALIKE) & (ratio < ALIKE)).sum())
-    if (far_in[1] >= 2 and far_in[0] < far_in[1]) or 2 * alike >= q.shape[1]:
-        raise LogError(
-            f"{name}: its positions are like those of {', '.join(degrees)} if they are radians, "
-            f"but these are degrees, by their values: convert one of them, or say --mend deg or "
-            "--mend rad for all"
-        )
+    if not ((far_in[1] >= 2 and far_in[0] < far_in[1]) or 2 * alike >= q.shape[1]):
+        return []
+    text = (
+        f"{name}: its positions are like those of {', '.join(degrees)} if they are radians, "
+        'but these are degrees, by their values: convert one of them, or say `mend="deg"` or '
+        '`mend="rad"` for all'
+    )
+    return [cause("units", text, name)]
 
 
-def linear_axes(numbers: RobotNumbers, read: Mapping[str, Log]) -> tuple[str, ...]:
-    """A note on the units of linear axes; none for an arm without them.
+def _gathered(findings: Mapping[str, Findings], count: int) -> list[Finding]:
+    """Findings by the name of their log, of ``count`` logs in all, as a list with each text once.
 
-    Args:
-        numbers: the robot's numbers for the joints of the logs.
-        read: logs by file name.
-
-    Raises:
-        LogError: the columns of these axes are read in degrees.
+    The text of a finding begins with the name.
     """
-    pairs = zip(numbers.joint_names, numbers.prismatic, strict=True)
-    if not (linear := ", ".join(name for name, is_linear in pairs if is_linear)):
-        return ()
-    for name, log in read.items():
-        if log.columns is not None and log.columns.degrees is True:
-            raise LogError(
-                f"{name}: {linear} is a linear axis, but is read in degrees as the others: "
-                'give a column map in which "degrees" is a list, false for this axis [m]'
-            )
-    return (f"{linear}: linear, so its numbers are in m, m/s and N, not in rad, rad/s and N m",)
+    logs: dict[Finding, list[str]] = {}
+    for name, doubts in findings.items():
+        for finding in doubts:
+            text = finding.text.removeprefix(f"{name}: ")
+            logs.setdefault(dataclasses.replace(finding, text=text), []).append(name)
+    gathered = []
+    for finding, names in logs.items():
+        which = "each log" if len(names) == count > 1 else ", ".join(names)
+        where = (*(Path(name).name for name in names), *finding.where)
+        gathered.append(dataclasses.replace(finding, text=f"{which}: {finding.text}", where=where))
+    return gathered
 
 
-def _gathered(read: dict[str, Log]) -> list[str]:
-    """The notes of all logs, each text once."""
-    logs: dict[str, list[str]] = {}
-    for name, log in read.items():
-        for note in log.notes:
-            logs.setdefault(note.removeprefix(f"{name}: "), []).append(name)
-    out = []
-    for note, names in logs.items():
-        every = len(names) == len(read) > 1
-        out.append(f"{'each log' if every else ', '.join(names)}: {note}")
-    return out
+def _labelled_contacts(log: Log) -> list[Finding]:
+    if not log.labels:
+        return []
+    begin = float(log.trace.t[0])
+    times = ", ".join(f"{a - begin:.1f} to {b - begin:.1f} s" for a, b in log.labels[:3])
+    text = (
+        f"{log.name}: a column labels {len(log.labels)} contact"
+        f"{'' if len(log.labels) == 1 else 's'} ({times}"
+        f"{', ...' if len(log.labels) > 3 else ''} after the beginning); expected free "
+        "motion: leave this log out, or keep only its seconds without contact"
+    )
+    return [cause("labelled-contact", text, log.name)]
 
 
-def _refuse_touched(name: str, log: Log) -> None:
-    if log.touched:
-        begin = float(log.trace.t[0])
-        times = ", ".join(f"{a - begin:.1f} to {b - begin:.1f} s" for a, b in log.touched[:3])
-        raise LogError(
-            f"{name}: a column labels {len(log.touched)} contact"
-            f"{'' if len(log.touched) == 1 else 's'} ({times}"
-            f"{', ...' if len(log.touched) > 3 else ''} after the beginning); expected free "
-            "motion: leave this log out, or keep only its seconds without contact"
-        )
-
-
-def _refuse_saturated(log: str, trace: Trace) -> None:
-    for joint, row, count, peak in saturated(trace):
-        what, unit = ("torque", "N m") if is_torque(trace) else ("current", "A")
-        raise LogError(
+def _saturated(log: str, trace: Trace) -> list[Finding]:
+    what, unit = ("torque", "N m") if is_torque(trace) else ("current", "A")
+    return [
+        cause(
+            "saturated",
             f"{log}: the {what} of {joint} stays at {peak:g} {unit} for {count} samples, "
             f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, so the torque is "
-            "not known; leave this log out or cut it there"
+            "not known; leave this log out or cut it there",
+            log,
+            joint,
         )
+        for joint, row, count, peak in saturated(trace)
+    ]
 
 
-def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
-    """The trace with its joints in the robot's order.
-
-    Raises:
-        LogError: joints that do not match.
-    """
-    given = trace.joint_names
-    if len(given) != len(names):
-        raise LogError(
-            f"the log has {len(given)} joints ({', '.join(given)}), "
-            f"the robot {len(names)} ({', '.join(names)})"
-        )
-    if given == unnamed(len(given)) or given == names:
-        return dataclasses.replace(trace, joint_names=names)
-    if set(given) != set(names):
-        raise LogError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
-    order = [given.index(name) for name in names]
-    moved: dict[str, Any] = {name: values[:, order] for name, values in trace.signals.items()}
-    return dataclasses.replace(trace, joint_names=names, **moved)
+# -- loads -----------------------------------------------------------------------------------------
 
 
-def moving(traces: dict[str, Trace]) -> tuple[dict[str, Trace], list[str]]:
-    """The logs in which some joint moves, and a note on each log without motion.
-
-    If no joint moves in any log, all logs are returned; calibration then raises an error.
-    """
-    still = [name for name, trace in traces.items() if not moves(trace)]
-    notes = [f"{name}: no joint moves in it; calibration leaves it out" for name in still]
-    return {n: t for n, t in traces.items() if n not in still} or traces, notes
-
-
-def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
-    """The log whose file name, with or without extension, is ``name``; errors name ``flag``.
+def load_of(value: LoadLike, log: str = "") -> Load | None:
+    """The load that a value stands for; ``log`` names the log in an error.
 
     Raises:
-        LogError: no log or several logs have this name.
+        ArgumentError: neither kg nor (kg, (x, y, z)), a negative mass, or above ``HEAVIEST``.
     """
-    found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
-    if len(found) != 1:
-        there = f"two are called {name!r}" if found else f"no log {name!r}"
-        raise LogError(f"{flag}: {there}; expected one of {', '.join(logs)}")
-    return found[0]
-
-
-def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recording]:
-    """Give each trace its load.
-
-    Args:
-        traces: traces by file name.
-        payload: one of LOG=KG, LOG=KG,X,Y,Z and LOG=unknown per log; other logs have no load.
-
-    Raises:
-        LogError: a payload that cannot be read or belongs to no log.
-    """
-    loads: dict[str, Load | None] = {}
-    for text in payload:
-        name, _, value = text.rpartition("=")
-        log = log_named(name, f"--payload {text}", list(traces))
-        form = "LOG=KG, LOG=KG,X,Y,Z or LOG=unknown"
-        loads[log] = None if value == "unknown" else _load(text, value, form)
-    return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
-
-
-def parse_load(text: str) -> Load:
-    """The load in ``--payload KG`` or ``--payload KG,X,Y,Z``.
-
-    Raises:
-        LogError: the text has another form.
-    """
-    if text == "unknown":
-        raise LogError("--payload unknown: for an unknown load, do not give this flag")
-    return _load(text, text, "KG or KG,X,Y,Z, 0 for nothing")
-
-
-def _load(text: str, value: str, form: str) -> Load:
+    if value is None or isinstance(value, Load):
+        return value
+    said = f'`payload={{"{log}": {_python(value)}}}`' if log else f"`payload={_python(value)}`"
     try:
-        parts = [float(v) for v in value.split(",")]
-    except ValueError:
-        parts = []
-    if len(parts) not in (1, 4):
-        raise LogError(f"--payload {text}: expected {form}")
-    if parts[0] > HEAVIEST:
-        raise LogError(
-            f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
-            "loads are given in kg"
-        )
-    centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
-    return Load(parts[0], centre)
+        pair: Any = value if isinstance(value, tuple | list) else (value, None)
+        mass, centre = float(pair[0]), None if pair[1] is None else tuple(map(float, pair[1]))
+    except (TypeError, ValueError, IndexError):
+        text = f"{said}: expected kg, or (kg, (x, y, z)), or None for an unknown load"
+        raise ArgumentError(cause("payload", text)) from None
+    if mass > HEAVIEST:
+        text = f"{said}: {mass:g} kg, expected at most {HEAVIEST:g}; loads are given in kg"
+        raise ArgumentError(cause("payload", text))
+    return Load(mass, centre)  # type: ignore[arg-type]
 
 
-def not_shown(traces: Sequence[Trace]) -> list[str]:
-    """Notes on joints that hardly move in any log, and on kinds of motion that no log shows."""
-    seconds = motion_seconds([Recording(trace) for trace in traces])
-    names = traces[0].joint_names
-    still = [name for name, s in zip(names, seconds, strict=True) if s < SHOWN_SECONDS]
-    notes = []
-    if still:
-        notes.append(
-            f"{', '.join(still)}: moves in none of the logs, so its friction is not known. No "
-            "collision is detected while it moves, and none of moving joints while it stands "
-            "elsewhere; its bound at rest is assumed; add a log in which it moves"
-        )
-    if lacking := unseen(traces):
-        notes.append(f"the logs show less than {SEEN:g} s of {unseen_text(lacking, len(names))}")
-    return notes
+def loads_of(payload: Mapping[str, LoadLike], logs: Sequence[str]) -> dict[str, Load | None]:
+    """The load of each log; logs that ``payload`` does not name have none.
+
+    Raises:
+        ArgumentError: a name of no log, or as for :func:`load_of`.
+    """
+    loads: dict[str, Load | None] = dict.fromkeys(logs, Load())
+    for name, value in payload.items():
+        log = log_named(name, f'`payload={{"{name}": {_python(value)}}}`', logs)
+        loads[log] = load_of(value, name)
+    return loads
+
+
+def _python(value: Any) -> str:
+    """A load as Python, with short numbers."""
+    if isinstance(value, tuple | list):
+        return f"({', '.join(map(_python, value))})"
+    return f"{value:g}" if isinstance(value, int | float) else repr(value)

@@ -148,7 +148,7 @@ def _in_degrees(names: Sequence[str], q: Array, qd: Array) -> bool:
     joint = int(np.argmax(far))
     raise LogError(
         f"column {names[joint]} is beyond two turns ({np.nanmax(np.abs(q[:, joint])):.4g}) as the "
-        "only position: if angles are in degrees, say --mend deg or --mend rad if in radians"
+        'only position: if angles are in degrees, say `mend="deg"` or `mend="rad"` if in radians'
     )
 
 

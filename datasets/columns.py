@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from tauguard.findings import LogError
+from tauguard.findings import ArgumentError, LogError, cause
 from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
@@ -128,23 +128,33 @@ class ColumnMap:
                 or "clock=HZ".
 
         Raises:
-            LogError: an unknown word.
+            ArgumentError: an unknown word.
         """
         changed: dict[str, Any] = {"repair": self.repair | (set(words) & set(REPAIRS))}
         for word in words:
-            name, _, value = word.partition("=")
-            if word in ANGLES:
-                changed["degrees"] = ANGLES[word]
-            elif word == "mA":
-                changed["current_scale"] = 1e-3
-            elif word in CLOCK_UNITS:
-                changed["time_scale"] = CLOCK_UNITS[word]
-            elif name == "clock" and re.fullmatch(r"[0-9.]+", value) and float(value) > 0:
-                changed |= {"t": None, "clock": float(value)}
-            elif word not in REPAIRS:
-                known = ", ".join((*ANGLES, "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
-                raise LogError(f"--mend {word}: expected some of {known}")
+            changed |= changed_fields(word)
         return dataclasses.replace(self, **changed)
+
+
+def changed_fields(word: str) -> dict[str, Any]:
+    """The fields of a map that a word of ``mend`` changes; none for a repair.
+
+    Raises:
+        ArgumentError: an unknown word.
+    """
+    name, _, value = word.partition("=")
+    if word in ANGLES:
+        return {"degrees": ANGLES[word]}
+    if word == "mA":
+        return {"current_scale": 1e-3}
+    if word in CLOCK_UNITS:
+        return {"time_scale": CLOCK_UNITS[word]}
+    if name == "clock" and re.fullmatch(r"[0-9.]+", value) and float(value) > 0:
+        return {"t": None, "clock": float(value)}
+    if word in REPAIRS:
+        return {}
+    words = ", ".join((*ANGLES, "mA", *CLOCK_UNITS, *REPAIRS, "clock=HZ"))
+    raise ArgumentError(cause("mend", f'`mend="{word}"`: expected some of {words}'))
 
 
 @dataclass(frozen=True)
@@ -205,16 +215,23 @@ def presets_of_width(width: int) -> list[str]:
     return [name for name, one in PRESETS.items() if one.headerless and one.width == width]
 
 
-def column_map(columns: str | None) -> ColumnMap | str | None:
-    """The map in the JSON file ``columns``; the name of a preset is returned unchanged.
+def column_map(columns: ColumnMap | str | Path | None) -> ColumnMap | str | None:
+    """The map in the JSON file ``columns``; a map or the name of a preset is returned unchanged.
 
     Raises:
-        LogError: no such file, or not the fields of a :class:`ColumnMap`.
+        ArgumentError: no such file or preset.
+        LogError: not the fields of a :class:`ColumnMap`.
     """
-    if columns is None or not columns.endswith(".json"):
-        return columns  # "auto" is recognised from the file itself
+    if columns is None or isinstance(columns, ColumnMap):
+        return columns
+    columns = str(columns)
+    if columns == "auto" or columns in PRESETS:
+        return columns
+    presets = f"presets are {', '.join(PRESETS)}"
+    if not columns.endswith(".json"):
+        raise ArgumentError(cause("columns", f"columns {columns!r}: {presets}, or auto"))
     if not Path(columns).is_file():
-        raise LogError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
+        raise ArgumentError(cause("columns", f"{columns}: no such file; {presets}"))
     fields = read_json(columns)
     known = [field.name for field in dataclasses.fields(ColumnMap)]
     fields_are = f"its fields are {', '.join(known)}"

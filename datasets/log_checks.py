@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array, runs
 from tauguard.datasets.columns import ColumnMap
 from tauguard.detectors.faults.inputs import FASTEST
-from tauguard.findings import LogError
+from tauguard.findings import Finding, Findings, LogError, cause, note, raise_errors
 from tauguard.traces.trace import Trace
 
 #: A pause is a gap if it is longer than GAP_SAMPLES sample intervals and than GAP_SECONDS seconds.
@@ -40,54 +40,60 @@ LABEL = {"0": False, "false": False, "1": True, "true": True}
 Where = Callable[[int], str]
 
 
-def checked(trace: Trace, where: Where) -> tuple[str, ...]:
+def checked(trace: Trace, where: Where, earlier: Sequence[Finding] = ()) -> Findings:
     """Check a log and return notes on faults that a detector tolerates.
 
     Args:
         trace: the log.
         where: text for a row's number, such as "line 12".
+        earlier: findings of its reading, which come first.
 
     Raises:
-        LogError: a gap, angles in degrees, or velocities that do not fit the positions.
+        LogError: gaps, angles in degrees, or velocities that do not fit the positions; each is a
+            finding.
     """
-    _refuse_degrees(trace, where)
-    notes = _timing(trace, where)
-    _refuse_strange_velocities(trace)
+    degrees = _in_degrees(trace, where)
+    doubts = [*degrees, *_timing(trace, where)]
+    doubts += [] if degrees else _strange_velocities(trace)
     most = float(np.abs(trace.current).max(initial=0.0))
     if most > AMPERES and trace.meta.get("effort") != "torque":
-        notes.append(
-            f"currents up to {most:.0f} A: if these are milliamperes, say --mend mA; if they are "
-            "torques, --torque"
+        text = (
+            f'currents up to {most:.0f} A: if these are milliamperes, say `mend="mA"`; if they are '
+            "torques, `torque=True`"
         )
+        doubts.append(note("large-currents", text))
     for name, row, count, peak in saturated(trace):
-        notes.append(
+        text = (
             f"{where(row)}: the current of {name} stays at {peak:g} A for {count} samples: "
             "saturated; neither an alarm nor its absence there means anything"
         )
-    return tuple(notes)
+        doubts.append(note("saturated", text, name))
+    return raise_errors(LogError, [*earlier, *doubts])
 
 
-def _timing(trace: Trace, where: Where) -> list[str]:
+def _timing(trace: Trace, where: Where) -> list[Finding]:
     steps = np.diff(trace.t)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > max(GAP_SAMPLES * usual, GAP_SECONDS))
     if len(steps) >= 20 and len(gaps):
         row = int(gaps[0])
-        raise LogError(
+        text = (
             f"{where(row + 1)}: no sample in the {steps[row]:.3g} s before it, but samples come "
             f"every {1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there; the "
             f"rows up to {where(row)} and those from {where(row + 1)} on are separate logs"
         )
+        return [cause("gap", text)]
     late = np.flatnonzero(steps > 2 * usual)
     if len(steps) < 20 or not len(late):
         return []
-    return [
+    text = (
         f"samples come every {1e3 * usual:.3g} ms, {len(late)} later than twice that, by up to "
         f"{1e3 * steps.max():.3g} ms; first: {where(int(late[0]) + 1)}"
-    ]
+    )
+    return [note("late-samples", text)]
 
 
-def _refuse_degrees(trace: Trace, where: Where) -> None:
+def _in_degrees(trace: Trace, where: Where) -> list[Finding]:
     for what, x, most, unit, needed in (
         ("velocity", trace.qd, FASTEST, "rad/s", 1),
         ("position", trace.q, FURTHEST, "rad", min(2, trace.q.shape[1])),
@@ -95,10 +101,13 @@ def _refuse_degrees(trace: Trace, where: Where) -> None:
         beyond = np.abs(x) > most
         if beyond.any(axis=0).sum() >= needed:
             row, joint = (int(v) for v in np.argwhere(beyond)[0])
-            raise LogError(
+            text = (
                 f"{where(row)}: the {what} of {trace.joint_names[joint]} is {x[row, joint]:g} "
-                f'{unit}: if these are degrees, say --mend deg ("degrees" in a column map)'
+                f'{unit}: if these are degrees, say `mend="deg"` ("degrees" in a column map)'
             )
+            joints = [trace.joint_names[k] for k in np.flatnonzero(beyond.any(axis=0))]
+            return [cause("units", text, *joints)]
+    return []
 
 
 def travelled(trace: Trace) -> tuple[Array, Array]:
@@ -109,40 +118,48 @@ def travelled(trace: Trace) -> tuple[Array, Array]:
     return np.diff(trace.q[::count], axis=0), np.diff(whole[::count], axis=0)
 
 
-def _refuse_strange_velocities(trace: Trace) -> None:
+def _strange_velocities(trace: Trace) -> list[Finding]:
+    """Velocities that do not follow the positions; joints with the same likely cause together."""
     if len(trace.t) < 100:
-        return
+        return []
     change, summed = travelled(trace)
     moves = (np.sqrt((change**2).mean(axis=0)) > 1e-3) & (np.sqrt((summed**2).mean(axis=0)) > 1e-5)
+    findings: list[Finding] = []
+    ratios: dict[tuple[str, str], dict[str, float]] = {}
     for j in np.flatnonzero(moves):
         name = trace.joint_names[j]
         alike = [_alike(change[:, k], summed[:, j]) for k in range(change.shape[1])]
         if abs(alike[j]) < 0.7:  # a wrong sign is reported below
             best = int(np.argmax(alike))
             other = trace.joint_names[best]
-            raise LogError(
-                f"the velocity of {name} does not follow its position"
-                + (f" but that of {other}: columns in another order?" if alike[best] > 0.9 else "")
+            text = f"the velocity of {name} does not follow its position" + (
+                f" but that of {other}: columns in another order?" if alike[best] > 0.9 else ""
             )
+            findings.append(cause("velocities", text, name))
+            continue
         ratio = float(change[:, j] @ summed[:, j] / (summed[:, j] @ summed[:, j]))
         if not 0.7 < ratio < 1.4:
-            raise LogError(
-                f"{_meaning(ratio, name)}: change of position is {ratio:.3g} times the velocity"
-            )
+            ratios.setdefault(_meaning(ratio), {})[name] = ratio
+    for (code, meaning), of in ratios.items():
+        low, high = f"{min(of.values()):.3g}", f"{max(of.values()):.3g}"
+        span = low if low == high else f"{low} to {high}"
+        text = f"{', '.join(of)}: {meaning}: change of position is {span} times the velocity"
+        findings.append(cause(code, text, *of))
+    return findings
 
 
-def _meaning(ratio: float, name: str) -> str:
-    """The likely cause of a wrong ratio of change of position to velocity."""
+def _meaning(ratio: float) -> tuple[str, str]:
+    """Code and likely cause of a wrong ratio of change of position to velocity."""
     if 40 < ratio < 80:
-        return f"{name}: positions in degrees, velocities in rad/s"
+        return "units", "positions in degrees, velocities in rad/s"
     if 1 / 80 < ratio < 1 / 40:
-        return f"{name}: velocities in degrees/s, positions in rad"
+        return "units", "velocities in degrees/s, positions in rad"
     if -1.4 < ratio < -0.7:
-        return f"{name}: the velocity has the other sign"
+        return "velocity-sign", "the velocity has the other sign"
     for word, scale in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if 0.7 < ratio / scale < 1.4:
-            return f"{name}: time in {word}? Then say --mend {word}"
-    return f"{name}: the units of velocity, position and time do not fit"
+            return "units", f'time in {word}? Then say `mend="{word}"`'
+    return "units", "the units of velocity, position and time do not fit"
 
 
 def _alike(a: Array, b: Array) -> float:
@@ -172,43 +189,45 @@ def refuse_set_back(t: Array, lines: NDArray[np.int64]) -> None:
     for begin, row, end in zip([0, *back[:-1]], back, [*back[1:], len(t)], strict=True):
         over = float(min(t[row - 1], t[end - 1]) - max(t[row], t[begin]))
         if len(back) < FEW and end - row > FEW and over > max(5 * np.median(np.diff(t)), 0.05):
-            raise LogError(
-                f"line {lines[row]}: the clock was set back by {over:.3g} s: cut the log there "
-                "into two"
-            )
+            text = f"line {lines[row]}: the clock was set back by {over:.3g} s: cut the log there "
+            raise LogError(cause("time", f"{text}into two"))
 
 
 def increasing(
-    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[str]
+    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[Finding]
 ) -> NDArray[np.bool_]:
     """Rows to keep so that time increases strictly; times may repeat only if the map allows it."""
     step = np.diff(t)
     back = np.flatnonzero(step < 0)
     if back.size:
         row = back[0] + 1
-        raise LogError(
+        text = (
             f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
-            "say --mend order"
+            'say `mend="order"`'
         )
+        raise LogError(cause("time", text))
     same = np.flatnonzero(step == 0)
     if same.size and "repeat" not in columns.repair:
-        raise LogError(
+        text = (
             f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
-            "--mend repeat"
+            '`mend="repeat"`'
         )
+        raise LogError(cause("time", text))
     if same.size > COARSE * len(t):
-        raise LogError(
+        text = (
             f"{same.size} of {len(t)} rows repeat the time before: the time has too few digits; "
-            "write more of them, or say --mend clock=HZ (rows per second) instead"
+            'write more of them, or say `mend="clock=HZ"` (rows per second) instead'
         )
+        raise LogError(cause("time", text))
     if same.size:
-        notes.append(
-            f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
-        )
+        text = f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
+        notes.append(note("rows-left-out", text))
     return np.concatenate([[True], step > 0])
 
 
-def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
+def fresh(
+    t: Array, state: Array, keep: NDArray[np.bool_], notes: list[Finding]
+) -> NDArray[np.bool_]:
     """Rows to keep: all but copies of the previous state that a fast recorder wrote.
 
     A difference quotient would be 0 at a copy, and twice the speed after it. While the state does
@@ -230,10 +249,11 @@ def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> 
     for row, is_new in zip(rows, new, strict=True):
         if is_new or t[row] - last > 1.4 * usual:
             kept[row], last = True, t[row]
-    notes.append(
+    text = (
         f"{100 * share:.0f} % of the rows repeat the previous state and are left out; new states "
         f"come every {1e3 * usual:.3g} ms"
     )
+    notes.append(note("rows-left-out", text))
     return kept
 
 

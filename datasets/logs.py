@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from math import isfinite
 from pathlib import Path
@@ -24,7 +24,8 @@ from tauguard.datasets.columns import (
 )
 from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
 from tauguard.datasets.recognition import described, in_units_of, lacking, recognised
-from tauguard.findings import LogError
+from tauguard.findings import Finding, LogError, cause, note
+from tauguard.traces.logs import Log
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
@@ -32,36 +33,26 @@ from tauguard.untrusted_input import reading
 LOOKED_AT = 5000
 
 
-@dataclass(frozen=True)
-class Log:
-    """A log as a trace, with notes on repairs."""
-
-    trace: Trace
-    notes: tuple[str, ...]  #: one line for each repair, empty if there was none
-    touched: tuple[tuple[float, float], ...] | None = None
-    """First and last time [s] of each contact that a column labels; None: no such column"""
-    columns: ColumnMap | None = None  #: the map of a CSV file, as it was read
-
-
-def read_log(
+def read_file(
     path: str | Path,
     columns: ColumnMap | str | None = None,
     joint_names: Sequence[str] | None = None,
     mend: Collection[str] = (),
     robot_joints: Sequence[str] = (),
+    torque: bool = False,
 ) -> Log:
-    """Read a recording of a real arm.
+    """Read a recording of a real arm, without knowledge of its robot.
 
     Args:
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
-            system whose ``JointState`` messages hold the motor currents in ``effort``.
-            If ``effort`` holds joint torques, set ``meta["effort"]`` of the trace to "torque".
+            system whose ``JointState`` messages hold motor currents or torques in ``effort``.
         columns: for CSV: a map, the name of a preset (see ``PRESETS``), or "auto" to recognise
             columns by names and values. By default the header line must be that of a preset.
         joint_names: names of the joints in the order of the columns (default: the map's names, the
             messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
         mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
         robot_joints: names of the robot's joints; "auto" finds columns that are named after them.
+        torque: the currents or efforts of the file are joint torques [N m].
 
     Returns:
         The trace, without truth and with the log's own times, and notes on repairs. Only faults
@@ -74,17 +65,17 @@ def read_log(
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
-    with reading(path):
+    with reading(path, kind=LogError):
         if path.suffix == ".mcap":
             from tauguard.datasets.logs_mcap import read_joint_states
 
-            log, own = read_joint_states(path, joint_names), None
+            log, own = read_joint_states(path, joint_names, torque), None
         else:
             try:
                 own = chosen(columns, path, mend, robot_joints).mended(mend)
                 told = columns == "auto" and set(own.joint_names) <= set(robot_joints)
                 names = own.joint_names or joint_names if told else joint_names
-                log = read_csv(path, own, names, columns == "auto")
+                log = read_csv(path, own, names, columns == "auto", torque)
             except UnicodeDecodeError as error:
                 raise LogError("not a text file; expected CSV or MCAP") from error
             except csv.Error as error:
@@ -94,7 +85,8 @@ def read_log(
         preset = columns
     if preset is not None:
         log = replace(log, trace=replace(log.trace, meta={**log.trace.meta, "columns": preset}))
-    return log
+        log = replace(log, as_read=f"preset {preset}" + (f": {log.as_read}" if log.as_read else ""))
+    return replace(log, name=path.name, path=path)
 
 
 def chosen(
@@ -108,8 +100,6 @@ def chosen(
         return columns
     form: dict[str, Any] = _form(path)
     if columns is not None and columns != "auto":
-        if columns not in PRESETS:
-            raise LogError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
         return replace(PRESETS[columns], **form)
     header, table = _beginning(path, **form)
     if not header:
@@ -126,15 +116,14 @@ def chosen(
         return found
     known = f"give a column map, or a preset: {', '.join(PRESETS)}"
     if found is None and not header_of(header):
-        raise LogError(
-            f"no names of columns in the first line: {known}; a map may count columns from 0"
-        )
+        text = f"no names of columns in the first line: {known}; a map may count columns from 0"
+        raise LogError(cause("columns", text))
     if found is None:
         lead = "" if columns == "auto" else "no column map; "
-        raise LogError(f"{lead}among the columns, {lacking(header, joints)}; {known}")
-    raise LogError(
-        f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
-    )
+        text = f"{lead}among the columns, {lacking(header, joints)}; {known}"
+        raise LogError(cause("columns", text))
+    text = f'it looks like {described(found)}: accept with `columns="auto"`; or {known}'
+    raise LogError(cause("columns", f"no column map; {text}"))
 
 
 def _form(path: Path) -> dict[str, Any]:
@@ -167,9 +156,13 @@ def _beginning(path: Path, separator: str, decimal: str) -> tuple[list[str], Arr
 
 
 def read_csv(
-    path: Path, columns: ColumnMap, joint_names: Sequence[str] | None, auto: bool = False
+    path: Path,
+    columns: ColumnMap,
+    joint_names: Sequence[str] | None,
+    auto: bool = False,
+    torque: bool = False,
 ) -> Log:
-    """A CSV file as a trace, see :func:`read_log`; with ``auto``, a note describes the columns."""
+    """A CSV file as a trace, see :func:`read_file`; with ``auto``, a note describes the columns."""
     rows = list(_rows(path, columns.separator, columns.decimal))
     if not rows:
         raise LogError("empty file")
@@ -190,7 +183,8 @@ def read_csv(
     if "order" in columns.repair and (np.diff(t) < 0).any():
         refuse_set_back(t, lines)
         order = np.argsort(t, kind="stable")
-        notes.append(f"rows sorted by time; {int((np.diff(t) < 0).sum())} were out of order")
+        count = int((np.diff(t) < 0).sum())
+        notes.append(note("rows-sorted", f"rows sorted by time; {count} were out of order"))
         t, lines = t[order], lines[order]
         parts = {name: value[order] for name, value in parts.items()}
     keep = increasing(t, lines, columns, notes)
@@ -199,19 +193,21 @@ def read_csv(
     kept_parts = {name: np.ascontiguousarray(value[keep]) for name, value in parts.items()}
     signals: dict[str, Any] = _in_si_units(kept_parts, columns)
     meta = {"log": path.name}
+    as_read = ""
     if auto and columns not in PRESETS.values():
-        notes.insert(0, f"read as {described(columns)}")
-    if columns.torque:
+        as_read = described(columns)
+        notes.insert(0, note("columns", f"read as {as_read}"))
+    if columns.torque or torque:
         meta["effort"] = "torque"
     if "qd" not in signals:
         signals["qd"], meta["velocities"] = differentiated(t[keep], signals["q"]), "differentiated"
-        notes.append(DIFFERENTIATED)
+        notes.append(note("no-velocities", DIFFERENTIATED))
     names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
-    touched = labelled(header, rows, kept, trace.t)
-    notes += checked(trace, lambda row: f"line {kept[row]}")
-    return Log(trace, tuple(notes), touched, columns)
+    labels = labelled(header, rows, kept, trace.t)
+    findings = checked(trace, lambda row: f"line {kept[row]}", notes)
+    return Log(trace, labels=labels, as_read=as_read, columns=columns, findings=findings)
 
 
 def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:
@@ -223,11 +219,12 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     header = header_of(first)
     if header and columns.headerless:
         fitting = presets_of(header)
-        raise LogError(
+        text = (
             f"the first line names columns ({listed(header, 60)}), but files of this column map "
             "have no header line: "
             + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
         )
+        raise LogError(cause("columns", text))
     try:
         return header, {
             name: [position(column, header, columns) for column in group]
@@ -236,7 +233,7 @@ def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[
     except ValueError as error:
         better = presets_of(header) if header else presets_of_width(len(first))
         hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
-        raise LogError(f"{error}{hint}") from None
+        raise LogError(cause("columns", f"{error}{hint}")) from None
 
 
 def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array]:
@@ -325,22 +322,24 @@ def parse(
     width: int,
     columns: ColumnMap,
     header: Sequence[str] = (),
-) -> tuple[Array, NDArray[np.int64], list[str]]:
+) -> tuple[Array, NDArray[np.int64], list[Finding]]:
     """The wanted columns of all rows that are kept, shape (R, columns), line numbers, and notes."""
     if max(wanted) >= width:
         raise LogError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
     values: list[list[float]] = []
     lines: list[int] = []
     dropped: list[int] = []
-    notes: list[str] = []
+    notes: list[Finding] = []
     for index, (line, row) in enumerate(rows):
         if len(row) != width:
             if index == len(rows) - 1 and len(row) < width and "tail" in columns.repair:
-                notes.append(f"line {line}: cut off ({len(row)} of {width} columns), left out")
+                text = f"line {line}: cut off ({len(row)} of {width} columns), left out"
+                notes.append(note("rows-left-out", text))
                 continue
             cut = len(row) < width and index == len(rows) - 1
-            more = "; to leave the last row out, say --mend tail" if cut else ""
-            raise LogError(f"line {line}: {len(row)} columns, expected {width}{more}")
+            more = '; to leave the last row out, say `mend="tail"`' if cut else ""
+            text = f"line {line}: {len(row)} columns, expected {width}{more}"
+            raise LogError(cause("rows", text))
         try:
             cells = [float(row[i]) for i in wanted]
             if all(map(isfinite, cells)):
@@ -352,9 +351,8 @@ def parse(
         _lacking(row, wanted, line, columns, header)
         dropped.append(line)
     if dropped:
-        notes.append(
-            f"{len(dropped)} rows without finite numbers left out, first: line {dropped[0]}"
-        )
+        text = f"{len(dropped)} rows without finite numbers left out, first: line {dropped[0]}"
+        notes.append(note("rows-left-out", text))
     table = np.array(values, np.float64).reshape(len(values), len(wanted))
     return table, np.array(lines, np.int64), notes
 
@@ -369,9 +367,10 @@ def _lacking(
             continue
         said = f"{row[i]!r} is not a number" if value is None else f"{cell}, not finite"
         if cell and value is None:
-            raise LogError(f"line {line}, {column_text(i, header)}: {said}")
+            raise LogError(cause("rows", f"line {line}, {column_text(i, header)}: {said}"))
         if "nan" not in columns.repair:
-            raise LogError(
+            text = (
                 f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
-                "--mend nan (where they last longer than 0.05 s, cut the log in two instead)"
+                '`mend="nan"` (where they last longer than 0.05 s, cut the log in two instead)'
             )
+            raise LogError(cause("rows", text))

@@ -4,47 +4,52 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from mcap.exceptions import McapError
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.findings import LogError
+from tauguard.datasets.log_checks import checked
+from tauguard.findings import LogError, note
+from tauguard.traces.logs import Log
 from tauguard.traces.mcap import decode
 from tauguard.traces.mcap_container import Contents
 from tauguard.traces.trace import Trace
 
-if TYPE_CHECKING:
-    from tauguard.datasets.logs import Log
-
 TYPE = "sensor_msgs/msg/JointState"
 
 
-def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
-    """A trace from the first topic of type JointState; its ``effort`` is taken as current.
+def read_joint_states(path: Path, joint_names: Sequence[str] | None, torque: bool = False) -> Log:
+    """A trace from the first topic of type JointState.
+
+    Its ``effort`` is taken as current [A], with ``torque`` as joint torque [N m].
 
     Raises:
         LogError: no such topic, messages without velocity or effort, or a message that lacks a
             joint of the first one.
     """
-    from tauguard.datasets.log_checks import checked
-    from tauguard.datasets.logs import Log
-
     try:
         contents = Contents(path.read_bytes())
         contents.check_sum()
     except (McapError, struct.error) as error:
         raise LogError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
     if "tauguard.trace" in contents.metadata:
-        own = decode(contents)
-        return Log(own, checked(own, lambda row: f"sample {row}"))
+        trace = _of_effort(decode(contents), torque)
+        return Log(trace, findings=checked(trace, lambda row: f"sample {row}"))
     topic, messages = _messages(contents)
-    trace = assemble(topic, messages, joint_names)
-    notes = checked(trace, lambda row: f"{topic}, message {row}")
-    return Log(trace, (f"{topic}: effort is taken as current [A]", *notes))
+    trace = _of_effort(assemble(topic, messages, joint_names), torque)
+    meaning = "joint torque [N m]" if torque else "taken as current [A]"
+    notes = [note("effort", f"{topic}: effort is {meaning}")]
+    findings = checked(trace, lambda row: f"{topic}, message {row}", notes)
+    return Log(trace, as_read=f"{topic}, effort {meaning}", findings=findings)
+
+
+def _of_effort(trace: Trace, torque: bool) -> Trace:
+    return replace(trace, meta={**trace.meta, "effort": "torque"}) if torque else trace
 
 
 def _messages(contents: Contents) -> tuple[str, list[tuple[int, bytes]]]:

@@ -19,65 +19,16 @@ from tauguard.detectors.calibration.assessment import (
     start_gains,
     unexplained_notes,
 )
+from tauguard.detectors.calibration.joints import is_torque
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.dynamics.robot import holding
 from tauguard.findings import ArgumentError
-from tauguard.models import pin_model
 from tauguard.traces import Trace
 from tauguard.untrusted_input import read_text
 
 #: Two files describe the same arm if each joint's position [m], and each entry of its rotation
 #: matrix, differ by at most this.
 SAME_PLACE = 1e-3
-
-
-def robot_numbers(robot: Path) -> RobotNumbers:
-    """The numbers of a robot file (URDF or MJCF).
-
-    Raises:
-        ArgumentError: the file cannot be read; the message names it.
-    """
-    try:
-        return RobotNumbers.from_pin(pin_model(robot))
-    except ValueError as error:
-        name = "" if str(robot) in str(error) else f"{robot}: "
-        raise ArgumentError(f"{name}{error}") from None
-
-
-def of_log(
-    numbers: RobotNumbers, given: tuple[str, ...], robot: Path
-) -> tuple[RobotNumbers, tuple[str, ...]]:
-    """The numbers for the joints of a log, and a note on joints that it lacks (held at 0).
-
-    Args:
-        numbers: those of the file ``robot``.
-        given: joints of the log, in any order, or ``joint_1``, ...
-        robot: the robot file, which the note names.
-
-    Raises:
-        ArgumentError: joints that the robot does not have.
-    """
-    names = numbers.joint_names
-    if len(given) >= len(names):
-        return numbers, ()
-    kept = names[: len(given)] if given == unnamed(len(given)) else given
-    if not set(kept) <= set(names):
-        raise ArgumentError(
-            f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}"
-        )
-    lacking = [name for name in names if name not in kept]
-    note = f"the log lacks {', '.join(lacking)} of {robot.name}: held fixed at 0"
-    return holding(numbers, lacking), (note,)
-
-
-def unnamed(count: int) -> tuple[str, ...]:
-    """Names for joints that have none: ``joint_1``, ..."""
-    return tuple(f"joint_{i}" for i in range(1, count + 1))
-
-
-def is_torque(trace: Trace) -> bool:
-    """Whether a log holds joint torques instead of currents."""
-    return trace.meta.get("effort") == "torque"
 
 
 # -- consistency of robot file, model and logs -----------------------------------------------------

@@ -14,7 +14,7 @@ PRIVATE = {"zoo", "wary", "doubt", "promise", "promised", "levelled", "levelling
 SEVERAL = {"watch", "watched", "watcher", "watching"}
 ROOMS = ("studies", "cloth", "contacts", "datasets", "detectors", "envs", "rigid", "traces")
 #: Where the one recording stands.
-RECORDING = "detectors/calibration/recording.py"
+RECORDING = "traces/logs.py"
 
 
 def glossary() -> set[str]:

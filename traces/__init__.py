@@ -6,6 +6,7 @@ from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
     from tauguard.traces.contacts import CheckedContacts
+    from tauguard.traces.logs import Load, Log, Logs, Recording
     from tauguard.traces.mcap import read_mcap, write_mcap
     from tauguard.traces.resample import resampled
     from tauguard.traces.trace import (
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "KINDS", "STRATA", "TARGETS", "Alarm", "CheckedContacts", "Collision", "Detection", "Trace",
-    "Truth", "read_mcap", "resampled", "stratum", "write_mcap",
+    "KINDS", "STRATA", "TARGETS", "Alarm", "CheckedContacts", "Collision", "Detection", "Load",
+    "Log", "Logs", "Recording", "Trace", "Truth", "read_mcap", "resampled", "stratum", "write_mcap",
 ]  # fmt: skip
 
 __getattr__ = on_demand(__name__)

@@ -2,42 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauguard.arrays import Array, Bools
+from tauguard.arrays import Array
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.findings import ArgumentError
-from tauguard.traces.trace import Trace
+from tauguard.findings import ArgumentError, Findings, note
+from tauguard.traces import motion
+from tauguard.traces.logs import Load as Load
+from tauguard.traces.logs import Recording as Recording
+from tauguard.traces.logs import cut as cut
+from tauguard.traces.motion import MOVING as MOVING
+from tauguard.traces.motion import moves as moves
+from tauguard.traces.motion import moving_span as moving_span
 
-#: A joint moves in a log if its speed is above this in some sample [rad/s].
-MOVING = 0.01
-#: A joint whose position varies by less does not move: the cause is noise or a touch [rad].
-SHIFTED = 0.01
 #: Least length of the parts into which a log is cut [s].
 SHORTEST = 8.0
 #: Least motion for an identification, and least length of logs of an arm that only stands [s].
 LEAST, LEAST_STANDING = 10.0, 2.0
-
-
-@dataclass(frozen=True)
-class Load:
-    """Mass and centre of mass of the load that the arm carried; the centre may be unknown."""
-
-    mass: float = 0.0  #: [kg]
-    centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]. None: unknown; it is identified with the arm's parameters."""
-
-    def __post_init__(self) -> None:
-        """``ArgumentError`` for a mass below 0 or numbers that are not finite."""
-        if not (np.isfinite(self.mass) and self.mass >= 0):
-            raise ArgumentError(f"load: {self.mass} kg, expected 0 or more")
-        if self.centre is not None and not (
-            len(self.centre) == 3 and np.isfinite(self.centre).all()
-        ):
-            raise ArgumentError(f"load: centre {self.centre}, expected three finite numbers [m]")
 
 
 @dataclass(frozen=True)
@@ -52,49 +36,20 @@ class LoadDeviation:
 UNKNOWN_LOAD = LoadDeviation(3.0, 0.3)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """A collision-free log and the load that the arm carried."""
+def moving(logs: Mapping[str, Recording]) -> tuple[dict[str, Recording], Findings]:
+    """The logs in which some joint moves, and a note on each log without motion.
 
-    trace: Trace
-    load: Load | None = Load()  #: None: an unknown load
-
-
-def moves(trace: Trace) -> bool:
-    """Whether a joint exceeds :data:`MOVING` and its position varies by :data:`SHIFTED`."""
-    quick = (np.abs(trace.qd) > MOVING).any(axis=0)
-    return bool((quick & (np.ptp(trace.q, axis=0) > SHIFTED)).any())
-
-
-def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
-    """Rows from the first to the last motion of any joint, shape (T,).
-
-    Before and after, static friction takes up an unknown fraction of the torque.
-
-    Args:
-        trace: the log.
-        margin: time at the beginning of the log that is always left out [s].
-
-    Raises:
-        ArgumentError: no joint moves, or only within ``margin``.
+    If no joint moves in any log, all logs are returned; calibration then raises an error.
     """
-    moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
-    if not len(moves):
-        raise ArgumentError(f"no joint moves faster than {MOVING} rad/s")
-    rows = np.zeros(len(trace.t), dtype=np.bool_)
-    rows[moves[0] : moves[-1] + 1] = True
-    rows &= trace.t >= trace.t[0] + margin
-    if not rows.any():
-        raise ArgumentError(
-            f"no motion is left without the first {margin:g} s of the log: give a longer log"
-        )
-    return rows
+    still = [name for name, log in logs.items() if not moves(log.trace)]
+    text = "no joint moves in it; calibration leaves it out"
+    notes = Findings(note("still-log", f"{name}: {text}", name) for name in still)
+    return {n: log for n, log in logs.items() if n not in still} or dict(logs), notes
 
 
 def motion_length(recordings: Sequence[Recording]) -> float:
     """Sum over the recordings of the time from the first motion to the last one [s]."""
-    moving = [r.trace for r in recordings if moves(r.trace)]
-    return sum(float(moving_span(trace, 0.0).sum()) * trace.dt for trace in moving)
+    return motion.motion_length([recording.trace for recording in recordings])
 
 
 def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
@@ -162,9 +117,3 @@ def pieces(
         halves = [cut(trace, slice(None, middle)), cut(trace, slice(middle, None))]
         parts[k : k + 1] = [Recording(half, parts[k].load) for half in halves]
     return parts
-
-
-def cut(trace: Trace, rows: slice) -> Trace:
-    """The given rows of a log, without its truth."""
-    q, qd, current = trace.q[rows], trace.qd[rows], trace.current[rows]
-    return Trace(trace.joint_names, trace.t[rows], q, qd, current, meta=trace.meta)

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors.features.free_bound import SLOW
+from tauguard.detectors.calibration.recording import Recording
+from tauguard.detectors.features.free_bound import SHOWN_SECONDS, SLOW, motion_seconds
+from tauguard.findings import Findings, note
 from tauguard.traces.trace import Trace
 
 #: Least total time of a regime in the logs [s]; below it the regime counts as unseen.
@@ -49,6 +51,25 @@ def unseen(traces: Sequence[Trace]) -> Unseen:
         for name, seconds in shown.items()
     )
     return tuple((name, joints) for name, joints in lacking if joints)
+
+
+def unseen_motion(traces: Sequence[Trace]) -> Findings:
+    """Notes on joints that hardly move in any log, and on regimes that no log shows."""
+    seconds = motion_seconds([Recording(trace) for trace in traces])
+    names = traces[0].joint_names
+    still = [name for name, s in zip(names, seconds, strict=True) if s < SHOWN_SECONDS]
+    notes = []
+    if still:
+        text = (
+            f"{', '.join(still)}: moves in none of the logs, so its friction is not known. No "
+            "collision is detected while it moves, and none of moving joints while it stands "
+            "elsewhere; its bound at rest is assumed; add a log in which it moves"
+        )
+        notes.append(note("still-joint", text, *still))
+    if lacking := unseen(traces):
+        text = f"the logs show less than {SEEN:g} s of {unseen_text(lacking, len(names))}"
+        notes.append(note("unseen-motion", text))
+    return Findings(notes)
 
 
 def exceeded(parts: Sequence[tuple[Array, Array]]) -> Array:

@@ -20,10 +20,12 @@ from typing import TYPE_CHECKING, Any
 from tauguard.environments import register_environments
 
 if TYPE_CHECKING:
+    from tauguard.datasets.arm_logs import read_log, read_logs, simulated
     from tauguard.detectors.calibration.nominal import residual
     from tauguard.replay.plot import plot
+    from tauguard.traces.logs import Load, Log, Logs
 
-__all__ = ["plot", "residual"]
+__all__ = ["Load", "Log", "Logs", "plot", "read_log", "read_logs", "residual", "simulated"]
 __version__ = version("tauguard")
 
 register_environments()
@@ -33,7 +35,12 @@ _PACKAGES = (
     "benchmark", "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases",
     "live", "models", "replay", "report", "rigid", "traces", "twin",
 )  # fmt: skip
-_FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.calibration.nominal"}
+_FUNCTIONS = {
+    **dict.fromkeys(("read_log", "read_logs", "simulated"), "tauguard.datasets.arm_logs"),
+    **dict.fromkeys(("Load", "Log", "Logs"), "tauguard.traces.logs"),
+    "plot": "tauguard.replay.plot",
+    "residual": "tauguard.detectors.calibration.nominal",
+}
 
 
 def __getattr__(name: str) -> Any:

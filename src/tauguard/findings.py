@@ -73,10 +73,16 @@ def note(code: str, text: str, *where: str) -> Finding:
     return Finding(code, "note", text, where)
 
 
+def cause(code: str, text: str, *where: str, accept: str = "") -> Finding:
+    """A finding that stops the call, unless the caller accepts its word ``accept``."""
+    return Finding(code, "error", text, where, accept)
+
+
 class TauguardError(ValueError):
     """Base of the errors that a caller can mend."""
 
     code: ClassVar[str] = "error"  #: of a finding that is given as text
+    shown: ClassVar[int] = 5  #: largest number of findings in the message
 
     def __init__(self, *findings: Finding | str) -> None:
         """Take what was found until the refusal.
@@ -90,7 +96,8 @@ class TauguardError(ValueError):
             for found in findings
         )
         causes = [str(finding) for finding in self.findings if finding.severity == "error"]
-        super().__init__("; ".join(causes))
+        more = len(causes) - self.shown
+        super().__init__("; ".join(causes[: self.shown]) + (f"; and {more} more" * (more > 0)))
 
     def __reduce__(self) -> tuple[type[TauguardError], tuple[Finding, ...]]:
         return type(self), tuple(self.findings)
@@ -168,7 +175,7 @@ def as_flags(text: str) -> str:
     """The text with each argument in backquotes written as a flag.
 
     ```mend="deg"``` becomes ``--mend deg``, ```torque=True``` becomes ``--torque``, and
-    ```payload={"a.csv": KG}``` becomes ``--payload a.csv=KG``.
+    ```payload={"a.csv": KG}``` becomes ``--payload a.csv=KG``; None becomes ``unknown``.
     """
     return _ARGUMENT.sub(_flag, text)
 
@@ -192,5 +199,7 @@ def _flag(argument: re.Match[str]) -> str:
 
 def _word(node: ast.expr | None) -> str:
     if isinstance(node, ast.Constant):
-        return str(node.value)
+        return "unknown" if node.value is None else str(node.value)
+    if isinstance(node, ast.Tuple | ast.List):
+        return ",".join(map(_word, node.elts))
     return "" if node is None else ast.unparse(node)

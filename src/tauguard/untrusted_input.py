@@ -1,26 +1,31 @@
 """Read untrusted files: every error in a file becomes a ``FileError`` of one line."""
 
 import contextlib
+import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tauguard.findings import FileError
+from tauguard.findings import FileError, Finding, TauguardError
 
 #: Largest size of a text file [bytes]: settings, column maps, robot descriptions.
 MOST_TEXT = 1 << 26
 
 
 @contextlib.contextmanager
-def reading(path: str | Path, expected: str = "") -> Iterator[None]:
+def reading(
+    path: str | Path, expected: str = "", kind: type[FileError] = FileError
+) -> Iterator[None]:
     """Turn every error that the content of ``path`` causes in this block into a ``FileError``.
 
-    The message is one line and begins with the path; ``expected`` describes a valid file.
+    The message is one line and begins with the path; ``expected`` describes a valid file, ``kind``
+    is the class of the error.
 
     Raises:
         FileError: the content cannot be read (the cause is chained), or ``path`` is a device such
-            as ``/dev/zero``, which may be endless.
+            as ``/dev/zero``, which may be endless. A ``TauguardError`` of the block keeps the codes
+            of its findings, and a subclass of ``FileError`` its class.
         OSError: as raised in the block.
     """
     check_no_device(path)
@@ -28,23 +33,36 @@ def reading(path: str | Path, expected: str = "") -> Iterator[None]:
         yield
     except OSError:
         raise
+    except TauguardError as error:
+        if str(error).startswith(str(path)):
+            raise
+        same = type(error) if isinstance(error, kind) else kind
+        raise same(*_in_file(error, path, expected)) from error
     except ValueError as error:
         said = str(error)
         if said.startswith(str(path)):
             raise
-        raise FileError(_line(path, said, expected)) from error
+        raise kind(_line(path, said, expected)) from error
     except (RecursionError, MemoryError) as error:
-        kind = "nested too deep" if isinstance(error, RecursionError) else "too large"
-        raise FileError(_line(path, kind, expected)) from error
+        said = "nested too deep" if isinstance(error, RecursionError) else "too large"
+        raise kind(_line(path, said, expected)) from error
     except Exception as error:
         said = f"damaged ({type(error).__name__}: {str(error)[:200]})"
-        raise FileError(_line(path, said, expected)) from error
+        raise kind(_line(path, said, expected)) from error
 
 
 def check_no_device(path: str | Path) -> None:
     """Raise ``FileError`` for a device such as ``/dev/zero``, which may be endless."""
     if Path(path).is_char_device():
         raise FileError(f"{path}: a device; expected a file")
+
+
+def _in_file(error: TauguardError, path: str | Path, expected: str) -> Iterator[Finding]:
+    """The findings of an error; the text of those that caused it begins with the path."""
+    for finding in error.findings:
+        stops = finding.severity == "error"
+        text = _line(path, finding.text, expected) if stops else finding.text
+        yield dataclasses.replace(finding, text=text)
 
 
 def _line(path: str | Path, said: str, expected: str) -> str:

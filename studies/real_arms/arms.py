@@ -132,8 +132,8 @@ def touched(arm: ArmData) -> dict[str, Touched]:
     for path in sorted((folder() / arm.contact).glob("*.csv")) if arm.contact else ():
         log = read_log(path, arm.columns or "ur5")
         table = np.genfromtxt(path, delimiter=",", names=True)
-        if log.touched:
-            found[path.stem] = _labelled(Recording(log.trace), log.touched, table)
+        if log.labels:
+            found[path.stem] = _labelled(Recording(log.trace), log.labels, table)
         elif known := _by_sensor(table) or by_eye(path.stem):
             found[path.stem] = Touched(Recording(log.trace), known)
     return found

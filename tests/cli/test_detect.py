@@ -9,8 +9,8 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.cli.detect import diagnosed
-from tauguard.datasets import real_arms
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.detectors.calibration import joints
 from tauguard.detectors.events import Alarm
 from tauguard.models import pin_model
 from tauguard.traces import Trace
@@ -80,7 +80,7 @@ def test_the_robot_file_is_read_once_and_a_linear_axis_in_degrees_is_refused(
     header = "t,q_j1,q_j2,qd_j1,qd_j2,current_j1,current_j2"
     np.savetxt(log / "log.csv", table, delimiter=",", fmt="%.9g", header=header, comments="")
     parsed = []
-    monkeypatch.setattr(real_arms, "pin_model", lambda file: parsed.append(file) or pin_model(file))
+    monkeypatch.setattr(joints, "pin_model", lambda file: parsed.append(file) or pin_model(file))
     run(log, "--columns", "auto", "--gains", "8", "5")
     assert "1 alarm in 8.0 s watched" in capsys.readouterr().out
     assert parsed == [log / "arm.xml"]

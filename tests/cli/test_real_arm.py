@@ -44,14 +44,13 @@ def test_calibrate_train_detect(folder, tmp_path, capsys):
 )
 def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike):
     """All columns of two wrist joints may be exchanged: these look alike, and are not named."""
-    from tauguard.datasets.arm_logs import moving, read_logs
+    from tauguard import read_logs
     from tauguard.datasets.real_arms import initial_arm
     from tauguard.detectors.calibration.checks import _misreadings, check_order
-    from tauguard.detectors.calibration.recording import Recording
+    from tauguard.detectors.calibration.recording import Recording, moving
 
-    read = read_logs((data_dir / name / "free",), columns, data_dir / name / f"{name}.urdf")
-    traces, _ = moving(read.traces)
-    own = {log: Recording(trace) for log, trace in traces.items()}
+    read = read_logs((data_dir / name / "free",), columns, robot=data_dir / name / f"{name}.urdf")
+    own, _ = moving(read)
     arm, _ = initial_arm(read.numbers, list(own.values()), (), "auto")
     check_order(arm, own)
     for a, b in ((0, 2), (3, 4), (4, 5)):
@@ -62,7 +61,7 @@ def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike)
                 log: Recording(
                     replace(trace, **{key: getattr(trace, key)[:, order].copy() for key in fields})
                 )
-                for log, trace in traces.items()
+                for log, trace in ((log, one.trace) for log, one in own.items())
             }
             if (a, b) in alike and "q" in fields:
                 traces_of = [one.trace for one in mixed.values()]

@@ -10,10 +10,14 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.cli.calibrate import report
-from tauguard.datasets import arm_logs, columns, real_arms
+from tauguard.cli.payload import loads
+from tauguard.datasets import columns, real_arms
+from tauguard.datasets.arm_logs import loads_of
 from tauguard.datasets.drives import DRIVES, preset_gains
 from tauguard.detectors.calibration.arm_file import load_arm
+from tauguard.detectors.calibration.joints import robot_numbers
 from tauguard.detectors.calibration.recording import Load, Recording, cut
+from tauguard.detectors.features.motion_regimes import unseen_motion
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 from tests.oracles.added_contact import Added, add_contact
 
@@ -219,8 +223,8 @@ def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     own = {line[0]: line.split() for line in out.splitlines() if line[:3] in ("b  ", "c  ")}
     assert own["c"][-3:] == ["-", "-", "-"]
     assert "-" not in own["b"]
-    (note,) = arm_logs.not_shown([held_joint(0), record(0)])
-    assert note.startswith("the logs show less than 3 s of standing for 2 s: a, b;")
+    (note,) = unseen_motion([held_joint(0), record(0)])
+    assert note.text.startswith("the logs show less than 3 s of standing for 2 s: a, b;")
 
 
 def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
@@ -271,21 +275,22 @@ def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, ca
 
 
 def test_payloads_by_file_name_or_stem():
-    traces = {"a.csv": record(0, 12.0), "b.x.csv": record(1, 12.0), "b.x.mcap": record(2, 12.0)}
-    found = arm_logs.with_loads(traces, ("a=2.6", "b.x.mcap=unknown"))
-    assert [r.load for r in found] == [Load(2.6), Load(), None]
+    logs = ["a.csv", "b.x.csv", "b.x.mcap"]
+    found = loads_of(loads(("a=2.6", "b.x.mcap=unknown")), logs)
+    assert list(found.values()) == [Load(2.6), Load(), None]
+    assert loads_of({"a": (2.6, (0.0, 0.1, 0.2))}, logs)["a.csv"] == Load(2.6, (0.0, 0.1, 0.2))
     for text, said in (
         ("b.x=1", "two are called 'b.x'"),
         ("c=1", "no log 'c'"),
         ("a=1,2", "LOG=KG"),
     ):
         with pytest.raises(ValueError, match=said):
-            arm_logs.with_loads(traces, (text,))
+            loads_of(loads((text,)), logs)
 
 
 def test_a_load_in_grams_is_refused():
     with pytest.raises(ValueError, match="at most 100; loads are given in kg"):
-        arm_logs.with_loads({"a.csv": record(0, 12.0)}, ("a=2600",))
+        loads_of(loads(("a=2600",)), ["a.csv"])
 
 
 def test_an_untold_load_names_its_log(folder, capsys):
@@ -345,8 +350,8 @@ def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
 
 
 def test_where_the_scale_comes_from_is_said(folder):
-    numbers = real_arms.robot_numbers(folder / "arm.xml")
-    recordings = arm_logs.with_loads({"a": record(0, 12.0)}, ())
+    numbers = robot_numbers(folder / "arm.xml")
+    recordings = [Recording(record(0, 12.0))]
     assert real_arms.initial_arm(numbers, recordings, tuple(GAIN), "auto")[1] == "gains"
     assert real_arms.initial_arm(numbers, recordings, (), "auto")[1] == "masses"
     (one,) = recordings

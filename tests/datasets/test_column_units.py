@@ -5,9 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from tauguard.datasets.arm_logs import read_logs
-from tauguard.datasets.columns import ColumnMap, Reading
-from tauguard.datasets.logs import read_log
+from tauguard import read_log, read_logs
+from tauguard.datasets.columns import ColumnMap
 from tauguard.datasets.recognition import described, recognised
 from tests.datasets.test_recognition import motion, written
 
@@ -224,12 +223,12 @@ def test_one_joint_beyond_two_turns_does_not_make_degrees(tmp_path):
     path = turned(tmp_path / "fast.csv", speed=3.0)
     assert read_log(path, "auto").trace.q[-1, 2] == pytest.approx(16.0, rel=0.01)
     path = turned(tmp_path / "deg.csv", speed=3.0, motion_of_others=10.0, turns=40.0)
-    assert "[deg]" in read_log(path, "auto").notes[0]
+    assert "[deg]" in read_log(path, "auto").findings[0].text
     path = turned(tmp_path / "slow.csv", speed=0.5)
-    with pytest.raises(ValueError, match=r"q2 is beyond two turns .*--mend deg or --mend rad"):
+    with pytest.raises(ValueError, match=r"q2 is beyond two turns .*`mend=.deg.` or `mend=.rad"):
         read_log(path, "auto")
-    assert "[rad]" in read_log(path, "auto", mend=("rad",)).notes[0]
-    assert "[deg]" in read_log(path, "auto", mend=("deg",)).notes[0]
+    assert "[rad]" in read_log(path, "auto", mend=("rad",)).findings[0].text
+    assert "[deg]" in read_log(path, "auto", mend=("deg",)).findings[0].text
 
 
 def three_joints(path):
@@ -243,18 +242,20 @@ def test_logs_of_one_command_have_one_unit_of_angles(tmp_path):
     arm = three_joints(tmp_path / "arm.xml")
     turned(tmp_path / "slow.csv", speed=0.5)
     usual = turned(tmp_path / "usual.csv", speed=3.0, turns=3.0)
-    read = read_logs([tmp_path], "auto", arm).traces
-    assert read["slow.csv"].q[-1, 2] == pytest.approx(16.0, rel=0.01)
+    read = read_logs([tmp_path], "auto", robot=arm)
+    assert read["slow.csv"].trace.q[-1, 2] == pytest.approx(16.0, rel=0.01)
     turned(tmp_path / "degrees.csv", speed=1.0, scale=57.3, turns=3.0)
-    said = r"usual.csv: its positions are like those of degrees.csv if they are radians, .*--mend"
+    said = r"usual.csv: its positions are like those of degrees.csv if they are radians, .*`mend="
     with pytest.raises(ValueError, match=said):
-        read_logs([tmp_path], "auto", arm)
-    read = read_logs([tmp_path], "auto", arm, reading=Reading(mend=("deg",))).traces
-    assert np.abs(read["usual.csv"].q[:, 0]).max() == pytest.approx(np.pi / 180, rel=0.01)
+        read_logs([tmp_path], "auto", robot=arm)
+    read = read_logs([tmp_path], "auto", robot=arm, mend="deg")
+    assert np.abs(read["usual.csv"].trace.q[:, 0]).max() == pytest.approx(np.pi / 180, rel=0.01)
     turned(usual, speed=3.0, turns=0.3, motion_of_others=0.1)  # small motions: the others decide
-    read = read_logs([tmp_path], "auto", arm).traces
-    assert np.abs(read["usual.csv"].q[:, 0]).max() == pytest.approx(0.1 * np.pi / 180, rel=0.01)
-    assert read["slow.csv"].q[-1, 2] == pytest.approx(16.0 * np.pi / 180, rel=0.01)
+    read = read_logs([tmp_path], "auto", robot=arm)
+    assert np.abs(read["usual.csv"].trace.q[:, 0]).max() == pytest.approx(
+        0.1 * np.pi / 180, rel=0.01
+    )
+    assert read["slow.csv"].trace.q[-1, 2] == pytest.approx(16.0 * np.pi / 180, rel=0.01)
 
 
 def test_a_standing_log_in_radians_is_not_read_in_degrees(tmp_path):
@@ -267,10 +268,10 @@ def test_a_standing_log_in_radians_is_not_read_in_degrees(tmp_path):
     written(tmp_path / "a.csv", names, t, np.rad2deg(q), np.rad2deg(np.gradient(q, t, axis=0)), q)
     written(tmp_path / "b.csv", names, t, place + 0 * q, 0 * q, q)
     with pytest.raises(ValueError, match=r"b.csv: its positions are like those of a.csv"):
-        read_logs([tmp_path], "auto", arm)
+        read_logs([tmp_path], "auto", robot=arm)
     written(tmp_path / "b.csv", names, t, np.rad2deg([0.1, -0.1, 0.2]) + noise, 0 * q, q)
-    read = read_logs([tmp_path], "auto", arm).traces
-    assert read["b.csv"].q[0] == pytest.approx([0.1, -0.1, 0.2], abs=0.01)
+    read = read_logs([tmp_path], "auto", robot=arm)
+    assert read["b.csv"].trace.q[0] == pytest.approx([0.1, -0.1, 0.2], abs=0.01)
 
 
 @pytest.mark.data
@@ -279,20 +280,22 @@ def test_all_logs_of_a_ur3_are_in_radians(data_dir):
     if not files:
         pytest.skip("no ur3 folder in the real data")
     for path in files:
-        assert "[rad]" in next(n for n in read_log(path, "auto").notes if "read as" in n), path
+        assert "[rad]" in next(
+            n.text for n in read_log(path, "auto").findings if "read as" in n.text
+        ), path
 
 
 def test_a_note_on_several_logs_is_given_once(tmp_path):
     arm = three_joints(tmp_path / "arm.xml")
     for name in ("a", "b"):
         turned(tmp_path / f"{name}.csv", speed=3.0, turns=3.0)
-    notes = read_logs([tmp_path], "auto", arm).notes
-    (note,) = [note for note in notes if "read as" in note]
-    assert note.startswith("each log: read as time t [s]")
+    (note,) = read_logs([tmp_path], "auto", robot=arm).findings.of("columns")
+    assert note.where == ("a.csv", "b.csv")
+    assert note.text.startswith("each log: read as time t [s]")
     path = turned(tmp_path / "d.csv", speed=3.0, turns=3.0)
     path.write_text(path.read_text() + "4.0,1")
-    tail = [note for note in read_logs([tmp_path], "auto", arm).notes if "cut off" in note]
-    assert tail == ["d.csv: line 402: cut off (2 of 10 columns), left out"]
+    (tail,) = read_logs([tmp_path], "auto", robot=arm).findings.of("rows-left-out")
+    assert tail.text == "d.csv: line 402: cut off (2 of 10 columns), left out"
 
 
 def test_degrees_are_those_of_revolute_joints(tmp_path):
@@ -312,9 +315,13 @@ def test_degrees_are_those_of_revolute_joints(tmp_path):
     np.testing.assert_allclose(trace.q, table[:, :3] * [1.0, np.pi / 180, np.pi / 180])
     np.testing.assert_allclose(trace.qd[:, 0], table[:, 3])
     with pytest.raises(ValueError, match=r"a.csv: j0 is a linear axis, .* \"degrees\" is a list"):
-        read_logs([log], "auto", arm)
+        read_logs([log], "auto", robot=arm)
     turned(log, speed=3.0, turns=3.0)
-    assert read_logs([log], "auto", arm).notes[-1].startswith("j0: linear, so its numbers are in m")
+    assert (
+        read_logs([log], "auto", robot=arm)
+        .findings[-1]
+        .text.startswith("j0: linear, so its numbers are in m")
+    )
     for wrong in ((False, True), (0, 1, 1)):
         with pytest.raises(ValueError, match=r"columns.degrees: .*(one value or 3|expected true)"):
             ColumnMap("t", **signals, torque=torque, degrees=wrong)

@@ -41,7 +41,7 @@ def test_late_samples_are_told_and_gaps_refused():
     trace = log()
     late = dataclasses.replace(trace, t=trace.t + np.where(np.arange(600) >= 200, 0.02, 0.0))
     (note,) = checked(late, line)
-    assert "1 later than twice that, by up to 30 ms; first: line 201" in note
+    assert "1 later than twice that, by up to 30 ms; first: line 201" in note.text
     gone = dataclasses.replace(trace, t=trace.t + np.where(np.arange(600) >= 200, 0.5, 0.0))
     cut = r"line 201: .* 0\.51 s .* cut the log there; the rows up to line 200 and those from"
     with pytest.raises(ValueError, match=cut):
@@ -59,7 +59,7 @@ SWAPPED = dataclasses.replace(log(), q=log().q[:, [1, 0, 2]])
 @pytest.mark.parametrize(
     ("trace", "message"),
     [
-        (changed(q=57.3, qd=57.3), r"line \d+: the velocity of . is .* say --mend deg"),
+        (changed(q=57.3, qd=57.3), r"line \d+: the velocity of . is .* say `mend=.deg"),
         (changed(q=57.3), r"line \d+: the position of . is .*degrees"),
         (changed(qd=8.0), "units of velocity, position and time do not fit"),
         (changed(t=1000.0), "time in ms"),
@@ -86,7 +86,7 @@ def test_a_saturated_current_is_told_with_its_row():
     clipped = dataclasses.replace(trace, current=current)
     assert saturated(clipped) == [("b", 300, 12, 25.0)]
     (note,) = checked(clipped, line)
-    assert "line 301: the current of b stays at 25 A for 12 samples" in note
+    assert "line 301: the current of b stays at 25 A for 12 samples" in note.text
     assert saturated(trace) == []
 
 
@@ -112,7 +112,7 @@ def test_recordings_of_our_own_pass_the_same_checks(tmp_path):
     with pytest.raises(ValueError, match=r"sample 300: the velocity of b is 1e\+160"):
         read_log(path)
     write_mcap(path, trace)
-    assert read_log(path).notes == ()
+    assert read_log(path).findings == ()
 
 
 def test_a_gap_in_a_labelled_recording_is_no_watched_time(tmp_path):

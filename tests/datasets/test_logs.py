@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from mcap.writer import Writer as PlainWriter
 from mcap_ros2.writer import Writer
 
+from tauguard import read_logs
 from tauguard.datasets import PRESETS, ColumnMap, read_log
-from tauguard.datasets.arm_logs import read_logs
 from tauguard.traces import Trace, write_mcap
 from tauguard.traces.mcap_container import walk
 from tauguard.traces.trace import UR_JOINTS
@@ -43,7 +43,7 @@ def write(tmp_path, text, name="log.csv"):
 
 def test_numbers_by_name(tmp_path):
     log = read_log(write(tmp_path, TEXT), TWO)
-    assert log.notes == ()
+    assert log.findings == ()
     assert log.trace.joint_names == ("joint_1", "joint_2")
     np.testing.assert_array_equal(log.trace.t, [0, 0.1, 0.3])
     np.testing.assert_array_equal(log.trace.q, [[1, 2], [7, 8], [1, 1]])
@@ -64,7 +64,7 @@ def test_numbers_by_name(tmp_path):
 )
 def test_a_column_of_labels_says_when_something_touched(tmp_path, name, cells, touched):
     lines = [f"{line},{cell}" for line, cell in zip(TEXT.split(), [name, *cells], strict=True)]
-    assert read_log(write(tmp_path, "\n".join(lines)), TWO).touched == touched
+    assert read_log(write(tmp_path, "\n".join(lines)), TWO).labels == touched
 
 
 def test_labelled_contacts_are_no_free_motion(tmp_path):
@@ -76,7 +76,7 @@ def test_labelled_contacts_are_no_free_motion(tmp_path):
     columns.write_text(json.dumps(dataclasses.asdict(TWO) | {"repair": []}))
     (tmp_path / "arm.xml").write_text(XML)
     with pytest.raises(ValueError, match=r"log.csv: a column labels 1 contact \(0.1 to 0.3 s"):
-        read_logs([tmp_path / "log.csv"], str(columns), tmp_path / "arm.xml")
+        read_logs([tmp_path / "log.csv"], str(columns), robot=tmp_path / "arm.xml")
 
 
 def test_indices_units_and_names(tmp_path):
@@ -128,10 +128,10 @@ def test_repairs_only_where_the_map_says_so_and_tells(tmp_path):
     columns = dataclasses.replace(TWO, repair=frozenset({"repeat", "tail", "nan"}))
     log = read_log(write(tmp_path, text), columns)
     np.testing.assert_array_equal(log.trace.t, [0, 0.1, 0.5])
-    assert len(log.notes) == 3
-    assert any("line 7: cut off (3 of 7 columns)" in note for note in log.notes)
-    assert any("first: line 4" in note for note in log.notes)
-    assert any("first: line 5" in note for note in log.notes)
+    assert len(log.findings) == 3
+    assert any("line 7: cut off (3 of 7 columns)" in note.text for note in log.findings)
+    assert any("first: line 4" in note.text for note in log.findings)
+    assert any("first: line 5" in note.text for note in log.findings)
     back = text.replace("0.5,", "0.05,")
     with pytest.raises(ValueError, match="goes back"):
         read_log(write(tmp_path, back), columns)
@@ -208,7 +208,7 @@ def test_a_bag_of_joint_states(tmp_path):
     np.testing.assert_allclose(log.trace.t, 1 + 0.008 * np.arange(5), rtol=1e-15)
     np.testing.assert_array_equal(log.trace.q[2], [2.5, 2.25])
     np.testing.assert_array_equal(log.trace.current[3], [5.5, 5.25])
-    assert "effort is taken as current" in log.notes[0]
+    assert "effort is taken as current" in log.findings[0].text
     assert read_log(tmp_path / "a.mcap").trace.joint_names == ("b", "a")
     assert "columns" not in log.trace.meta
     assert read_log(tmp_path / "a.mcap", "ur5").trace.meta["columns"] == "ur5"  # for its gains
@@ -297,6 +297,8 @@ def test_a_time_of_too_few_digits_is_named(tmp_path):
     rows = [f"{a:.6g},{0.03 * k:.2f},2,3,0,5,6\n" for k, a in enumerate(t)]
     path = write(tmp_path, "t,a,b,va,vb,ia,ib\n" + "".join(rows))
     columns = dataclasses.replace(TWO, repair=frozenset({"repeat"}))
-    with pytest.raises(ValueError, match=r"299 of 300 rows repeat .* too few digits; .* clock=HZ"):
+    with pytest.raises(
+        ValueError, match=r'299 of 300 rows repeat .* too few digits; .* `mend="clock=HZ"`'
+    ):
         read_log(path, columns)
     assert len(read_log(path, columns, mend=["clock=100"]).trace.t) == 300

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from tauguard import read_log
 from tauguard.datasets.arm_logs import reduced
 from tauguard.datasets.columns import PRESETS, ColumnMap
-from tauguard.datasets.logs import Log, read_csv, read_log
+from tauguard.datasets.logs import read_csv, read_file
 from tauguard.datasets.recognition import described, grouped, lacking, recognised
-from tauguard.traces import Trace
+from tauguard.traces import Log, Trace
 
 
 def motion(rows=400, dt=0.01, joints=2):
@@ -114,11 +115,11 @@ def test_a_preset_s_columns_in_other_units_are_told_by_their_numbers(tmp_path):
     parts = 1e3 * t, np.rad2deg(q), np.rad2deg(qd), 1e3 * i
     path = written(tmp_path / "log.csv", names, *parts)
     log = read_log(path, "auto")
-    assert log.notes[0].startswith("read as time t [ms], positions q1 to q6 [deg]")
+    assert log.findings[0].text.startswith("log.csv: read as time t [ms], positions q1 to q6 [deg]")
     assert log.trace.meta["columns"] == "ur5"
     np.testing.assert_allclose(log.trace.q, q, atol=1e-8)
     np.testing.assert_allclose(log.trace.current, i, atol=1e-8)
-    with pytest.raises(ValueError, match="say --mend ms"):
+    with pytest.raises(ValueError, match='say `mend="ms"`'):
         read_log(path, mend=("deg", "mA"))
 
 
@@ -142,7 +143,7 @@ def test_units_and_order_are_proposed_and_read_when_accepted(tmp_path, accepted)
     parts = (1e3 * t, np.rad2deg(q), np.rad2deg(qd), 1e3 * current)
     path = written(tmp_path / "log.csv", names, *(part[order] for part in parts))
     if not accepted:
-        with pytest.raises(ValueError, match="accept with --columns auto") as error:
+        with pytest.raises(ValueError, match='accept with `columns="auto"`') as error:
             read_log(path)
         assert "time stamp [ms], positions pos_1 to pos_2 [deg]" in str(error.value)
         assert "currents current_1 to current_2 [mA], rows sorted by time" in str(error.value)
@@ -152,8 +153,8 @@ def test_units_and_order_are_proposed_and_read_when_accepted(tmp_path, accepted)
     np.testing.assert_allclose(log.trace.q, q, atol=1e-8)
     np.testing.assert_allclose(log.trace.qd, qd, atol=1e-8)
     np.testing.assert_allclose(log.trace.current, current, atol=1e-8)
-    assert log.notes[0].startswith("read as time stamp [ms]")
-    assert "were out of order" in log.notes[1]
+    assert log.findings[0].text.startswith("log.csv: read as time stamp [ms]")
+    assert "were out of order" in log.findings[1].text
 
 
 def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp_path):
@@ -177,7 +178,7 @@ def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp
     assert np.diff(log.trace.t).max() <= 0.015 + 1e-9
     moving = log.trace.t < 1.5
     np.testing.assert_allclose(log.trace.t[moving], 0.01 * np.arange(moving.sum()), atol=1e-9)
-    assert "58 % of the rows repeat the previous state" in log.notes[0]
+    assert "58 % of the rows repeat the previous state" in log.findings[0].text
 
 
 def test_a_fast_log_of_an_arm_that_rarely_repeats_keeps_all_rows(tmp_path):
@@ -219,7 +220,9 @@ def test_real_logs_of_arms_with_torque_sensors_are_recognised(data_dir, file, pr
     log = read_log(data_dir / file)
     assert log.trace.meta["columns"] == preset
     assert log.trace.meta["effort"] == "torque"
-    assert any(f"{share} of the rows repeat the previous state" in note for note in log.notes)
+    assert any(
+        f"{share} of the rows repeat the previous state" in note.text for note in log.findings
+    )
     assert log.trace.dt == pytest.approx(0.01, rel=0.05)
 
 
@@ -282,13 +285,13 @@ def test_what_is_wrong_with_a_log_is_named_with_the_word_that_mends_it(tmp_path)
     }
     for word, parts in cases.items():
         path = written(tmp_path / f"{word}.csv", names, *parts)
-        with pytest.raises(ValueError, match=f"say --mend {word}"):
+        with pytest.raises(ValueError, match=f'say `mend="{word}"`'):
             read_log(path, columns)
         np.testing.assert_allclose(read_log(path, columns, mend=(word,)).trace.current, i)
     path = written(tmp_path / "milli.csv", names, t, q, qd, 1000 * i)
-    assert "say --mend mA" in "".join(read_log(path, columns).notes)
+    assert 'say `mend="mA"`' in str(read_log(path, columns).findings)
     np.testing.assert_allclose(read_log(path, columns, mend=("mA",)).trace.current, i)
-    with pytest.raises(ValueError, match="--mend grad: expected some of deg, rad, mA"):
+    with pytest.raises(ValueError, match='`mend="grad"`: expected some of deg, rad, mA'):
         read_log(path, columns, mend=("grad",))
 
 
@@ -298,13 +301,13 @@ def test_a_reduced_log_has_nothing_folded_in_and_says_its_cost(tmp_path):
     slow, line = np.sin(2 * np.pi * 2 * t), np.sin(2 * np.pi * 97 * t)
     q = np.column_stack([slow, slow])
     trace = Trace(("a", "b"), t, q, 0 * q, q + np.column_stack([line, line]))
-    log = reduced(Log(trace, ()), 100.0)
+    log = reduced(Log(trace), 100.0)
     late = np.sin(2 * np.pi * 2 * (log.trace.t - 0.005))[:, None]
     assert np.abs(log.trace.current - late)[1:].max() < 0.05
     np.testing.assert_allclose(log.trace.q[1:], np.hstack([late, late])[1:], atol=2e-3)
-    assert "1e+03 Hz averaged down to 100 Hz: alarms come 4.5 ms later" in log.notes[0]
-    with pytest.raises(ValueError, match="--resample 2000: hz 2000 for a trace at 1000 Hz"):
-        reduced(Log(trace, ()), 2000.0)
+    assert "1e+03 Hz averaged down to 100 Hz: alarms come 4.5 ms later" in log.findings[0].text
+    with pytest.raises(ValueError, match="`resample=2000`: hz 2000 for a trace at 1000 Hz"):
+        reduced(Log(trace), 2000.0)
 
 
 RAIL = ("rail", "A1", "A2", "lift axis", "j.rot")
@@ -328,7 +331,7 @@ def test_names_of_the_robot_s_joints_decide_before_numbers(tmp_path, q, i):
     names = [*(q.format(RAIL[k]) for k in order), *(i.format(RAIL[k].upper()) for k in order)]
     values = (parts[0][:, order], parts[2][:, order])
     path = written(tmp_path / "log.csv", ["time [s]", *names], t, *values)
-    trace = read_log(path, "auto", robot_joints=RAIL).trace
+    trace = read_file(path, "auto", robot_joints=RAIL).trace
     assert trace.joint_names == RAIL
     np.testing.assert_allclose(trace.q, parts[0], atol=1e-8)
     np.testing.assert_allclose(trace.current, parts[2], atol=1e-8)
@@ -349,7 +352,7 @@ def test_a_refusal_says_what_was_found_and_what_was_not(tmp_path):
     path = written(tmp_path / "log.csv", names, t, q, i)
     said = r"found time: t; positions: q_A1 to q_A2 \(2\).*; not found: the joints of q_rail"
     with pytest.raises(ValueError, match=said):
-        read_log(path, "auto", robot_joints=("x", "y", "z"))
+        read_file(path, "auto", robot_joints=("x", "y", "z"))
     said = lacking(names[:-1], axes)
     assert said.endswith("currents: i_rail to i_A1 (2); not found: currents of A2")
     assert lacking(["t", "a", "b"]) == (

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 
 from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, as_flags
 
 COMMANDS = {
     "demo": "simulate an arm, train a detector, detect collisions, write a recording",
@@ -122,7 +122,7 @@ def said(error: Exception) -> str:
         return f"{error.filename}: there is a file of that name; expected a folder, or a new name"
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
-    return str(error)
+    return as_flags(str(error))
 
 
 def expect(flag: str, value: float, least: float, most: float = float("inf")) -> None:

@@ -110,11 +110,11 @@ def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, li
     """
     from tauguard.cli.free_logs import explain, run_check
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import not_shown
     from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.checks import check_order, check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import filtered_logs, identify
     from tauguard.detectors.calibration.recording import each_can_be_left_out
+    from tauguard.detectors.features.motion_regimes import unseen_motion
 
     arm, recordings = given.arm, list(given.logs.values())
     traces = [recording.trace for recording in recordings]
@@ -133,7 +133,7 @@ def identified(given: FreeLogs, accept: tuple[str, ...]) -> tuple[Identified, li
     held: list[Array] = []
     if each_can_be_left_out(recordings):
         held = left_out(arm, recordings, scale=given.scale, data=data)
-    print_notes(not_shown(list(given.all_traces.values())))
+    print_notes(unseen_motion(list(given.all_traces.values())))
     explain(found.arm, given.logs, held, accept)
     return found, held
 

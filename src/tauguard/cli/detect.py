@@ -14,11 +14,10 @@ from tauguard.findings import ArgumentError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.datasets.logs import Log
     from tauguard.detectors import CollisionAlarm, Diagnosis, RobotNumbers
     from tauguard.detectors.alarms.log_detection import LogDetection
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
-    from tauguard.traces import Trace
+    from tauguard.traces import Log, Trace
 
 
 #: One number per joint; the help does not print the empty default.
@@ -87,14 +86,12 @@ def command(
         reading: how logs are read.
         json: write the results here as JSON.
     """
+    from tauguard import read_log
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import read_one
-    from tauguard.datasets.real_arms import robot_numbers
     from tauguard.detectors.alarms.log_detection import detect_in_log
     from tauguard.detectors.evaluation.labelled_log import compare_with_labels
     from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
-    from tauguard.untrusted_input import check_no_device
 
     if out is not None and out.exists() and not out.is_dir():
         raise ArgumentError(f"--out {out}: is a file; expected a folder")
@@ -103,11 +100,10 @@ def command(
             "--quiet and --gains cannot be combined with --model: they are for training"
         )
     robot = bodies_file(robot)
-    check_no_device(log)
-    numbers = robot_numbers(robot)
-    joints = numbers.joint_names if columns in ("auto", None) else ()
-    read = read_one(log, columns, torque, reading, joints)
-    print_notes(read.notes)
+    options = {"torque": torque, "mend": reading.mend, "resample": reading.resample}
+    read = read_log(log, columns, robot=robot, **options)  # type: ignore[arg-type]
+    print_notes(read.findings)
+    numbers = read.numbers
     if model is not None:
         trace, alarm = trained(model, log.name, read, payload, robot, numbers)
     else:
@@ -118,9 +114,9 @@ def command(
     causes, notes = diagnosed(alarm.detector, trace, found, robot, at_tool, payload is not None)
     print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
-    if read.touched is not None:
+    if read.labels is not None:
         begin, end = found.begin, float(trace.t[-1])
-        result["labels"] = compare_with_labels(found.detection.alarms, read.touched, begin, end)
+        result["labels"] = compare_with_labels(found.detection.alarms, read.labels, begin, end)
     report(result)
     if json is not None:
         write_json(json, result)
@@ -131,7 +127,7 @@ def command(
 def refuse_touched(log: Path, read: Log, quiet: float) -> None:
     """Raise ``ArgumentError`` if labels mark a contact in the first ``quiet`` seconds."""
     begin = read.trace.t[0]
-    early = [start - begin for start, _ in read.touched or () if start < begin + quiet]
+    early = [start - begin for start, _ in read.labels or () if start < begin + quiet]
     if early:
         raise ArgumentError(
             f"{log}: a column labels a contact {early[0]:.2f} s after the beginning, within the "
@@ -148,16 +144,18 @@ def trained(
     A note names joints whose columns do not fit the detector's arm.
     """
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import linear_axes, matched, parse_load
-    from tauguard.datasets.real_arms import check_robot, is_torque
+    from tauguard.cli.payload import load
+    from tauguard.datasets.arm_logs import load_of
+    from tauguard.datasets.real_arms import check_robot
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.training import carrying
     from tauguard.detectors.calibration.checks import check_order, check_signs
-    from tauguard.detectors.calibration.recording import Recording
+    from tauguard.detectors.calibration.joints import is_torque, linear_axes, matched
+    from tauguard.detectors.calibration.recording import Load, Recording
 
     alarm = load_model(model)
     if payload is not None:
-        alarm = carrying(alarm, parse_load(payload))
+        alarm = carrying(alarm, load_of(load(payload)) or Load())
     arm = alarm.detector.arm
     check_robot(numbers, robot, arm.robot, model)
     trace = matched(read.trace, arm.robot.joint_names)
@@ -187,9 +185,10 @@ def trained_on_beginning(
 
     from tauguard.cli.free_logs import free_arm, free_detector
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import linear_axes, matched, parse_load
-    from tauguard.datasets.real_arms import of_log
+    from tauguard.cli.payload import load
+    from tauguard.datasets.arm_logs import load_of
     from tauguard.detectors.alarms.training import free_alarm
+    from tauguard.detectors.calibration.joints import linear_axes, matched, of_log
     from tauguard.detectors.calibration.recording import Load, Recording, cut
 
     numbers, held = of_log(numbers, read.trace.joint_names, robot)
@@ -202,8 +201,8 @@ def trained_on_beginning(
             "logs of free motion (`tauguard train --free`) and give --model"
         )
     rows = int(np.searchsorted(trace.t, trace.t[0] + quiet))
-    load = Load() if payload is None else parse_load(payload)
-    first = {log.name: Recording(cut(trace, slice(0, rows)), load)}
+    carried = Load() if payload is None else load_of(load(payload)) or Load()
+    first = {log.name: Recording(cut(trace, slice(0, rows)), carried)}
     try:
         arm, source = free_arm(robot, numbers, first, gains)
         detector = free_detector(arm, first)
@@ -214,7 +213,7 @@ def trained_on_beginning(
         ) from None
     print_notes([f"trained on the first {quiet:g} s; gains: {source}"])
     detector = dataclasses.replace(detector, settle=quiet)
-    detector = detector if payload is None else detector.carrying(load)
+    detector = detector if payload is None else detector.carrying(carried)
     return trace, free_alarm(detector, [first[log.name].trace])
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tauguard.detectors import ArmModel, RobotNumbers
     from tauguard.detectors.calibration.recording import Recording
     from tauguard.detectors.scores.free_motion import FittedFreeMotion
-    from tauguard.traces import Trace
+    from tauguard.traces import Logs, Trace
 
 
 @dataclass(frozen=True)
@@ -45,24 +45,46 @@ def free_logs(
         ArgumentError: as raised by the called functions.
     """
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import moving, read_logs, with_loads
     from tauguard.datasets.real_arms import check_named, initial_arm
     from tauguard.detectors.calibration.checks import check_signs
-    from tauguard.detectors.calibration.recording import check_length
+    from tauguard.detectors.calibration.recording import check_length, moving
 
-    read = read_logs(logs, columns, robot, torque, reading)
-    print_notes(read.notes)
-    known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
-    traces, notes = moving(read.traces)
+    read = read_real(logs, robot, columns, payload, torque, reading)
+    print_notes(read.findings)
+    recordings, notes = moving(read)
     print_notes(notes)
     if not gains:
-        check_named(robot, list(traces.values()))
-    recordings = {name: known[name] for name in traces}
+        check_named(robot, [log.trace for log in recordings.values()])
     check_length(list(recordings.values()))
     arm, source = initial_arm(read.numbers, list(recordings.values()), gains, scale)
     check_signs(arm, recordings)
     chosen = "gains" if source in ("preset", "torques") else source
-    return FreeLogs(read.numbers, read.traces, recordings, arm, source, chosen)
+    traces = dict(zip(read, read.traces, strict=True))
+    return FreeLogs(read.numbers, traces, recordings, arm, source, chosen)
+
+
+def read_real(
+    logs: Sequence[Path],
+    robot: Path,
+    columns: str | None,
+    payload: Sequence[str],
+    torque: bool,
+    reading: Reading | None,
+) -> Logs:
+    """:func:`tauguard.read_logs` with the flags of commands."""
+    from tauguard import read_logs
+    from tauguard.cli.payload import loads
+
+    mend, resample = (reading.mend, reading.resample) if reading else ((), 0.0)
+    return read_logs(
+        logs,
+        columns,
+        robot=robot,
+        payload=loads(payload),
+        torque=torque,
+        mend=mend,
+        resample=resample,
+    )
 
 
 #: Checks whose errors ``--accept`` turns into notes.

@@ -8,6 +8,8 @@ from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
 
+from tauguard.findings import Finding, as_flags
+
 #: An argument of a docstring: its name, and its text with continuation lines.
 ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
@@ -37,7 +39,7 @@ def tidy(command: Callable[..., Any]) -> None:
     command.__annotations__ = hints
 
 
-def print_notes(notes: Iterable[str]) -> None:
-    """Print one line per note."""
+def print_notes(notes: Iterable[Finding | str]) -> None:
+    """Print one line per note, with the names of arguments as flags."""
     for note in notes:
-        print(f"note: {note}")
+        print(f"note: {as_flags(note if isinstance(note, str) else note.text)}")

@@ -65,9 +65,10 @@ def command(
         rerun: `view` opens the rerun viewer; FILE.rrd records the same display in a file.
     """
     from tauguard.cli import expect
-    from tauguard.datasets.real_arms import check_robot, robot_numbers
+    from tauguard.datasets.real_arms import check_robot
     from tauguard.detectors import load_model
     from tauguard.detectors.alarms.monitor import Monitor
+    from tauguard.detectors.calibration.joints import robot_numbers
     from tauguard.live.display import BackgroundDisplay
     from tauguard.live.session import listen
     from tauguard.models.robot import bodies_file
@@ -128,12 +129,14 @@ def with_load(
     Raises:
         ArgumentError: ``torque``, although the detector was trained on currents.
     """
-    from tauguard.datasets.arm_logs import parse_load
+    from tauguard.cli.payload import load
+    from tauguard.datasets.arm_logs import load_of
     from tauguard.detectors.alarms.training import carrying
+    from tauguard.traces import Load
 
     if torque and not (alarm.detector.arm.drive_gain == 1).all():
         raise ArgumentError(f"--torque: {model} was trained on currents")
-    return alarm if payload is None else carrying(alarm, parse_load(payload))
+    return alarm if payload is None else carrying(alarm, load_of(load(payload)) or Load())
 
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
@@ -163,7 +166,7 @@ def opened(
     alarm: CollisionAlarm,
 ) -> Any:
     """The connected source that the flags name."""
-    from tauguard.datasets.logs import read_log
+    from tauguard.datasets.logs import read_file
     from tauguard.live import LineStream, PlayedStream, UrStream
 
     names, dt = alarm.detector.arm.robot.joint_names, alarm.detector.dt
@@ -171,11 +174,11 @@ def opened(
         return UrStream(ur, port, 1 / dt, reconnect)
     if play is not None:
         from tauguard.cli.help_text import print_notes
-        from tauguard.datasets.arm_logs import matched
         from tauguard.datasets.columns import column_map
+        from tauguard.detectors.calibration.joints import matched
 
-        log = read_log(play, column_map(columns), names, robot_joints=names)
-        print_notes(f"{play.name}: {note}" for note in log.notes)
+        log = read_file(play, column_map(columns), names, robot_joints=names)
+        print_notes(f"{play.name}: {note.text}" for note in log.findings)
         return PlayedStream(matched(log.trace, names))
     if ros is not None:
         from tauguard.live.ros import RosStream

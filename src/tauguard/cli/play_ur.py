@@ -26,8 +26,8 @@ def command(
             Names: frozen, stale, encoder, missing, late, repeated, rate, jump, bias, saturated,
             swapped, sign, nan.
     """
+    from tauguard import read_log
     from tauguard.cli import expect
-    from tauguard.datasets.logs import read_log
     from tauguard.live.packets import Fault, Packets
     from tauguard.live.ur_server import HOST, UrServer
 

@@ -213,23 +213,22 @@ def free_motion(
     reading: Reading | None = None,
 ) -> None:
     """Train on logs in which nothing should have touched the arm."""
-    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, run_check
+    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, read_real, run_check
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import not_shown, read_logs, with_loads
     from tauguard.detectors import save_model
     from tauguard.detectors.alarms.training import free_alarm
     from tauguard.detectors.evaluation.acceptance import check_own_alarms, check_own_error
+    from tauguard.detectors.features.motion_regimes import unseen_motion
 
-    read = read_logs(free, columns, robot, torque, reading)
-    print_notes(read.notes)
-    traces, recordings = read.traces, with_loads(read.traces, payload)
-    own = dict(zip(traces, recordings, strict=True))
+    read = read_real(free, robot, columns, payload, torque, reading)
+    print_notes(read.findings)
+    own: dict[str, Recording] = dict(read)
     arm, _ = free_arm(robot, read.numbers, own, gains)
     logs_kept = [name for name in accept if name not in ACCEPTABLE]
     own, validation = validated_logs(own, arm, logs_kept)
     traces = {name: recording.trace for name, recording in own.items()}
     detector = free_detector(arm, own, accept)
-    print_notes(not_shown(list(traces.values())))
+    print_notes(unseen_motion(list(traces.values())))
     held = [log for log in validation.kept if log not in validation.accepted]
     run_check("error", accept, lambda: check_own_error(held))
     run_check("alarms", accept, lambda: check_own_alarms(held, per_hour))
@@ -253,8 +252,8 @@ def validated_logs(
         ArgumentError: a name in ``accept`` is not that of a log.
     """
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import log_named
     from tauguard.detectors.evaluation.cross_validation import cross_validate
+    from tauguard.traces.logs import log_named
 
     names = list(recordings)
     accepted = [log_named(name, f"--accept {name}", names) for name in accept]

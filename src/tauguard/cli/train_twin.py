@@ -46,8 +46,8 @@ def twin_contacts(
     Raises:
         ArgumentError: ``twin`` is not a twin's file, or the logs have another rate or arm.
     """
+    from tauguard.cli.free_logs import read_real
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors import CollisionAlarm, make_detector, save_model
     from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
     from tauguard.detectors.alarms.training import train_beside
@@ -64,17 +64,18 @@ def twin_contacts(
     if arm is None or sensors is None or sensors.left_over is None:
         raise ArgumentError(f"--twin {twin}: not a file that `tauguard twin` wrote")
     method = make_detector(detector)
-    read = read_logs(free, columns, bodies_file(twin), torque, reading)
-    print_notes(read.notes)
-    for name, trace in read.traces.items():
+    read = read_real(free, bodies_file(twin), columns, (), torque, reading)
+    print_notes(read.findings)
+    traces = {name: log.trace for name, log in read.items()}
+    for name, trace in traces.items():
         if not same_rate(trace.dt, 1 / sensors.rate):
             raise ArgumentError(
                 f"{name}: {1 / trace.dt:.4g} samples a second, the twin has "
                 f"{sensors.rate:.4g}; expected logs of that rate, or --resample {sensors.rate:.4g}"
             )
-    names, logs = arm.robot.joint_names, list(read.traces.values())
+    names, logs = arm.robot.joint_names, read.traces
     struck = [replace(trace, joint_names=names) for trace in contacts(twin)]
-    learned, scores, notes = train_beside(method, struck, read.traces, arm, per_hour)
+    learned, scores, notes = train_beside(method, struck, traces, arm, per_hour)
     quiet = FreeMotion().fit(logs, arm)
     both = BesideFreeMotion(quiet, learned)
     usual = UsualInput.of(logs, quiet.arm)

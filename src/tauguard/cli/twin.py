@@ -60,9 +60,8 @@ def command(
         reading: how logs are read.
         json: write the results here as JSON.
     """
-    from tauguard.cli.free_logs import explain, free_logs, run_check
+    from tauguard.cli.free_logs import explain, free_logs, read_real, run_check
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import read_logs
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.checks import check_order
     from tauguard.detectors.calibration.recording import each_can_be_left_out
@@ -88,7 +87,10 @@ def command(
     seen = explain(twin.arm, given.logs, apart, accept)
     twin, own = with_jackknife(twin, given, limit)
     print_notes(own)
-    tried = read_logs(judge, columns, robot, torque, reading).traces if judge else None
+    tried = None
+    if judge:
+        others = read_real(judge, robot, columns, (), torque, reading)
+        tried = {name: log.trace for name, log in others.items()}
     likeness, compared, reasons = judged(twin, given, limit, tried)
     notes = (*left, *seen, *own)
     written = write_twin(replace(twin, notes=notes), robot, out, names, given.source)
