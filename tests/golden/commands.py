@@ -3,7 +3,7 @@
 The cases stand in commands.txt and real_commands.txt: a name, a command line, and the expected
 text. They run in a temporary folder, in order; a case may use files that earlier ones wrote.
 ``python -m tests.golden.commands --write`` writes what the commands say now (the real cases only
-if there are real logs: TAUGUARD_DATA). To add a case, write its name and command line, then do this.
+if there are real logs: TAUGUARD_DATA). To add a case, write its name and command line first.
 """
 
 from __future__ import annotations
