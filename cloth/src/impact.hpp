@@ -26,7 +26,7 @@ struct ImpactArrays {
 //   a displacement relative to that of the first vertex, at most 2e-9 sqrt 3 M < 2^-28 M, and
 // * rounding, at most 2^-44 of the largest coordinate.
 // The plane's solution is used where it reaches this bound, and the sine between q and r is above
-// about 2^-20. Otherwise the shortest gap is searched.
+// about 2^-20. Otherwise, and for all contacts at a distance, the shortest gap is searched.
 template <bool vf>
 void describe(const Ends& x, const std::int32_t* row, double t, double distance, ImpactArrays out,
               std::size_t i) {
@@ -47,8 +47,9 @@ void describe(const Ends& x, const std::int32_t* row, double t, double distance,
   const auto [a, b, c, d] = at;
   const geometry::Gap<vf> gap{vf ? a - b : c - a, vf ? c - b : b - a, vf ? d - b : c - d};
   auto uv = gap.in_domain(gap.perpendicular(gap.p));
-  const double enough = scale * distance + 0x1p-28 * moved + 0x1p-44 * scale * big;
-  if (!(gap.nn > 0x1p-40 && gap.size(uv) <= enough)) uv = gap.shortest(enough);
+  const double rounding = 0x1p-44 * scale * big, enough = 0x1p-28 * moved + rounding;
+  if (distance > 0 || !(gap.nn > 0x1p-40 && gap.size(uv) <= enough))
+    uv = gap.shortest(distance > 0 ? rounding : enough);
 
   double* w = out.weights + 4 * i;
   w[0] = vf ? 1 : 1 - uv.u;

@@ -274,6 +274,7 @@ NB_MODULE(_mesh, m) {
       "Continuous collision detection of a mesh, one call per frame. Arguments are checked in "
       "Python.";
   tauguard::geometry::bind_interrupts();
+  nb::exception<TooMany>(m, "TooManyError", PyExc_ValueError);
   nb::class_<Mesh>(m, "Mesh")
       .def(nb::init<Faces, Ids, Table, int, std::optional<bool>, int>(), "faces"_a, "ids"_a,
            "meets"_a, "k"_a, "moving"_a.none(), "threads"_a)

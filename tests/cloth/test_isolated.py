@@ -4,8 +4,6 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from oracles.point_contact import point_edge_time, point_point_time
 from tauguard.cloth import Groups, MeshCCD, edge_edge, point_edge, point_point, vertex_face
@@ -200,30 +198,6 @@ def test_positions_must_reach_to_every_isolated_part():
     for kw, name in (({"edges": [[3, 9]]}, "edges: row"), ({"points": [9]}, "points: row")):
         with pytest.raises(ValueError, match=name):
             MeshCCD([[0, 1, 2]], **kw).find(x, x)
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.lists(st.integers(-3, 3), min_size=78, max_size=78), st.floats(0.05, 0.95))
-def test_a_safe_step_meets_nothing_and_is_not_timid(numbers, fraction):
-    x = np.array(numbers, dtype=float).reshape(2, 13, 3)
-    faces, rods, points, _ = parts(np.random.default_rng(0))
-    ccd = MeshCCD(faces, edges=rods, points=points)
-    share = ccd.safe_step(*x, fraction=fraction)
-    first = ccd.find(*x).first_time()
-    assert 0 <= share <= 1
-    if share > 0:
-        assert ccd.find(x[0], x[0] + share * (x[1] - x[0])).first_time() == np.inf
-        assert share == 1 or share <= first
-    if first == np.inf:
-        assert share == 1
-    if first > 1e-6 and np.isfinite(first):
-        assert share >= 0.5 * fraction * first
-
-
-@pytest.mark.parametrize("fraction", [0, 1, -1, 2, np.nan, "a", None])
-def test_a_fraction_outside_0_1_is_refused(fraction):
-    with pytest.raises(ValueError, match="fraction: "):
-        MeshCCD([[0, 1, 2]]).safe_step(np.zeros((3, 3)), np.zeros((3, 3)), fraction=fraction)
 
 
 def test_comparators_have_no_queries_of_points():
