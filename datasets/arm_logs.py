@@ -12,7 +12,8 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.datasets.columns import ANGLES, ColumnMap, changed_fields, column_map
 from tauguard.datasets.log_checks import saturated
-from tauguard.datasets.logs import read_file
+from tauguard.datasets.log_table import Options
+from tauguard.datasets.logs import read_source
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.joints import (
     is_torque,
@@ -21,7 +22,15 @@ from tauguard.detectors.calibration.joints import (
     of_log,
     robot_numbers,
 )
-from tauguard.findings import ArgumentError, Finding, Findings, LogError, cause, note
+from tauguard.findings import (
+    ArgumentError,
+    Finding,
+    Findings,
+    LogError,
+    cause,
+    note,
+    raise_errors,
+)
 from tauguard.traces.logs import Load, Log, Logs, log_named
 from tauguard.traces.resample import averaged
 from tauguard.traces.trace import Trace
@@ -42,7 +51,7 @@ ALIKE = 3.0
 
 
 def read_log(
-    path: str | Path,
+    source: Any,
     columns: Columns = None,
     *,
     robot: str | Path | None = None,
@@ -51,12 +60,17 @@ def read_log(
     torque: bool = False,
     mend: str | Collection[str] = (),
     resample: float = 0.0,
+    name: str = "log",
 ) -> Log:
     """Read a log of a real arm, which may show contacts.
 
     Args:
-        path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
-            system with ``JointState`` messages, whose ``effort`` is taken as current [A].
+        source: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
+            system with ``JointState`` messages, whose ``effort`` is taken as current [A]. Or a
+            DataFrame with the columns of a CSV file, or one of ``Log.to_frame``; a dictionary of
+            arrays "t" and, if the log labels contacts, "contact", (T,), and "q", "qd", "current" or
+            "torque", "q_des", "qd_des", "qdd_des", (T, n), all in SI units but for ``mend``; a
+            :class:`~tauguard.traces.Trace`.
         columns: columns of a CSV file: a :class:`ColumnMap`, the path of a JSON file with its
             fields, the name of a preset (see ``PRESETS``), or "auto" to recognise columns by names
             and values. By default the header line must be that of a preset.
@@ -65,34 +79,35 @@ def read_log(
         joint_names: names of the joints in the order of the columns (default: the map's names, the
             messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
         payload: the load that the arm carried, see :data:`LoadLike`.
-        torque: currents or efforts of the file are joint torques [N m].
+        torque: currents or efforts of the source are joint torques [N m].
         mend: units and repairs of a CSV file, see :meth:`ColumnMap.mended`.
         resample: average the log down to this rate [Hz]; 0: unchanged.
+        name: name of a log that is not a file.
 
     Returns:
-        The log with its joints in the file's order. The text of each finding begins with the file's
+        The log with its joints in the file's order. The text of each finding begins with the log's
         name. Only faults that ``mend`` names, or the column map's ``repair``, are repaired.
 
     Raises:
         LogError: a missing column, a bad number, a cut-off row, time that does not increase, a
             gap, angles in degrees, or velocities that do not fit the positions. The message names
-            file, row or line, and what would work.
+            log, row or line, and what would work.
         ArgumentError: the robot file or another argument cannot be used.
         OSError: the file is missing or cannot be read.
     """
     from tauguard.models.robot import bodies_file
 
     file = None if robot is None else bodies_file(Path(robot))
-    check_no_device(path)
+    if isinstance(source, str | Path):
+        check_no_device(source)
     numbers = None if file is None else robot_numbers(file)
-    columns = column_map(columns)
-    joints = _joints_to_find(columns, numbers)
-    log = _read(Path(path), columns, torque, _words(mend), resample, joints, joint_names)
+    options = _options(columns, mend, torque, numbers, joint_names)
+    log = _read(source, name, options, resample)
     return dataclasses.replace(log, load=load_of(payload), robot=file, numbers=numbers)
 
 
 def read_logs(
-    logs: str | Path | Sequence[str | Path],
+    logs: str | Path | Sequence[str | Path] | Mapping[str, Any],
     columns: Columns = None,
     *,
     robot: str | Path | None = None,
@@ -105,8 +120,9 @@ def read_logs(
     """Read logs of one arm: free motion of a real arm, or labelled recordings of a simulated one.
 
     Args:
-        logs: files, or folders that hold them; names of files differ. Without ``robot``, a folder
-            of labelled MCAP recordings, or a dataset, whose first split is read.
+        logs: files, or folders that hold them; names of files differ. Or sources of
+            :func:`read_log` by the name of the log. Without ``robot``, a folder of labelled MCAP
+            recordings, or a dataset, whose first split is read.
         columns: as for :func:`read_log`.
         robot: URDF or MJCF file of the arm, or a name in ``models.ROBOTS``. The logs then have to
             show free motion. Without it, the arm is attached to the recordings.
@@ -118,7 +134,7 @@ def read_logs(
         resample: average the logs down to this rate [Hz]; 0: unchanged.
 
     Returns:
-        The logs by file name, with joints in the robot's order.
+        The logs by name, with joints in the robot's order.
 
     Raises:
         LogError: labelled contacts, a saturated current, currents in one log and torques in
@@ -130,21 +146,18 @@ def read_logs(
     """
     from tauguard.models.robot import bodies_file
 
-    paths = [Path(log) for log in ([logs] if isinstance(logs, str | Path) else logs)]
     if robot is None:
-        from tauguard.datasets.recordings import labelled
+        return _of_simulated_arm(logs, arm)
+    file, sources = bodies_file(Path(robot)), _sources(logs)
+    numbers = robot_numbers(file)
+    options = _options(columns, mend, torque, numbers)
 
-        return simulated(trace for path in paths for trace in labelled(path, arm))
-    file = bodies_file(Path(robot))
-    files = log_files(paths)
-    numbers, words, columns = robot_numbers(file), _words(mend), column_map(columns)
-    joints = _joints_to_find(columns, numbers)
+    def one(name: str, word: tuple[str, ...] = ()) -> Log:
+        words = dataclasses.replace(options, mend=(*options.mend, *word))
+        return _read(sources[name], name, words, resample)
 
-    def one(path: Path, word: tuple[str, ...] = ()) -> Log:
-        return _read(path, columns, torque, (*words, *word), resample, joints)
-
-    decided = columns != "auto" or not ANGLES.keys().isdisjoint(words)
-    read = _each(files, one) if decided else of_one_unit(files, one)
+    decided = options.columns != "auto" or not ANGLES.keys().isdisjoint(options.mend)
+    read = _each(sources, one) if decided else of_one_unit(sources, one)
     _refuse(touch for log in read.values() for touch in _labelled_contacts(log))
     numbers, findings = of_log(numbers, next(iter(read.values())).trace.joint_names, file)
     notes = _gathered({name: log.findings for name, log in read.items()}, len(read))
@@ -182,7 +195,24 @@ def simulated(traces: Iterable[Trace]) -> Logs:
     return Logs(logs)
 
 
-# -- files -----------------------------------------------------------------------------------------
+# -- sources ---------------------------------------------------------------------------------------
+
+
+def _of_simulated_arm(logs: Any, arm: str | None) -> Logs:
+    from tauguard.datasets.recordings import labelled
+
+    if isinstance(logs, Mapping):
+        raise ArgumentError("`robot=` is missing: the URDF or MJCF file of the arm")
+    paths = [Path(log) for log in ([logs] if isinstance(logs, str | Path) else logs)]
+    return simulated(trace for path in paths for trace in labelled(path, arm))
+
+
+def _sources(logs: Any) -> dict[str, Any]:
+    """Sources by the name of their log."""
+    if isinstance(logs, Mapping):
+        return dict(logs)
+    files = log_files([Path(log) for log in ([logs] if isinstance(logs, str | Path) else logs)])
+    return {path.name: path for path in files}
 
 
 def log_files(logs: Sequence[Path]) -> list[Path]:
@@ -205,33 +235,31 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     return files
 
 
-def _joints_to_find(columns: Columns, numbers: RobotNumbers | None) -> tuple[str, ...]:
-    """Joints after which columns may be named."""
-    return numbers.joint_names if numbers is not None and columns in ("auto", None) else ()
-
-
-def _words(mend: str | Collection[str]) -> tuple[str, ...]:
+def _options(
+    columns: Columns,
+    mend: str | Collection[str],
+    torque: bool,
+    numbers: RobotNumbers | None,
+    joint_names: Sequence[str] | None = None,
+) -> Options:
+    """Checked options of a log's table."""
     words = (mend,) if isinstance(mend, str) else tuple(mend)
     for word in words:
         changed_fields(word)
-    return words
+    joints = numbers.joint_names if numbers is not None and columns in ("auto", None) else ()
+    return Options(column_map(columns), joint_names, words, torque, joints)
 
 
-def _read(
-    path: Path,
-    columns: ColumnMap | str | None,
-    torque: bool,
-    mend: tuple[str, ...],
-    resample: float,
-    joints: Sequence[str] = (),
-    joint_names: Sequence[str] | None = None,
-) -> Log:
-    """A log with its joints in the file's order; each finding begins with the file's name."""
-    log = read_file(path, columns, joint_names, mend, joints, torque)
+def _read(source: Any, name: str, options: Options, resample: float) -> Log:
+    """A log with its joints in the file's order; each finding begins with the log's name."""
+    log = read_source(source, name, options)
     if resample != 0:
         log = reduced(log, resample)
     findings = (
-        dataclasses.replace(note, text=f"{path.name}: {note.text}") for note in log.findings
+        dataclasses.replace(
+            finding, text=f"{log.name}: {finding.text}", where=(log.name, *finding.where)
+        )
+        for finding in log.findings
     )
     return dataclasses.replace(log, findings=Findings(findings))
 
@@ -255,55 +283,59 @@ def reduced(log: Log, hz: float) -> Log:
     return dataclasses.replace(log, trace=trace, findings=findings)
 
 
-def _each(files: Sequence[Path], one: Callable[[Path], Log]) -> dict[str, Log]:
-    """Logs by file name; a ``LogError`` has the findings of all files that cannot be read."""
+def _each(sources: Mapping[str, Any], one: Callable[[str], Log]) -> dict[str, Log]:
+    """Logs by name; a ``LogError`` has the findings of all logs that cannot be read."""
     read, errors = {}, {}
-    for path in files:
+    for name in sources:
         try:
-            read[path.name] = one(path)
+            read[name] = one(name)
         except LogError as error:
-            errors[str(path)] = error.findings
-    _refuse(_gathered(errors, len(files)))
+            errors[_called(name, sources)] = error.findings
+    _refuse(_gathered(errors, len(sources)))
     return read
 
 
-def of_one_unit(files: Sequence[Path], one: Callable[..., Log]) -> dict[str, Log]:
-    """Logs by file name, with the unit of angles that the others have where a log does not show it.
+def _called(name: str, sources: Mapping[str, Any]) -> str:
+    """How errors call a log: the path of a file, else the name."""
+    return str(sources[name]) if isinstance(sources[name], str | Path) else name
+
+
+def of_one_unit(sources: Mapping[str, Any], one: Callable[..., Log]) -> dict[str, Log]:
+    """Logs by name, with the unit of angles that the others have where a log does not show it.
 
     Angles of small motions may be in degrees or radians. If another log of the same columns is in
     degrees, they are degrees.
 
     Args:
-        files: logs whose columns are recognised.
-        one: reads a log, also in the unit ``("deg",)`` or ``("rad",)``.
+        sources: logs whose columns are recognised, by name.
+        one: reads the log of a name, also in the unit ``("deg",)`` or ``("rad",)``.
 
     Raises:
         LogError: a log whose angles fit those of the others as radians, but not as degrees.
     """
     read, doubts = {}, {}
-    for path in files:
+    for name in sources:
         try:
-            read[path.name] = one(path)
+            read[name] = one(name)
         except LogError as error:  # perhaps because the unit is open
-            doubts[str(path)] = error.findings
+            doubts[name] = error.findings
     maps = {name: log.columns for name, log in read.items() if log.columns is not None}
     if len({columns.q for columns in maps.values()}) != 1:
-        _refuse(_gathered(doubts, len(files)))
+        errors = {_called(name, sources): findings for name, findings in doubts.items()}
+        _refuse(_gathered(errors, len(sources)))
         return read
     degrees = {name: read[name] for name, columns in maps.items() if columns.degrees}
     radians = [name for name in maps if degrees and name not in degrees]
     _refuse(f for name in radians for f in _in_radians(name, read[name].trace.q, degrees))
-    for path in files:
-        if str(path) in doubts or path.name in radians:
-            read[path.name] = one(path, ("deg" if degrees else "rad",))
-    return {path.name: read[path.name] for path in files}
+    unit = ("deg" if degrees else "rad",)
+    again = {name: sources[name] for name in sources if name in doubts or name in radians}
+    read |= _each(again, lambda name: one(name, unit))
+    return {name: read[name] for name in sources}
 
 
 def _refuse(findings: Iterable[Finding]) -> None:
     """Raise ``LogError`` with all findings, if one of them is an error."""
-    every = list(findings)
-    if any(finding.severity == "error" for finding in every):
-        raise LogError(*every)
+    raise_errors(LogError, findings)
 
 
 # -- checks of logs of free motion -----------------------------------------------------------------
@@ -342,8 +374,10 @@ def _gathered(findings: Mapping[str, Findings], count: int) -> list[Finding]:
     logs: dict[Finding, list[str]] = {}
     for name, doubts in findings.items():
         for finding in doubts:
-            text = finding.text.removeprefix(f"{name}: ")
-            logs.setdefault(dataclasses.replace(finding, text=text), []).append(name)
+            text, short = finding.text.removeprefix(f"{name}: "), Path(name).name
+            where = tuple(part for part in finding.where if part != short)
+            shared = dataclasses.replace(finding, text=text, where=where)
+            logs.setdefault(shared, []).append(name)
     gathered = []
     for finding, names in logs.items():
         which = "each log" if len(names) == count > 1 else ", ".join(names)

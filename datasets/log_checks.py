@@ -5,6 +5,7 @@ is an error that names the row.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,11 +112,15 @@ def _in_degrees(trace: Trace, where: Where) -> list[Finding]:
 
 
 def travelled(trace: Trace) -> tuple[Array, Array]:
-    """Change of position, and integrated velocity, in each interval of ``SPAN``, shape (K, n)."""
+    """Change of position, and integrated velocity, in each interval of ``SPAN``, shape (K, n).
+
+    Intervals with a gap are left out.
+    """
     count = max(1, round(SPAN / trace.dt))
     steps = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     whole = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
-    return np.diff(trace.q[::count], axis=0), np.diff(whole[::count], axis=0)
+    usual = np.diff(trace.t[::count]) < 1.25 * count * trace.dt
+    return np.diff(trace.q[::count], axis=0)[usual], np.diff(whole[::count], axis=0)[usual]
 
 
 def _strange_velocities(trace: Trace) -> list[Finding]:
@@ -183,44 +188,44 @@ def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
     return found
 
 
-def refuse_set_back(t: Array, lines: NDArray[np.int64]) -> None:
+def refuse_set_back(t: Array, where: Where) -> None:
     """Refuse to sort rows if the clock was set back: rows of two periods would be mixed."""
-    back = np.flatnonzero(np.diff(t) < 0) + 1
+    back = [int(row) + 1 for row in np.flatnonzero(np.diff(t) < 0)]
     for begin, row, end in zip([0, *back[:-1]], back, [*back[1:], len(t)], strict=True):
         over = float(min(t[row - 1], t[end - 1]) - max(t[row], t[begin]))
         if len(back) < FEW and end - row > FEW and over > max(5 * np.median(np.diff(t)), 0.05):
-            text = f"line {lines[row]}: the clock was set back by {over:.3g} s: cut the log there "
+            text = f"{where(row)}: the clock was set back by {over:.3g} s: cut the log there "
             raise LogError(cause("time", f"{text}into two"))
 
 
 def increasing(
-    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[Finding]
+    t: Array, where: Where, columns: ColumnMap, notes: list[Finding]
 ) -> NDArray[np.bool_]:
     """Rows to keep so that time increases strictly; times may repeat only if the map allows it."""
     step = np.diff(t)
     back = np.flatnonzero(step < 0)
     if back.size:
-        row = back[0] + 1
+        row = int(back[0]) + 1
         text = (
-            f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
+            f"{where(row)}: time goes back from {t[row - 1]} to {t[row]} s; to sort the rows, "
             'say `mend="order"`'
         )
         raise LogError(cause("time", text))
-    same = np.flatnonzero(step == 0)
-    if same.size and "repeat" not in columns.repair:
+    same = [int(row) for row in np.flatnonzero(step == 0)]
+    if same and "repeat" not in columns.repair:
         text = (
-            f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats; to leave such rows out, say "
+            f"{where(same[0] + 1)}: time {t[same[0]]} s repeats; to leave such rows out, say "
             '`mend="repeat"`'
         )
         raise LogError(cause("time", text))
-    if same.size > COARSE * len(t):
+    if len(same) > COARSE * len(t):
         text = (
-            f"{same.size} of {len(t)} rows repeat the time before: the time has too few digits; "
+            f"{len(same)} of {len(t)} rows repeat the time before: the time has too few digits; "
             'write more of them, or say `mend="clock=HZ"` (rows per second) instead'
         )
         raise LogError(cause("time", text))
-    if same.size:
-        text = f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
+    if same:
+        text = f"{len(same)} rows with a repeated time left out, first: {where(same[0] + 1)}"
         notes.append(note("rows-left-out", text))
     return np.concatenate([[True], step > 0])
 
@@ -259,7 +264,7 @@ def fresh(
 
 def labelled(
     header: Sequence[str],
-    rows: Sequence[tuple[int, list[str]]],
+    rows: Sequence[tuple[int, Sequence[Any]]],
     lines: NDArray[np.int64],
     t: Array,
 ) -> tuple[tuple[float, float], ...] | None:
@@ -278,7 +283,7 @@ def labelled(
     columns = [k for k, name in enumerate(header) if name.lower() in LABELS]
     cells = dict(rows) if columns else {}
     for column in columns:
-        marks = [LABEL.get(cells[n][column].strip().lower().removesuffix(".0")) for n in lines]
+        marks = [LABEL.get(str(cells[n][column]).strip().lower().removesuffix(".0")) for n in lines]
         if None in marks:
             continue
         return tuple((float(t[a]), float(t[b - 1])) for a, b in runs(np.array(marks)))

@@ -1,132 +1,72 @@
-"""Logs of real arms as traces: CSV with a column map, MCAP with ``sensor_msgs/JointState``."""
+"""Sources of a log: CSV and MCAP files, DataFrames, arrays, traces."""
 
 import csv
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import islice
-from math import isfinite
 from pathlib import Path
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauguard.arrays import Array
-from tauguard.datasets.columns import (
-    ANGLES,
-    PRESETS,
-    Column,
-    ColumnMap,
-    preset_of,
-    presets_of,
-    presets_of_width,
-)
-from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
-from tauguard.datasets.recognition import described, in_units_of, lacking, recognised
-from tauguard.findings import Finding, LogError, cause, note
+from tauguard.datasets.columns import PRESETS, SIGNALS, ColumnMap
+from tauguard.datasets.log_checks import checked
+from tauguard.datasets.log_table import Options, Table, header_of, log_of
+from tauguard.findings import ArgumentError, LogError, cause
 from tauguard.traces.logs import Log
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
 
-#: Number of rows at a file's beginning from which units are recognised.
-LOOKED_AT = 5000
+#: Names of arrays of a log in memory: times, signals, and whether a sample is in contact.
+ARRAYS = ("t", *SIGNALS, "contact")
 
 
-def read_file(
-    path: str | Path,
-    columns: ColumnMap | str | None = None,
-    joint_names: Sequence[str] | None = None,
-    mend: Collection[str] = (),
-    robot_joints: Sequence[str] = (),
-    torque: bool = False,
-) -> Log:
-    """Read a recording of a real arm, without knowledge of its robot.
-
-    Args:
-        path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
-            system whose ``JointState`` messages hold motor currents or torques in ``effort``.
-        columns: for CSV: a map, the name of a preset (see ``PRESETS``), or "auto" to recognise
-            columns by names and values. By default the header line must be that of a preset.
-        joint_names: names of the joints in the order of the columns (default: the map's names, the
-            messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
-        mend: units, repairs and clock of a CSV file, see :meth:`ColumnMap.mended`.
-        robot_joints: names of the robot's joints; "auto" finds columns that are named after them.
-        torque: the currents or efforts of the file are joint torques [N m].
-
-    Returns:
-        The trace, without truth and with the log's own times, and notes on repairs. Only faults
-        that the map's ``repair`` names are repaired. ``meta["columns"]`` is the preset, if any.
-
-    Raises:
-        LogError: a missing column, a bad number, a cut-off row, time that does not increase, a
-            gap, angles in degrees, or velocities that do not fit the positions. The message names
-            file, row or line, and what would work.
-        OSError: the file is missing or cannot be read.
-    """
-    path = Path(path)
+def read_source(source: Any, name: str, options: Options) -> Log:
+    """The log in a source, without knowledge of its robot and load; see ``tauguard.read_log``."""
+    if isinstance(source, Trace):
+        with reading(name, kind=LogError):
+            trace = _of_effort(source, options.torque)
+            return Log(trace, name=name, findings=checked(trace, lambda row: f"row {row}"))
+    if isinstance(source, Mapping):
+        return _of_arrays(source, name, options)
+    if hasattr(source, "to_numpy") and hasattr(source, "columns"):
+        return _of_frame(source, name, options)
+    if not isinstance(source, str | Path):
+        text = f"source: {type(source).__name__}; expected a path, a DataFrame, arrays or a Trace"
+        raise ArgumentError(cause("source", text))
+    path = Path(source)
     with reading(path, kind=LogError):
-        if path.suffix == ".mcap":
-            from tauguard.datasets.logs_mcap import read_joint_states
-
-            log, own = read_joint_states(path, joint_names, torque), None
-        else:
-            try:
-                own = chosen(columns, path, mend, robot_joints).mended(mend)
-                told = columns == "auto" and set(own.joint_names) <= set(robot_joints)
-                names = own.joint_names or joint_names if told else joint_names
-                log = read_csv(path, own, names, columns == "auto", torque)
-            except UnicodeDecodeError as error:
-                raise LogError("not a text file; expected CSV or MCAP") from error
-            except csv.Error as error:
-                raise LogError(f"not CSV ({error})") from error
-    preset = preset_of(own) if own else None
-    if isinstance(columns, str) and columns in PRESETS:
-        preset = columns
-    if preset is not None:
-        log = replace(log, trace=replace(log.trace, meta={**log.trace.meta, "columns": preset}))
-        log = replace(log, as_read=f"preset {preset}" + (f": {log.as_read}" if log.as_read else ""))
+        log = _of_mcap(path, options) if path.suffix == ".mcap" else _of_csv(path, options)
     return replace(log, name=path.name, path=path)
 
 
-def chosen(
-    columns: ColumnMap | str | None,
-    path: Path,
-    mend: Collection[str] = (),
-    joints: Sequence[str] = (),
-) -> ColumnMap:
-    """The given map, the preset of the given name, or the preset that fits the header line."""
-    if isinstance(columns, ColumnMap):
-        return columns
-    form: dict[str, Any] = _form(path)
-    if columns is not None and columns != "auto":
-        return replace(PRESETS[columns], **form)
-    header, table = _beginning(path, **form)
-    if not header:
-        raise LogError("the file is empty")
-    preset = next((replace(PRESETS[name], **form) for name in presets_of(header)), None)
-    if preset is not None and columns is None:
-        return preset
-    told = next((ANGLES[word] for word in mend if word in ANGLES), None)
-    found = recognised(header, table, told, joints)
-    found = None if found is None else replace(found, **form)
-    if preset is not None:
-        return preset if found is None else in_units_of(preset, found)
-    if found is not None and columns == "auto":
-        return found
-    known = f"give a column map, or a preset: {', '.join(PRESETS)}"
-    if found is None and not header_of(header):
-        text = f"no names of columns in the first line: {known}; a map may count columns from 0"
-        raise LogError(cause("columns", text))
-    if found is None:
-        lead = "" if columns == "auto" else "no column map; "
-        text = f"{lead}among the columns, {lacking(header, joints)}; {known}"
-        raise LogError(cause("columns", text))
-    text = f'it looks like {described(found)}: accept with `columns="auto"`; or {known}'
-    raise LogError(cause("columns", f"no column map; {text}"))
+# -- files -----------------------------------------------------------------------------------------
 
 
-def _form(path: Path) -> dict[str, Any]:
+def _of_mcap(path: Path, options: Options) -> Log:
+    from tauguard.datasets.logs_mcap import read_joint_states
+
+    log, preset = read_joint_states(path, options.joint_names, options.torque), options.columns
+    if not (isinstance(preset, str) and preset in PRESETS):
+        return log
+    meta = {**log.trace.meta, "columns": preset}  # for its gains
+    return replace(log, trace=replace(log.trace, meta=meta), as_read=f"preset {preset}")
+
+
+def _of_csv(path: Path, options: Options) -> Log:
+    columns = options.columns
+    try:
+        form = _form(path)
+        if isinstance(columns, ColumnMap):
+            form = {"separator": columns.separator, "decimal": columns.decimal}
+        table = Table(list(_rows(path, **form)), form=form)
+        return log_of(table, path.name, options)
+    except UnicodeDecodeError as error:
+        raise LogError("not a text file; expected CSV or MCAP") from error
+    except csv.Error as error:
+        raise LogError(f"not CSV ({error})") from error
+
+
+def _form(path: Path) -> dict[str, str]:
     """Separator and decimal mark, found from the first two lines."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         first, second = stream.readline(), stream.readline()
@@ -143,234 +83,64 @@ def _rows(path: Path, separator: str, decimal: str) -> Iterator[tuple[int, list[
                 yield n, row if decimal == "." else [cell.replace(decimal, ".") for cell in row]
 
 
-def _beginning(path: Path, separator: str, decimal: str) -> tuple[list[str], Array]:
-    """Column names, and the values of the first rows; NaN for a cell that is no number."""
-    rows = [row for _, row in islice(_rows(path, separator, decimal), LOOKED_AT + 1)]
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    table = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
-    for k, row in enumerate(rows[1:]):
-        for i, cell in enumerate(row[: len(header)]):
-            value = number(cell)
-            table[k, i] = np.nan if value is None else value
-    return header, table
+# -- memory ----------------------------------------------------------------------------------------
 
 
-def read_csv(
-    path: Path,
-    columns: ColumnMap,
-    joint_names: Sequence[str] | None,
-    auto: bool = False,
-    torque: bool = False,
-) -> Log:
-    """A CSV file as a trace, see :func:`read_file`; with ``auto``, a note describes the columns."""
-    rows = list(_rows(path, columns.separator, columns.decimal))
-    if not rows:
-        raise LogError("empty file")
-    header, where = _located(rows[0][1], columns)
-    rows = rows[1:] if header else rows
-    if not rows:
-        raise LogError("a header line without rows of numbers")
-    width = columns.width or len(header) or len(rows[0][1])
-    table, lines, notes = parse(
-        rows, [i for group in where.values() for i in group], width, columns, header
-    )
-    if len(table) < 2:
-        raise LogError(f"{len(table)} rows of numbers, expected at least 2")
-    ends = np.cumsum([len(group) for group in where.values()])[:-1]
-    parts = dict(zip(where, np.split(table, ends, axis=1), strict=True))
-    times = parts.pop("t")
-    t = times[:, 0] * columns.time_scale if columns.times else np.arange(len(table)) / columns.clock
-    if "order" in columns.repair and (np.diff(t) < 0).any():
-        refuse_set_back(t, lines)
-        order = np.argsort(t, kind="stable")
-        count = int((np.diff(t) < 0).sum())
-        notes.append(note("rows-sorted", f"rows sorted by time; {count} were out of order"))
-        t, lines = t[order], lines[order]
-        parts = {name: value[order] for name, value in parts.items()}
-    keep = increasing(t, lines, columns, notes)
-    if "state" in columns.repair:
-        keep = fresh(t, np.column_stack(list(parts.values())), keep, notes)
-    kept_parts = {name: np.ascontiguousarray(value[keep]) for name, value in parts.items()}
-    signals: dict[str, Any] = _in_si_units(kept_parts, columns)
-    meta = {"log": path.name}
-    as_read = ""
-    if auto and columns not in PRESETS.values():
-        as_read = described(columns)
-        notes.insert(0, note("columns", f"read as {as_read}"))
-    if columns.torque or torque:
-        meta["effort"] = "torque"
-    if "qd" not in signals:
-        signals["qd"], meta["velocities"] = differentiated(t[keep], signals["q"]), "differentiated"
-        notes.append(note("no-velocities", DIFFERENTIATED))
-    names = named(joint_names or columns.joint_names, len(columns.q))
-    trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
-    kept = lines[keep]
-    labels = labelled(header, rows, kept, trace.t)
-    findings = checked(trace, lambda row: f"line {kept[row]}", notes)
-    return Log(trace, labels=labels, as_read=as_read, columns=columns, findings=findings)
+def _of_frame(frame: Any, name: str, options: Options) -> Log:
+    """The log in a DataFrame of pandas or polars, or in one of ``Log.to_frame``."""
+    if getattr(frame.columns, "nlevels", 1) == 2:  # signal and joint
+        signals = dict.fromkeys(signal for signal, _ in frame.columns)
+        arrays = {signal: frame[signal].to_numpy() for signal in signals}
+        joints = tuple(map(str, frame[next(iter(signals))].columns))
+        options = replace(options, joint_names=options.joint_names or joints)
+        return _of_arrays({"t": frame.index.to_numpy()} | arrays, name, options)
+    header = [str(column) for column in frame.columns]
+    return _of_rows(header, frame.to_numpy().tolist(), name, options)
 
 
-def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:
-    """The header (empty if the first line has numbers) and the column indices of each signal.
+def _of_arrays(arrays: Mapping[str, Any], name: str, options: Options) -> Log:
+    """The log in arrays that are named as the fields of a trace, see ``ARRAYS``.
 
     Raises:
-        LogError: columns that this file does not have; the message names presets that fit it.
+        ArgumentError: another name, or a shape that does not fit the others.
     """
-    header = header_of(first)
-    if header and columns.headerless:
-        fitting = presets_of(header)
-        text = (
-            f"the first line names columns ({listed(header, 60)}), but files of this column map "
-            "have no header line: "
-            + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
-        )
-        raise LogError(cause("columns", text))
-    try:
-        return header, {
-            name: [position(column, header, columns) for column in group]
-            for name, group in {"t": columns.times, **columns.groups()}.items()
-        }
-    except ValueError as error:
-        better = presets_of(header) if header else presets_of_width(len(first))
-        hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
-        raise LogError(cause("columns", f"{error}{hint}")) from None
+    if unknown := sorted(map(str, set(arrays) - set(ARRAYS))):
+        text = f"arrays: {', '.join(unknown)}; expected some of {', '.join(ARRAYS)}"
+        raise ArgumentError(cause("columns", text))
+    if "q" not in arrays:
+        raise ArgumentError(cause("columns", "arrays: q is missing: joint positions, shape (T, n)"))
+    values = {key: np.asarray(value, np.float64) for key, value in arrays.items()}
+    rows, joints = values["q"].shape if values["q"].ndim == 2 else (0, 0)
+    header, table = list[str](), []
+    fields: dict[str, Any] = {"t": None, "clock": 1.0}  # replaced by `mend="clock=HZ"`
+    for key, value in values.items():
+        wanted = (rows,) if key in ("t", "contact") else (rows, joints)
+        if value.shape != wanted or not rows:
+            text = f"arrays: {key} has the shape {value.shape}, expected {wanted or '(T, n)'}"
+            raise ArgumentError(cause("columns", text))
+        names = (key,) if value.ndim == 1 else tuple(f"{key}_{k}" for k in range(joints))
+        header += names
+        table.append(value.reshape(rows, -1))
+        if key == "t":
+            fields |= {"t": key, "clock": 0.0}
+        elif key != "contact":
+            fields[key] = names
+    if "t" not in arrays and not any(word.startswith("clock=") for word in options.mend):
+        text = 'arrays: t is missing: times [s], shape (T,); or give `mend="clock=HZ"`'
+        raise ArgumentError(cause("columns", text))
+    with reading(name, kind=LogError):
+        options = replace(options, columns=ColumnMap(**fields))
+    log = _of_rows(header, np.hstack(table).tolist(), name, options)
+    return replace(log, as_read="arrays")
 
 
-def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array]:
-    """Signals in rad, rad/s and A; ``current`` holds the joint torques [N m] of a torque log."""
-    signals = dict(parts)
-    if not columns.torque:
-        signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
-    efforts = signals.pop("torque", None)
-    if np.any(columns.degrees):
-        scale = np.where(columns.degrees, np.pi / 180, 1.0)  # one, or one per joint
-        signals |= {n: v * scale for n, v in signals.items() if n != "current"}
-    if efforts is not None:
-        signals["current"] = efforts * np.asarray(columns.torque_scale, float)
-    return signals
+def _of_rows(header: list[str], rows: list[list[Any]], name: str, options: Options) -> Log:
+    numbered: list[tuple[int, Any]] = list(enumerate(rows))
+    with reading(name, kind=LogError):
+        if header_of(header):
+            numbered.insert(0, (-1, header))
+        return log_of(Table(numbered, "row"), name, options)
 
 
-#: Note on a log without velocities.
-DIFFERENTIATED = (
-    "no velocities: positions are differentiated over three samples, which adds a delay of 1.5 "
-    "samples and noise; bounds get larger accordingly"
-)
-
-
-def differentiated(t: Array, q: Array) -> Array:
-    """Velocities of positions, causal: the change over the last three samples, shape (T, n)."""
-    rows = np.arange(len(t))
-    before = np.maximum(rows - 3, 0)
-    span = np.maximum(t[rows] - t[before], 1e-9)[:, None]
-    return np.asarray((q[rows] - q[before]) / span)
-
-
-def header_of(first: Sequence[str]) -> list[str]:
-    """The names in a first line, empty if it is a line of numbers.
-
-    Raises:
-        LogError: most cells are numbers, but not all: the line is damaged.
-    """
-    cells = [cell.strip() for cell in first]
-    names = [cell for cell in cells if cell and number(cell) is None]
-    if names and 2 * len(names) < len([cell for cell in cells if cell]):
-        at = cells.index(names[0])
-        raise LogError(f"line 1, column {at}: {names[0][:40]!r} is not a number")
-    return cells if names else []
-
-
-def named(names: Sequence[str], joints: int) -> tuple[str, ...]:
-    """Joint names, or ``joint_1``, ... if there are none."""
-    if names and len(names) != joints:
-        raise LogError(f"{len(names)} joint names for {joints} joints in the log")
-    return tuple(names) or tuple(f"joint_{i}" for i in range(1, joints + 1))
-
-
-def number(cell: str) -> float | None:
-    """A cell as a number, or None."""
-    try:
-        return float(cell)
-    except ValueError:
-        return None
-
-
-def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
-    """Index of a column."""
-    if isinstance(column, int):
-        if column < 0:
-            raise LogError(f"column {column}: indices begin at 0")
-        return column
-    if column not in header:
-        have = listed(header, 200) if header else "no header line"
-        raise LogError(f"no column {column!r}; the file has: {have}")
-    return header.index(column)
-
-
-def column_text(column: int, header: Sequence[str]) -> str:
-    """A column by its name, or by its number if there are no names."""
-    return f"column {header[column]!r}" if header else f"column {column} (counted from 0)"
-
-
-def listed(names: Sequence[str], length: int) -> str:
-    """As many names as fit into ``length`` characters."""
-    return shorten(", ".join(names), length, placeholder=" ...")
-
-
-def parse(
-    rows: Sequence[tuple[int, list[str]]],
-    wanted: Sequence[int],
-    width: int,
-    columns: ColumnMap,
-    header: Sequence[str] = (),
-) -> tuple[Array, NDArray[np.int64], list[Finding]]:
-    """The wanted columns of all rows that are kept, shape (R, columns), line numbers, and notes."""
-    if max(wanted) >= width:
-        raise LogError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
-    values: list[list[float]] = []
-    lines: list[int] = []
-    dropped: list[int] = []
-    notes: list[Finding] = []
-    for index, (line, row) in enumerate(rows):
-        if len(row) != width:
-            if index == len(rows) - 1 and len(row) < width and "tail" in columns.repair:
-                text = f"line {line}: cut off ({len(row)} of {width} columns), left out"
-                notes.append(note("rows-left-out", text))
-                continue
-            cut = len(row) < width and index == len(rows) - 1
-            more = '; to leave the last row out, say `mend="tail"`' if cut else ""
-            text = f"line {line}: {len(row)} columns, expected {width}{more}"
-            raise LogError(cause("rows", text))
-        try:
-            cells = [float(row[i]) for i in wanted]
-            if all(map(isfinite, cells)):
-                values.append(cells)
-                lines.append(line)
-                continue
-        except ValueError:
-            pass
-        _lacking(row, wanted, line, columns, header)
-        dropped.append(line)
-    if dropped:
-        text = f"{len(dropped)} rows without finite numbers left out, first: line {dropped[0]}"
-        notes.append(note("rows-left-out", text))
-    table = np.array(values, np.float64).reshape(len(values), len(wanted))
-    return table, np.array(lines, np.int64), notes
-
-
-def _lacking(
-    row: Sequence[str], wanted: Sequence[int], line: int, columns: ColumnMap, header: Sequence[str]
-) -> None:
-    """Refuse a row with a cell that is no finite number, unless "nan" is an allowed repair."""
-    for i in wanted:
-        cell, value = row[i].strip(), number(row[i])
-        if value is not None and isfinite(value):
-            continue
-        said = f"{row[i]!r} is not a number" if value is None else f"{cell}, not finite"
-        if cell and value is None:
-            raise LogError(cause("rows", f"line {line}, {column_text(i, header)}: {said}"))
-        if "nan" not in columns.repair:
-            text = (
-                f"line {line}, {column_text(i, header)}: {said}; to leave such rows out, say "
-                '`mend="nan"` (where they last longer than 0.05 s, cut the log in two instead)'
-            )
-            raise LogError(cause("rows", text))
+def _of_effort(trace: Trace, torque: bool) -> Trace:
+    return replace(trace, meta={**trace.meta, "effort": "torque"}) if torque else trace

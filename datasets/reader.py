@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 from tauguard.datasets.columns_of_shards import trace_of
 from tauguard.datasets.dataset_folder import HEAD, arm_texts, arm_xml, configuration_in, shards
 from tauguard.datasets.dataset_folder import arms_of as arms_in
-from tauguard.datasets.logs import read_file
+from tauguard.datasets.log_table import Options
+from tauguard.datasets.logs import read_source
 from tauguard.datasets.shard import data_path, manifest_path, read_lines
 from tauguard.findings import FileError
 from tauguard.traces import Trace
@@ -64,7 +65,7 @@ def read(
     if not files:
         raise FileError(f"{path}: no dataset and no recordings ({', '.join(ENDINGS)}) in it")
     for file in files:
-        yield read_file(file).trace
+        yield read_source(file, file.name, Options()).trace
 
 
 def splits_of(folder: Path, wanted: Sequence[str] | None) -> tuple[str, ...]:

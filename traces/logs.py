@@ -179,7 +179,8 @@ class Logs(Result, Mapping[str, Log]):
         seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in self.traces)
         count = "1 log" if len(self) == 1 else f"{len(self)} logs"
         robot = "simulated arm" if self.robot is None else self.robot.name
-        return f"Logs({count}, {seconds:.0f} s, {robot}, {len(self.findings)} findings)"
+        doubts = "1 finding" if len(self.findings) == 1 else f"{len(self.findings)} findings"
+        return f"Logs({count}, {seconds:.0f} s, {robot}, {doubts})"
 
 
 def cut(trace: Trace, rows: slice) -> Trace:

@@ -6,7 +6,8 @@ import pytest
 from tauguard import read_log
 from tauguard.datasets.arm_logs import reduced
 from tauguard.datasets.columns import PRESETS, ColumnMap
-from tauguard.datasets.logs import read_csv, read_file
+from tauguard.datasets.log_table import Options
+from tauguard.datasets.logs import read_source
 from tauguard.datasets.recognition import described, grouped, lacking, recognised
 from tauguard.traces import Log, Trace
 
@@ -172,7 +173,7 @@ def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp
     names = ["t", *columns.q, *columns.qd, *columns.torque]
     speed = np.where((rows >= 300) & (rows < 400), 0.0, 1.0)[:, None] * qd[source]
     path = written(tmp_path / "log.csv", names, t, q[source], speed, tau[source])
-    log = read_csv(path, columns, None)
+    log = read_log(path, columns)
     # Every second row, but every third while it stands.
     assert len(log.trace.t) == pytest.approx(275, abs=10)
     assert np.diff(log.trace.t).max() <= 0.015 + 1e-9
@@ -331,7 +332,7 @@ def test_names_of_the_robot_s_joints_decide_before_numbers(tmp_path, q, i):
     names = [*(q.format(RAIL[k]) for k in order), *(i.format(RAIL[k].upper()) for k in order)]
     values = (parts[0][:, order], parts[2][:, order])
     path = written(tmp_path / "log.csv", ["time [s]", *names], t, *values)
-    trace = read_file(path, "auto", robot_joints=RAIL).trace
+    trace = read_source(path, "log", Options("auto", robot_joints=RAIL)).trace
     assert trace.joint_names == RAIL
     np.testing.assert_allclose(trace.q, parts[0], atol=1e-8)
     np.testing.assert_allclose(trace.current, parts[2], atol=1e-8)
@@ -352,7 +353,7 @@ def test_a_refusal_says_what_was_found_and_what_was_not(tmp_path):
     path = written(tmp_path / "log.csv", names, t, q, i)
     said = r"found time: t; positions: q_A1 to q_A2 \(2\).*; not found: the joints of q_rail"
     with pytest.raises(ValueError, match=said):
-        read_file(path, "auto", robot_joints=("x", "y", "z"))
+        read_source(path, "log", Options("auto", robot_joints=("x", "y", "z")))
     said = lacking(names[:-1], axes)
     assert said.endswith("currents: i_rail to i_A1 (2); not found: currents of A2")
     assert lacking(["t", "a", "b"]) == (

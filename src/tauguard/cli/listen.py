@@ -166,7 +166,6 @@ def opened(
     alarm: CollisionAlarm,
 ) -> Any:
     """The connected source that the flags name."""
-    from tauguard.datasets.logs import read_file
     from tauguard.live import LineStream, PlayedStream, UrStream
 
     names, dt = alarm.detector.arm.robot.joint_names, alarm.detector.dt
@@ -175,9 +174,12 @@ def opened(
     if play is not None:
         from tauguard.cli.help_text import print_notes
         from tauguard.datasets.columns import column_map
+        from tauguard.datasets.log_table import Options
+        from tauguard.datasets.logs import read_source
         from tauguard.detectors.calibration.joints import matched
 
-        log = read_file(play, column_map(columns), names, robot_joints=names)
+        options = Options(column_map(columns), names, robot_joints=names)
+        log = read_source(play, play.name, options)
         print_notes(f"{play.name}: {note.text}" for note in log.findings)
         return PlayedStream(matched(log.trace, names))
     if ros is not None:
