@@ -12,8 +12,7 @@ from pathlib import Path
 from tauguard.datasets.dataset_folder import configuration_in
 from tauguard.datasets.plans import BEGIN
 from tauguard.datasets.reader import read, splits_of
-from tauguard.detectors.evaluation.matching import Matching, match
-from tauguard.detectors.events import MERGE_GAP
+from tauguard.detectors.evaluation.matching import Matching, match, merged
 from tauguard.findings import FileError
 from tauguard.traces import Alarm
 
@@ -21,7 +20,7 @@ COLUMNS = ("episode", "start", "end")
 
 
 def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
-    """The alarms of each episode, in order; alarms less than 0.5 s apart are merged.
+    """The alarms of each episode, in order; alarms less than 0.2 s apart are merged.
 
     Raises:
         FileError: other columns, or a line with a wrong value; the message names file and line.
@@ -41,7 +40,7 @@ def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
                 found.setdefault(row["episode"].strip(), []).append(alarm)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileError(f"{path}: not a CSV file ({error})") from None
-    return {name: _merged(alarms) for name, alarms in found.items()}
+    return {name: merged(alarms) for name, alarms in found.items()}
 
 
 def judged_alarms(
@@ -92,13 +91,3 @@ def _alarm(row: dict[str, str], where: str) -> Alarm:
     if not (0 <= start <= end < math.inf) or None in row:
         raise FileError(f"{where}: expected an episode and two times in seconds, start <= end")
     return Alarm(start, end)
-
-
-def _merged(alarms: list[Alarm]) -> tuple[Alarm, ...]:
-    merged: list[Alarm] = []
-    for alarm in sorted(alarms, key=lambda a: a.start):
-        if merged and alarm.start - merged[-1].end < MERGE_GAP:
-            merged[-1] = Alarm(merged[-1].start, max(merged[-1].end, alarm.end))
-        else:
-            merged.append(alarm)
-    return tuple(merged)

@@ -1,9 +1,9 @@
 """Definition of an alarm, and the collision-free rows of a trace.
 
 The alarm series is True where the score has been above the threshold for the confirmation time t_c.
-An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm detects a
-collision if it starts between the onset and 0.5 s later or, for a clamping, its end if that is
-later.
+An alarm is a maximal run of True; alarms close to each other are one. An alarm detects a collision
+if it starts between the onset and 0.5 s later; :mod:`~tauguard.detectors.evaluation.matching` has
+the whole rule.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def sustained(score: Array, samples: int) -> Array:
     return lowest
 
 
-#: Alarms less than this apart are one [s]. The false-alarm rate depends on it by up to a factor 4.
+#: Alarms of a detection less than this apart are one event for a reader [s].
 MERGE_GAP = 0.5
 #: Longest time from the onset of a collision to an alarm that detects it [s].
 WINDOW = 0.5
@@ -93,12 +93,8 @@ def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) ->
 
 
 def detection_window(collision: Collision) -> Interval:
-    """First and last time at which an alarm that detects ``collision`` can start [s].
-
-    A clamping can be detected until its end, and at least for :data:`WINDOW`.
-    """
-    soon = collision.onset + WINDOW
-    return collision.onset, max(collision.end, soon) if collision.kind == "clamp" else soon
+    """First and last time at which an alarm that detects ``collision`` can start [s]."""
+    return collision.onset, collision.onset + WINDOW
 
 
 def occupied(collision: Collision) -> Interval:

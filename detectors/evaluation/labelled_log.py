@@ -1,23 +1,18 @@
 """Alarms in a log compared with contacts that a column of the log labels."""
 
 from collections.abc import Sequence
+from math import isfinite
 from statistics import median
 from typing import Any
 
+from tauguard.detectors.evaluation.matching import Contact, count
 from tauguard.traces import Alarm
-
-#: An alarm that starts within this time after the onset of a contact detects it [s].
-LATE = 0.5
 
 
 def compare_with_labels(
     alarms: Sequence[Alarm], touched: Sequence[tuple[float, float]], begin: float, end: float
 ) -> dict[str, Any]:
-    """Compare alarms with labelled contacts.
-
-    A contact is found if an alarm begins during it, or within 0.5 s of its onset, and before the
-    next contact. If an earlier alarm is still on at the onset instead, the contact counts as
-    ``still_up``. Any other alarm is false.
+    """Count alarms beside labelled contacts by :func:`~.matching.count`.
 
     Args:
         alarms: in order of time.
@@ -26,37 +21,31 @@ def compare_with_labels(
         end: end of the log [s].
 
     Returns:
-        JSON values: numbers of ``contacts``, ``found``, ``still_up`` and ``false_alarms``; onsets
-        of ``missed`` contacts [s]; ``delays`` of found ones [s]; and ``free_seconds``, the time in
-        which every alarm that begins is false [s].
+        JSON values: numbers of ``contacts``, ``found``, ``still_up``, ``repeats`` and
+        ``false_alarms``; onsets of ``missed`` contacts [s]; ``delays`` of found ones [s]; the
+        number found ``by_chance``; and ``free_seconds``, the time in which every alarm that begins
+        is false [s].
     """
-    onsets = [a for a, _ in touched]
-    windows = [
-        (a, min(max(b, a + LATE), after))
-        for (a, b), after in zip(touched, [*onsets, end][1:], strict=True)
+    contacts = [Contact(first, last, "switch") for first, last in touched]
+    counted = count(alarms, contacts, (begin, end))
+    delays = [delay for delay in counted.delays if isfinite(delay)]
+    missed = [
+        contact.onset
+        for contact, delay, up in zip(
+            counted.contacts, counted.delays, counted.still_up, strict=True
+        )
+        if not (isfinite(delay) or up)
     ]
-    delays, missed, still_up, contacts = [], [], 0, 0
-    for a, last in windows:
-        if a < begin:
-            continue
-        contacts += 1
-        own = [alarm.start - a for alarm in alarms if a <= alarm.start <= last]
-        if own:
-            delays.append(own[0])
-        elif any(alarm.start < a <= alarm.end for alarm in alarms):
-            still_up += 1
-        else:
-            missed.append(a)
-    outside = [x for x in alarms if not any(a <= x.start <= last for a, last in windows)]
-    covered = sum(last - max(a, begin) for a, last in windows if last > begin)
     return {
-        "contacts": contacts,
+        "contacts": len(counted.contacts),
         "found": len(delays),
-        "still_up": still_up,
+        "still_up": sum(counted.still_up),
         "missed": missed,
         "delays": delays,
-        "false_alarms": len(outside),
-        "free_seconds": max(end - begin - covered, 0.0),
+        "by_chance": sum(counted.by_chance),
+        "repeats": len(counted.repeats),
+        "false_alarms": len(counted.false_alarms),
+        "free_seconds": counted.free_seconds,
     }
 
 
@@ -72,7 +61,7 @@ def labels_text(found: dict[str, Any], since: float = 0.0) -> str:
     total = found["contacts"]
     text = f"labels: {total} contact{'' if total == 1 else 's'}, {found['found']} found{when}"
     if found["still_up"]:
-        text += f", {found['still_up']} began during an earlier alarm (not judged)"
+        text += f", {found['still_up']} began during an earlier alarm (not found)"
     missed = [f"{onset - since:.2f}" for onset in found["missed"]]
     text += f", {len(missed)} missed"
     if missed:

@@ -34,14 +34,14 @@ def test_alarms_at_every_onset_find_all_and_nothing_else(tiny, tmp_path):
 def test_a_late_alarm_is_false_and_an_early_one_does_not_count(tiny, tmp_path):
     free = next(t for t in read(tiny, ["test"]) if not t.truth.collisions)
     name = free.meta["episode"]
-    path = written(tmp_path / "a.csv", f"{name},1.0,1.1", f"{name},5.0,5.1", f"{name},5.3,5.4")
+    path = written(tmp_path / "a.csv", f"{name},1.0,1.1", f"{name},5.0,5.1", f"{name},5.25,5.4")
     [(_, matched)] = judged_alarms(tiny, path)
     assert sum(len(one.false_alarms) for one in matched) == 1
 
 
-def test_alarms_less_than_half_a_second_apart_are_one(tmp_path):
-    found = read_alarm_file(written(tmp_path / "a.csv", "x/0,2,2.5", "x/0,1,1.6", "x/0,3,3"))
-    assert [(a.start, a.end) for a in found["x/0"]] == [(1.0, 2.5), (3.0, 3.0)]
+def test_alarms_less_than_a_fifth_of_a_second_apart_are_one(tmp_path):
+    found = read_alarm_file(written(tmp_path / "a.csv", "x/0,2,2.5", "x/0,1,1.85", "x/0,2.75,3"))
+    assert [(a.start, a.end) for a in found["x/0"]] == [(1.0, 2.5), (2.75, 3.0)]
 
 
 @pytest.mark.parametrize(
