@@ -106,11 +106,13 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
         late: a collision found later than this is late [s].
         alarm: the detector; its times are then part of the definitions.
     """
-    from tauguard.detectors.events import MERGE_GAP, WINDOW
+    from tauguard.detectors.events import ALARM_GAP, MERGE_GAP, WINDOW
 
     begin, time = "beginning", "confirmation time"
     if alarm is not None:
         begin, time = f"first {alarm.settle:.3g} s", f"last {1e3 * alarm.confirmation:.3g} ms"
     text = files("tauguard.replay").joinpath("event_terms.html").read_text("utf-8")
     ms = f"{1e3 * late:.0f} ms"
-    return text.format(gap=MERGE_GAP, window=WINDOW, late=ms, begin=begin, time=time)
+    return text.format(
+        gap=MERGE_GAP, apart=ALARM_GAP, window=WINDOW, late=ms, begin=begin, time=time
+    )

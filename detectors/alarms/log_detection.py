@@ -13,7 +13,7 @@ from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.monitor import Span, detect_with_faults
 from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
-from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.features.motion_regimes import SEEN, SHORTLY, motion_regimes, unseen_text
 from tauguard.detectors.scores.free_motion import FittedFreeMotion, Judged
 from tauguard.findings import ArgumentError
@@ -65,7 +65,7 @@ def detect_in_log(alarm: CollisionAlarm, trace: Trace, load_known: bool = False)
     residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, LOG_GAIN)
     monitored = detect_with_faults(alarm, trace)
     detection = replace(monitored.detection, residual=residual)
-    detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
+    detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm))
     strange = bool(detection.alarm[rows].mean() > STRANGE)
     quiet = rows if strange else rows & ~_within(detection.alarms, trace.t, AROUND)
     doubts = check_torques(arm.robot, trace, tau, residual, quiet, touched=strange)

@@ -25,7 +25,7 @@ from tauguard.detectors.calibration.recording import (
     pieces,
 )
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.features.free_bound import (
     Bound,
     friction_levels,
@@ -193,7 +193,7 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
 
 def _alarms_and_level(judged: Judged) -> tuple[tuple[Alarm, ...], float]:
     t, settled = judged.t, judged.t - judged.t[0] > SETTLE
-    alarms = find_alarms(t, (judged.ratio.max(axis=1) > 1) & settled, SERIES)
+    alarms = find_alarms(t, (judged.ratio.max(axis=1) > 1) & settled)
     fraction: Array = np.where(judged.rest, 0.0, np.abs(judged.residual) / judged.bound).max(axis=1)
     rows = settled & ~judged.rest.all(axis=1)
     return alarms, float(np.median(fraction[rows])) if rows.any() else 0.0

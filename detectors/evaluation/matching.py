@@ -25,7 +25,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.alarms.alarm import CollisionAlarm
-from tauguard.detectors.events import CASE_SECONDS, Interval, find_alarms
+from tauguard.detectors.events import ALARM_GAP, CASE_SECONDS, WINDOW, Interval
 from tauguard.findings import ArgumentError
 from tauguard.report import poisson_rate
 from tauguard.report import rate as wilson
@@ -46,8 +46,8 @@ ONSET_ERROR = {
 class Rule:
     """Times of the rule [s]."""
 
-    merge: float = 0.2  #: alarms less than this apart are one
-    window: float = 0.5  #: longest time from an onset to an alarm that finds the contact
+    merge: float = ALARM_GAP  #: alarms less than this apart are one
+    window: float = WINDOW  #: longest time from an onset to an alarm that finds the contact
     recover: float = 1.0  #: time after a release in which alarms are repeats
     shifts: int = 200  #: number of shifts for the result by chance
 
@@ -252,8 +252,7 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
     if detection.t.shape != trace.t.shape:
         raise ArgumentError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
     span = float(min(trace.t[0] + skip, trace.t[-1])), float(trace.t[-1])
-    alarms = find_alarms(detection.t, detection.alarm, Rule.merge)
-    return match(alarms, trace.truth.collisions, span)
+    return match(detection.alarms, trace.truth.collisions, span)
 
 
 def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:

@@ -15,7 +15,7 @@ from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobia
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
 from tauguard.detectors.estimation.observer import LOG_GAIN
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
-from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.features.free_bound import FREE_GAIN
 from tauguard.detectors.features.motion_regimes import motion_regimes
 from tauguard.detectors.scores.free_motion import SETTLE, FittedFreeMotion, Judged
@@ -208,7 +208,7 @@ def replayed(
         limit = np.where(motion_regimes(trace)["starting"], starting, moving)
         ratio = (np.abs(residual) / np.where(np.isfinite(limit), limit, np.inf)).max(axis=1)
         ratio[trace.t - trace.t[0] < detector.settle] = 0.0
-        contacts = find_alarms(trace.t, ratio > 1, SERIES)
+        contacts = find_alarms(trace.t, ratio > 1)
         harder = trace.t[ratio > UPPER]
         lower += len(contacts)
         upper += sum(((harder >= c.start) & (harder <= c.end)).any() for c in contacts)

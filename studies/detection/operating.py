@@ -25,7 +25,7 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.alarms.training import normalised
 from tauguard.detectors.calibration.nominal import nominal_design
-from tauguard.detectors.evaluation.matching import Matching, Rule
+from tauguard.detectors.evaluation.matching import Matching
 from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.traces import Collision, Trace
@@ -203,7 +203,7 @@ def _matched(
     for name, own in fleet.items():
         levels = own.sustained(trace)
         for point, threshold in own.thresholds.items():
-            alarms = find_alarms(trace.t, levels[point] > threshold, Rule.merge)
+            alarms = find_alarms(trace.t, levels[point] > threshold)
             yield (name, point), match(alarms, true, span)
 
 

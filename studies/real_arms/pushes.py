@@ -29,7 +29,7 @@ from studies.real_arms.arms import ArmData, Push, Touched, available, nominal, r
 from tauguard.detectors import ArmModel, poisson_rate
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Recording
-from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.scores.free_motion import (
     CONFIRMATION,
     SETTLE,
@@ -164,7 +164,7 @@ def count(
     If every contact is labelled, alarms outside of them are false.
     """
     t = trace.t - trace.t[0]
-    starts = np.array([one.start for one in find_alarms(t, alarm, SERIES)])
+    starts = np.array([one.start for one in find_alarms(t, alarm)])
     shifted = (starts + rng.uniform(0, t[-1], (SHIFTS, 1))) % t[-1]
     inside = np.zeros(len(starts), dtype=np.bool_)
     for push in known or ():

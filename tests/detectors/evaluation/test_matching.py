@@ -17,7 +17,8 @@ def logs(draw):
     times = sorted(draw(st.sets(TICKS, max_size=10)))
     truth = draw(st.sampled_from(sorted(ONSET_ERROR)))
     ends = [
-        min(a + draw(st.integers(0, 30)), b) for a, b in zip(times, [*times[1:], 400][: len(times)], strict=True)
+        min(a + draw(st.integers(0, 30)), b)
+        for a, b in zip(times, [*times[1:], 400][: len(times)], strict=True)
     ]
     contacts = [Contact(a / 20, b / 20, truth) for a, b in zip(times, ends, strict=True)]
     ups = draw(st.lists(st.tuples(TICKS, st.integers(0, 40)), max_size=12))

@@ -13,7 +13,7 @@ from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.evaluation.card_page import text
 from tauguard.detectors.evaluation.cross_validation import CrossValidation, judge_logs
 from tauguard.detectors.evaluation.threshold_card import replayed, threshold_card
-from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.features.free_bound import CREEP, friction_levels
 from tauguard.detectors.features.motion_regimes import exceeded
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
@@ -215,7 +215,7 @@ def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
 def test_a_push_of_seconds_is_one_event_until_it_is_let_go(alarm):
     trace = record(7, dwell=(6.0, 30.0))
     held = add_contact(trace, GAIN, Added(12.0, 5.0, (20.0, 12.0, 6.0), "push"))
-    events = find_alarms(trace.t, alarm.detect(held).alarm, SERIES)
+    events = find_alarms(trace.t, alarm.detect(held).alarm)
     assert len(events) == 1
     assert 12.0 < events[0].start < 12.4
     assert 16.2 < events[0].end < 17.0  # its force falls from 16 to 17 s
@@ -226,7 +226,7 @@ def test_touches_that_follow_each_other_by_0_3_s_are_each_an_event(alarm):
     onsets = np.arange(13.0, 19.0, 0.8)
     for onset in onsets:
         trace = add_contact(trace, GAIN, Added(float(onset), 0.5, (16.0, 12.0, 8.0), "push"))
-    events = find_alarms(trace.t, alarm.detect(trace).alarm, SERIES)
+    events = find_alarms(trace.t, alarm.detect(trace).alarm)
     assert len(events) == len(onsets)
     assert all(o < e.start < o + 0.2 for o, e in zip(onsets, events, strict=True))
     assert all(e.end < o + 0.6 for o, e in zip(onsets, events, strict=True))
@@ -242,7 +242,7 @@ def test_a_joint_that_hunts_hides_no_push_on_another(alarm):
     trace = replace(trace, current=trace.current + hunting)
 
     def starts(t):
-        return [one.start for one in find_alarms(t.t, alarm.detect(t).alarm, SERIES)]
+        return [one.start for one in find_alarms(t.t, alarm.detect(t).alarm)]
 
     assert sum(start > 12.0 for start in starts(trace)) < 10  # of 24 ramps
     onsets = np.arange(13.3, 28.0)
