@@ -5,17 +5,19 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import geom_kinds
 from tauguard.findings import ArgumentError
+from tauguard.rigid.imports import hull_rows
 
-#: Native numbers of shapes, by kind of geom.
-_CORES = {"plane": 0, "sphere": 1, "capsule": 2, "ellipsoid": 3, "cylinder": 4, "box": 5, "mesh": 6}
+#: Numbers of the native kinds of bodies (``rigid/include/tauguard/rigid/bodies.hpp``) of geoms.
+NATIVE_KINDS = {
+    "plane": 5, "sphere": 6, "capsule": 7, "ellipsoid": 8, "cylinder": 9, "box": 1, "mesh": 3,
+}  # fmt: skip
 #: Kinds of geoms with a native shape.
-CONVEX = tuple(_CORES)
+CONVEX = tuple(NATIVE_KINDS)
 _NONE = np.zeros((0, 3))
 
 
@@ -34,7 +36,7 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
     kinds = geom_kinds(model)
     for geom in geoms:
         kind = kinds[int(geom)]
-        if kind not in _CORES:
+        if kind not in NATIVE_KINDS:
             raise ArgumentError(
                 f"{checker}: geom {geom_name(model, int(geom))} is a {kind}; this checker handles "
                 f"{', '.join(CONVEX)} (skip=({kind!r},) excludes this kind)"
@@ -58,20 +60,6 @@ def hull_vertices(model: Any, geom: int) -> Array:
     return np.asarray(model.mesh_vert[rows], dtype=np.float64)
 
 
-def hull_rows(model: Any, mesh: int) -> NDArray[np.int64]:
-    """Rows of ``mjModel.mesh_vert`` that are vertices of the convex hull of a mesh.
-
-    MuJoCo stores the graph of the hull in ``mjModel.mesh_graph``. For a mesh without a graph the
-    rows of all its vertices are returned; they have the same hull.
-    """
-    start, graph = int(model.mesh_vertadr[mesh]), int(model.mesh_graphadr[mesh])
-    if graph < 0:
-        return np.arange(start, start + int(model.mesh_vertnum[mesh]))
-    number = int(model.mesh_graph[graph])
-    local = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
-    return start + np.asarray(local, dtype=np.int64)
-
-
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
     size = model.geom_size[geom].astype(np.float64)
     radius = float(size[0]) if kind in ("sphere", "capsule") else 0.0
@@ -83,7 +71,7 @@ def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
     elif kind == "box":
         normals = edges = np.eye(3)
     scene.add(
-        _CORES[kind],
+        NATIVE_KINDS[kind],
         size,
         radius,
         int(model.geom_bodyid[geom]),

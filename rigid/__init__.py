@@ -1,16 +1,17 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.queries import PlaneCache, sweep
 from tauguard.rigid.results import Distances, Impacts, MeshDistances, MeshImpacts, Overlap, Witness
 from tauguard.rigid.rounded import Capsules, Rounded, Spheres
-from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
+from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Shape, Tetrahedra
 from tauguard.rigid.solids_and_meshes import distance, overlap, time_of_impact
 
 __all__ = [
-    "Boxes", "Capsules", "Distances", "Hulls", "Impacts", "MeshContacts", "MeshDistances",
-    "MeshImpacts", "MeshOverlap", "MeshTree", "Motion", "Overlap", "Parallelepipeds", "PlaneCache",
-    "Polygons", "Rounded", "Spheres", "Tetrahedra", "Witness", "distance", "overlap", "sweep",
-    "time_of_impact",
+    "Boxes", "Capsules", "Cones", "Cylinders", "Distances", "Ellipsoids", "HalfSpaces", "Hulls",
+    "Impacts", "MeshContacts", "MeshDistances", "MeshImpacts", "MeshOverlap", "MeshTree", "Motion",
+    "Overlap", "Parallelepipeds", "PlaneCache", "Polygons", "Rounded", "Shape", "Spheres",
+    "Tetrahedra", "Witness", "distance", "overlap", "sweep", "time_of_impact",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen_finite
-from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
+from tauguard.rigid.shapes import FROM_QUATERNIONS, ORTHONORMAL_TOLERANCE, not_orthonormal
 
 #: Largest component of the rotation vector of a step [rad]. Computing time and the rounding error
 #: of the angle grow with the rotation.
@@ -26,6 +26,15 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
             row.
     """
     raw = np.asarray(value)
+    if raw.shape[-1:] in ((4,), (7,)) and raw.ndim < 3 and raw.shape != (4, 4):
+        raise ArgumentError(
+            f"{name}: shape {raw.shape}, expected (N, 4, 4) or (4, 4); {FROM_QUATERNIONS}"
+        )
+    if raw.shape[-2:] == (3, 3):
+        raise ArgumentError(
+            f"{name}: shape {raw.shape}, expected (N, 4, 4) or (4, 4); for rotations alone set "
+            "pose[:, :3, :3] of np.tile(np.eye(4), (N, 1, 1))"
+        )
     batch = frozen_finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
     bottom = (batch[:, 3] != (0.0, 0.0, 0.0, 1.0)).any(axis=1)
     if bottom.any():
@@ -37,11 +46,21 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
         bad = ~(off <= ORTHONORMAL_TOLERANCE) | (np.linalg.det(rotation) < 0)
     if bad.any():
         row = int(np.argmax(bad))
+        if off[row] <= ORTHONORMAL_TOLERANCE:
+            raise ArgumentError(
+                f"{name}: the rotation in row {row} is a reflection (determinant -1); "
+                "reverse one axis"
+            )
         raise ArgumentError(
-            f"{name}: the rotation in row {row} is not proper orthonormal "
-            f"(R^T R differs from I by {off[row]:.3g}, allowed is {ORTHONORMAL_TOLERANCE:g})"
+            f"{name}: the rotation in row {row} is not proper orthonormal: "
+            f"{not_orthonormal(rotation[row])}"
         )
     return batch
+
+
+def optional_poses(name: str, value: ArrayLike | None) -> NDArray[np.float64] | None:
+    """As :func:`poses`; ``None`` stays ``None``."""
+    return None if value is None else poses(name, value)
 
 
 @dataclass(frozen=True, eq=False)

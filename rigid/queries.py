@@ -9,7 +9,7 @@ Both run in floating point with derived error bounds. Exact arithmetic decides t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Sized
 from contextlib import contextmanager
 from threading import Lock
 from typing import Literal, get_args
@@ -20,11 +20,23 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.findings import ArgumentError
 from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
+from tauguard.rigid.motion import common_length, optional_poses
 from tauguard.rigid.results import Impacts, Overlap, Witness
-from tauguard.rigid.rounded import Capsules, Rounded, Spheres
-from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
+from tauguard.rigid.rounded import no_body
+from tauguard.rigid.shapes import (
+    SHARP,
+    Bodies,
+    Boxes,
+    Hulls,
+    Parallelepipeds,
+    Polygons,
+    Shape,
+    Tetrahedra,
+)
 
 SweepMethod = Literal["abfme", "sat", "auto"]
+#: Checked poses (N, 4, 4), or none.
+Poses = NDArray[np.float64] | None
 
 #: Number of a method in the native module; ``exact`` is for studies and tests.
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "exact": 4}
@@ -38,10 +50,20 @@ def check_method(method: object, known: Sequence[str]) -> None:
         raise ArgumentError(f"method: {given}, expected one of {', '.join(known)}")
 
 
-def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
-    """Whether bodies without radii share a point; ``method`` as in the public ``overlap``."""
-    hit = native_overlap(a, b, method, threads)[0]
-    return Overlap(hit, lambda: find_witness(a, b, hit, threads))
+def sharp_overlap(
+    a: Bodies, b: Bodies, method: str, threads: int, pose_a: Poses = None, pose_b: Poses = None
+) -> Overlap:
+    """Whether bodies without radii share a point; arguments as in the public ``overlap``."""
+    if pose_a is None and pose_b is None:
+        hit = native_overlap(a, b, method, threads)[0]
+    else:
+        if method == "sat":
+            refuse_hulls(a, b)
+        out = np.empty(rows(a, b, pose_a, pose_b), dtype=np.uint8)
+        first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+        _rigid.overlap_posed(first, second, _METHODS[method], thread_count(threads), out)
+        hit = out.view(np.bool_)
+    return Overlap(hit, lambda: find_witness(a, b, hit, threads, pose_a, pose_b))
 
 
 def native_overlap(
@@ -70,11 +92,19 @@ def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> i
 
 
 def sweep(
-    a: Bodies, b: Bodies, displacement: ArrayLike, method: SweepMethod = "auto", threads: int = 1
+    a: Bodies,
+    b: Bodies,
+    displacement: ArrayLike,
+    method: SweepMethod = "auto",
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
 ) -> Impacts:
     """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 
-    For two meshes use :meth:`MeshTree.sweep`; for bodies that rotate, :func:`time_of_impact`.
+    For two meshes use :meth:`MeshTree.sweep`. For bodies that rotate, with radii, or curved, use
+    :func:`time_of_impact`.
 
     Args:
         a: N bodies of one kind at rest, or one.
@@ -85,6 +115,8 @@ def sweep(
             axes for both. ``auto`` is the faster of the two. With each method, ``hit`` is exact
             and ``time_of_impact`` is never late.
         threads: 0 means all processors; the answer does not depend on it.
+        pose_a: Poses of the bodies ``a``, as for :func:`tauguard.rigid.distance`.
+        pose_b: Poses of the bodies ``b`` at t = 0.
 
     Returns:
         ``hit``, ``time_of_impact``, ``point`` and ``normal`` (from a to b; NaN where they overlap
@@ -94,16 +126,33 @@ def sweep(
         ArgumentError: lengths or shapes that do not match, an entry that is not finite, an unknown
             method.
     """
-    count = rows(a, b)
+    at_a, at_b = optional_poses("pose_a", pose_a), optional_poses("pose_b", pose_b)
+    given = np.asarray(displacement)
+    most = len(given) if given.ndim == 2 else 1
+    count = rows(a, b, at_a, at_b, most)
     if isinstance(a, Polygons):
         raise ArgumentError("a: Polygons, expected bodies in space; give them thickness as Hulls")
     check_method(method, get_args(SweepMethod))
-    given = np.asarray(displacement)
     moves = frozen_finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
     if len(moves) not in (1, count):
         raise ArgumentError(f"displacement: {len(moves)} rows, expected {count} or 1")
-    hit, out, _ = native_sweep(a, b, moves, method, threads)
+    if at_a is None and at_b is None and max(len(a), len(b)) == count:
+        hit, out, _ = native_sweep(a, b, moves, method, threads)
+    else:
+        hit, out = _posed_sweep(a, b, moves, method, threads, at_a, at_b, count)
     return Impacts(hit, out[:, 0], out[:, 1:4], out[:, 4:7])
+
+
+def _posed_sweep(
+    a: Bodies, b: Bodies, displacement: NDArray[np.float64], method: str, threads: int,
+    pose_a: Poses, pose_b: Poses, count: int,
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:  # fmt: skip
+    moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
+    hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))
+    first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+    workers = thread_count(threads)
+    _rigid.sweep_posed(first, second, moves, _METHODS[method], workers, hit, out)
+    return hit.view(np.bool_), out
 
 
 def native_sweep(
@@ -134,35 +183,64 @@ def portable() -> Iterator[None]:
         _rigid.allow_vectors(True)
 
 
-def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
+def find_witness(
+    a: Bodies,
+    b: Bodies,
+    hit: NDArray[np.bool_],
+    threads: int = 1,
+    pose_a: Poses = None,
+    pose_b: Poses = None,
+) -> Witness:
     """A common point or a separating plane of each row, up to rounding."""
-    out = np.empty((rows(a, b), 7))
-    _rigid.witnesses(a.native, b.native, thread_count(threads), hit.view(np.uint8), out)
+    out = np.empty((len(hit), 7))
+    first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+    _rigid.witnesses(first, second, thread_count(threads), hit.view(np.uint8), out)
     return Witness(out[:, :3], out[:, 3:6], out[:, 6])
 
 
-def rows(a: Bodies, b: Bodies) -> int:
-    """The common number of rows of two batches; a batch of one body fits any number.
+def rows(a: Bodies, b: Bodies, pose_a: Poses = None, pose_b: Poses = None, others: int = 1) -> int:
+    """The common number of rows of two batches and their poses; one body or pose fits any number.
 
     Raises:
-        ArgumentError: not batches of bodies, or lengths that do not match.
+        ArgumentError: not batches of polytopes or of polygons, or lengths that do not match.
     """
     for name, bodies in (("a", a), ("b", b)):
-        if isinstance(bodies, Rounded | Spheres | Capsules):
-            raise ArgumentError(
-                f"{name}: {type(bodies).__name__}, expected bodies without a radius; for bodies "
-                "with radii use overlap, distance, or time_of_impact with a Motion of angular = 0"
-            )
         if type(bodies) not in _KINDS:
-            kinds = ", ".join(kind.__name__ for kind in _KINDS)
-            given = type(bodies).__name__
-            advice = "; for two meshes use MeshTree.sweep" if given == "MeshTree" else ""
-            raise ArgumentError(f"{name}: {given}, expected one of {kinds}{advice}")
+            raise ArgumentError(f"{name}: {_no_polytopes(bodies)}")
     if isinstance(a, Polygons) != isinstance(b, Polygons):
         raise ArgumentError("b: polygons are tested against polygons only; both must be Polygons")
+    for name, pose in (("pose_a", pose_a), ("pose_b", pose_b)):
+        if pose is not None and isinstance(a, Polygons):
+            raise ArgumentError(f"{name}: Polygons are in the plane and take no poses; use Hulls")
+    return row_count(a, b, pose_a, pose_b, others)
+
+
+def row_count(a: Sized, b: Sized, pose_a: Poses, pose_b: Poses, others: int = 1) -> int:
+    """As :func:`rows`, without the test of the kinds."""
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ArgumentError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
-    return max(len(a), len(b)) if len(a) and len(b) else 0
+    count = max(len(a), len(b)) if len(a) and len(b) else 0
+    if pose_a is None and pose_b is None and others == 1:
+        return count
+    lengths = {"pose_a": pose_a, "pose_b": pose_b}
+    given = {name: len(poses) for name, poses in lengths.items() if poses is not None}
+    return common_length({"a, b": count} | given | {"displacement": others})
+
+
+def _no_polytopes(bodies: object) -> str:
+    if isinstance(bodies, Polygons):
+        return no_body(bodies)
+    if isinstance(bodies, Shape):
+        return (
+            f"{type(bodies).__name__}, expected Tetrahedra, Boxes, Parallelepipeds, Hulls or "
+            "Polygons; use overlap, distance, or time_of_impact with a Motion of angular = 0"
+        )
+    if type(bodies).__name__ == "MeshTree":
+        return (
+            "MeshTree, expected convex bodies; use MeshTree.sweep for two meshes, and "
+            "time_of_impact with a Motion of angular = 0 for a mesh and convex bodies"
+        )
+    return no_body(bodies)
 
 
 class PlaneCache:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
-from tauguard.geometry import Rebuilt, frozen_finite, sealed
+from tauguard.geometry import frozen_finite, sealed
+from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces, lengths
 from tauguard.rigid.shapes import (
     SHARP,
     Bodies,
@@ -18,28 +20,19 @@ from tauguard.rigid.shapes import (
     Hulls,
     Parallelepipeds,
     Polygons,
+    Shape,
     Tetrahedra,
 )
 
-Spatial = Tetrahedra | Boxes | Parallelepipeds | Hulls
+#: Bounded bodies in space without radii.
+Spatial = Tetrahedra | Boxes | Parallelepipeds | Hulls | Cylinders | Cones | Ellipsoids
 
 #: Largest coordinate and radius; products of larger ones would overflow.
 MOST_COORDINATE = 1e100
 
 
-def _radius(value: ArrayLike, count: int) -> NDArray[np.float64]:
-    given = np.asarray(value)
-    radius = frozen_finite(
-        "radius", np.broadcast_to(given, (count,)) if given.ndim == 0 else given, (count,)
-    )
-    if (radius < 0).any():
-        row = int(np.argmax(radius < 0))
-        raise ArgumentError(f"radius: {radius[row]} in row {row}; expected 0 or more")
-    return radius
-
-
 @dataclass(frozen=True, eq=False)
-class Rounded(Rebuilt):
+class Rounded(Shape):
     """Convex bodies grown by a ball: every point within ``radius`` of the core.
 
     A rounded box of outer half extents h is ``Rounded(Boxes(center, h - r, rotation), r)``.
@@ -63,14 +56,14 @@ class Rounded(Rebuilt):
         if not isinstance(core, Spatial):
             raise ArgumentError(f"core: {type(core).__name__}, expected convex bodies in space")
         object.__setattr__(self, "core", core)
-        object.__setattr__(self, "radius", _radius(radius, len(core)))
+        object.__setattr__(self, "radius", lengths("radius", radius, len(core)))
 
     def __len__(self) -> int:
         return len(self.core)
 
 
 @dataclass(frozen=True, eq=False)
-class Spheres(Rebuilt):
+class Spheres(Shape):
     """A batch of balls.
 
     Args:
@@ -89,7 +82,7 @@ class Spheres(Rebuilt):
     def __init__(self, center: ArrayLike, radius: ArrayLike) -> None:
         """Check and copy the arrays."""
         object.__setattr__(self, "center", frozen_finite("center", center, (None, 3)))
-        object.__setattr__(self, "radius", _radius(radius, len(self.center)))
+        object.__setattr__(self, "radius", lengths("radius", radius, len(self.center)))
 
     def __len__(self) -> int:
         return len(self.center)
@@ -101,7 +94,7 @@ class Spheres(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Capsules(Rebuilt):
+class Capsules(Shape):
     """Segments grown by a ball; a segment may have length zero.
 
     Args:
@@ -123,7 +116,7 @@ class Capsules(Rebuilt):
         """Check and copy the arrays."""
         object.__setattr__(self, "start", frozen_finite("start", start, (None, 3)))
         object.__setattr__(self, "end", frozen_finite("end", end, (len(self.start), 3)))
-        object.__setattr__(self, "radius", _radius(radius, len(self.start)))
+        object.__setattr__(self, "radius", lengths("radius", radius, len(self.start)))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -135,10 +128,10 @@ class Capsules(Rebuilt):
         return Hulls(points, 2 * np.arange(len(self) + 1))
 
 
-Solid = Bodies | Rounded | Spheres | Capsules
+Solid = Bodies | Cylinders | Cones | Ellipsoids | HalfSpaces | Rounded | Spheres | Capsules
 
 
-def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
+def parts(solid: Solid) -> tuple[Any, NDArray[np.float64]]:
     """The core of a batch and the radii; a single zero for bodies without radii."""
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
@@ -147,24 +140,33 @@ def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
 
 def solid_parts(
     name: str, solid: Solid, most: float = MOST_COORDINATE
-) -> tuple[Bodies, NDArray[np.float64]]:
+) -> tuple[Spatial | HalfSpaces, NDArray[np.float64]]:
     """Core and radii of three-dimensional bodies.
 
     Raises:
         ArgumentError: not a batch of bodies, polygons, or a number beyond ``most``.
     """
     core, radius = parts(solid)
-    if isinstance(core, Polygons):
-        raise ArgumentError(
-            f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
-        )
-    if not isinstance(core, Spatial):
-        kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
-        triangles = hasattr(core, "vertices") and hasattr(core, "faces")
-        way = "; a mesh is MeshTree(mesh.vertices, mesh.faces)" if triangles else ""
-        raise ArgumentError(f"{name}: {type(core).__name__}, expected one of {kinds}{way}")
+    if not isinstance(core, Spatial | HalfSpaces):
+        raise ArgumentError(f"{name}: {no_body(core)}")
     if core.largest > most or (radius is not SHARP and radius.max(initial=0.0) > most):
         raise ArgumentError(
             f"{name}: a number beyond {most:g}; scale the scene down".replace("+", "")
         )
     return core, radius
+
+
+def no_body(value: object) -> str:
+    """What ``value`` is, and what would work in its place."""
+    if isinstance(value, Polygons):
+        return "Polygons, expected bodies in space; give them thickness as Hulls"
+    kinds = (
+        "Tetrahedra, Boxes, Parallelepipeds, Hulls, Cylinders, Cones, Ellipsoids, HalfSpaces, "
+        "Rounded, Spheres, Capsules, MeshTree"
+    )
+    way = ""
+    if hasattr(value, "vertices") and hasattr(value, "faces"):
+        way = "; a mesh is MeshTree(mesh.vertices, mesh.faces), its hull Hulls.from_trimesh(mesh)"
+    elif type(value).__module__.startswith("coal"):
+        way = "; Shape.from_coal(shape) converts it"
+    return f"{type(value).__name__}, expected one of {kinds}{way}"

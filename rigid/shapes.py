@@ -1,4 +1,4 @@
-"""Batches of convex bodies on plain arrays: tetrahedra, boxes, parallelepipeds, hulls, polygons.
+"""Batches of polytopes on plain arrays: tetrahedra, boxes, parallelepipeds, hulls, polygons.
 
 A batch has N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
 thickness, a single point. Lengths may be in any unit; both sides of a query must use the same one.
@@ -7,9 +7,10 @@ A batch has its own immutable copy of its arrays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,22 +25,108 @@ ORTHONORMAL_TOLERANCE = 1e-6
 #: The radii of bodies without radii.
 SHARP = np.zeros(1)
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
+_S = TypeVar("_S", bound="Shape")
 
 
-class _Batch(Rebuilt):
-    """A batch of bodies."""
+class Shape(Rebuilt):
+    """A batch of N convex bodies of one kind.
+
+    ``len(bodies)`` is N. ``bodies[i]``, a slice, an array of rows and a mask give batches again,
+    and a loop over ``bodies`` gives batches of one body.
+    """
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    def __getitem__(self, rows: int | slice | ArrayLike) -> Self:
+        """The bodies of some rows, as a batch.
+
+        Raises:
+            IndexError: a row that does not exist.
+        """
+        index = np.atleast_1d(
+            np.arange(len(self))[rows if isinstance(rows, slice) else _index(rows)]
+        )
+        return self._at(index)
+
+    def __iter__(self) -> Iterator[Self]:
+        return (self[i] for i in range(len(self)))
+
+    def _at(self, index: NDArray[np.int64]) -> Self:
+        return type(self)(*(getattr(self, f.name)[index] for f in fields(self) if f.init))  # type: ignore[arg-type]
+
+    @classmethod
+    def from_trimesh(cls, meshes: Any) -> Self:
+        """The convex hulls of one or more ``trimesh.Trimesh``.
+
+        Raises:
+            ArgumentError: objects that are no meshes, or a class that does not include hulls.
+        """
+        from tauguard.rigid.imports import from_trimesh
+
+        return _expected(cls, from_trimesh(meshes))
+
+    @classmethod
+    def from_mujoco(cls, model: Any, geoms: Any) -> Self:
+        """Geoms of a MuJoCo model, in the frames of their bodies (``pose=`` is the body's pose).
+
+        Args:
+            model: MjModel.
+            geoms: A name or id, or several of the same type. ``Shape.from_mujoco`` takes any type.
+
+        Raises:
+            ArgumentError: geoms of several types or of a type without a convex shape (named), a
+                name that the model does not have, or a type that is not this class.
+        """
+        from tauguard.rigid.imports import from_mujoco
+
+        return _expected(cls, from_mujoco(model, geoms))
+
+    @classmethod
+    def from_coal(cls, shapes: Any) -> Self:
+        """One or more shapes of coal, of one class, in their own frames.
+
+        Raises:
+            ArgumentError: several classes, a class without a counterpart, or one that is not this.
+        """
+        from tauguard.rigid.imports import from_coal
+
+        return _expected(cls, from_coal(shapes))
+
+
+def _index(rows: Any) -> Any:
+    index = np.asarray(rows)
+    return index if index.size else index.astype(np.int64)
+
+
+def _expected(cls: type[_S], bodies: Shape) -> _S:
+    if not isinstance(bodies, cls):
+        kind = type(bodies).__name__
+        raise ArgumentError(
+            f"{cls.__name__}: these are {kind}; use {kind} or Shape, which takes every kind"
+        )
+    return bodies
+
+
+class Core(Shape):
+    """A batch of bodies without radii."""
 
     #: Number of this kind of bodies in native code.
     kind: ClassVar[int]
 
-    def grown(self, radius: NDArray[np.float64]) -> _rigid.Batch:
+    def grown(
+        self, radius: NDArray[np.float64], poses: NDArray[np.float64] | None = None
+    ) -> _rigid.Batch:
         """The native form of the bodies grown by balls, with one radius per body or one for all."""
-        return _rigid.Batch(self.kind, self.packed, getattr(self, "offsets", _NO_OFFSETS), radius)
+        if radius is SHARP and poses is None:
+            return self.native
+        offsets = getattr(self, "offsets", _NO_OFFSETS)
+        return _rigid.Batch(self.kind, self.packed, offsets, radius, poses)
 
     @cached_property
     def native(self) -> _rigid.Batch:
         """The native form of the bodies."""
-        return self.grown(SHARP)
+        return _rigid.Batch(self.kind, self.packed, getattr(self, "offsets", _NO_OFFSETS), SHARP)
 
     @property
     def packed(self) -> NDArray[np.float64]:
@@ -53,7 +140,7 @@ class _Batch(Rebuilt):
 
 
 @dataclass(frozen=True, eq=False)
-class Tetrahedra(_Batch):
+class Tetrahedra(Core):
     """Tetrahedra: convex hulls of four points, in any order and orientation.
 
     Args:
@@ -82,7 +169,7 @@ class Tetrahedra(_Batch):
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes(_Batch):
+class Boxes(Core):
     """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
 
     A rotation that is not exactly orthonormal gives a slightly oblique box. Queries are exact for
@@ -91,7 +178,8 @@ class Boxes(_Batch):
     Args:
         center: Shape (N, 3).
         half_extents: Shape (N, 3), zero or more.
-        rotation: Shape (N, 3, 3), body to world; entries of R^T R within 1e-6 of the identity.
+        rotation: Shape (N, 3, 3) or (3, 3), body to world; entries of R^T R within 1e-6 of the
+            identity. ``None``: along the axes.
 
     Raises:
         ArgumentError: wrong shapes or lengths, an entry that is not finite, a negative half extent,
@@ -107,21 +195,17 @@ class Boxes(_Batch):
 
     __repr__ = in_a_line
 
-    def __init__(self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike) -> None:
+    def __init__(
+        self, center: ArrayLike, half_extents: ArrayLike, rotation: ArrayLike | None = None
+    ) -> None:
         """Check and copy the arrays."""
         center = frozen_finite("center", center, (None, 3))
         half_extents = frozen_finite("half_extents", half_extents, (len(center), 3))
-        rotation = frozen_finite("rotation", rotation, (len(center), 3, 3))
+        rotation, skew = rotations("rotation", rotation, len(center))
         if (half_extents < 0).any():
             row, axis = np.argwhere(half_extents < 0)[0]
             raise ArgumentError(
                 f"half_extents: {half_extents[row, axis]} in row {row}; expected 0 or more"
-            )
-        skew, row = _rigid.box_skew(rotation.reshape(-1, 9), ORTHONORMAL_TOLERANCE)
-        if row < len(center):
-            raise ArgumentError(
-                f"rotation: row {row} is not orthonormal: R^T R differs from the identity by more "
-                f"than {ORTHONORMAL_TOLERANCE:g}"
             )
         object.__setattr__(self, "skew", skew)
         object.__setattr__(self, "center", center)
@@ -134,10 +218,7 @@ class Boxes(_Batch):
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """Centre, half extents and rotation (row-major) of a body in one row. Shape (N, 15)."""
-        out = np.empty((len(self), 15))
-        out[:, :3], out[:, 3:6] = self.center, self.half_extents
-        out[:, 6:] = self.rotation.reshape(len(self), 9)
-        return sealed(out)
+        return placed_rows(self.center, self.half_extents, self.rotation)
 
     @cached_property
     def blocks(self) -> NDArray[np.float64]:
@@ -152,7 +233,7 @@ class Boxes(_Batch):
 
 
 @dataclass(frozen=True, eq=False)
-class Parallelepipeds(_Batch):
+class Parallelepipeds(Core):
     """The sets ``origin + s @ edges``, ``0 <= s <= 1`` per coordinate.
 
     Args:
@@ -185,7 +266,7 @@ class Parallelepipeds(_Batch):
 
 
 @dataclass(frozen=True, eq=False)
-class PointSets(_Batch):
+class PointSets(Core):
     """Base of :class:`Hulls` and :class:`Polygons`, whose bodies have any number of points."""
 
     vertices: NDArray[np.float64]
@@ -208,6 +289,11 @@ class PointSets(_Batch):
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
+
+    def _at(self, index: NDArray[np.int64]) -> Self:
+        parts = [self.vertices[self.offsets[i] : self.offsets[i + 1]] for i in index]
+        points = np.concatenate(parts) if parts else self.vertices[:0]
+        return type(self)(points, np.cumsum([0, *map(len, parts)]))
 
     @property
     def packed(self) -> NDArray[np.float64]:
@@ -240,6 +326,57 @@ class Polygons(PointSets):
     """
 
     kind, dimensions = 4, 2
+
+
+def rotations(name: str, value: ArrayLike | None, count: int) -> tuple[NDArray[np.float64], float]:
+    """Rotations of shape (count, 3, 3), and the largest entry of ``|R^T R - I|``, rounded up.
+
+    One matrix is repeated for all rows; ``None`` is the identity.
+
+    Raises:
+        ArgumentError: quaternions or another shape, an entry that is not finite, or a matrix that
+            is not orthonormal (named with its row).
+    """
+    if value is None:
+        value = np.eye(3)
+    raw = np.asarray(value)
+    if raw.ndim == 2 and raw.shape == (3, 3):
+        raw = np.broadcast_to(raw, (count, 3, 3))
+    if raw.shape[-1:] == (4,) and raw.ndim < 3:
+        raise ArgumentError(f"{name}: shape {raw.shape}, expected (N, 3, 3); {FROM_QUATERNIONS}")
+    rotation = frozen_finite(name, raw, (count, 3, 3))
+    skew, row = _rigid.box_skew(rotation.reshape(-1, 9), ORTHONORMAL_TOLERANCE)
+    if row < count:
+        raise ArgumentError(
+            f"{name}: row {row} is not orthonormal: {not_orthonormal(rotation[row])}"
+        )
+    return rotation, skew
+
+
+#: What works in place of quaternions.
+FROM_QUATERNIONS = (
+    "for quaternions use scipy's Rotation.from_quat(q).as_matrix(), where q is x, y, z, w; "
+    "with MuJoCo's order w, x, y, z add scalar_first=True"
+)
+
+
+def not_orthonormal(rotation: NDArray[np.float64]) -> str:
+    """How far a (3, 3) matrix is from orthonormal, and how to mend it."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(rotation.T @ rotation - np.eye(3)).max()
+    text = f"R^T R differs from the identity by {off:.3g}, allowed is {ORTHONORMAL_TOLERANCE:g}"
+    if off < 0.1:
+        return f"{text}; the nearest rotation is u @ vt of u, _, vt = np.linalg.svd(R)"
+    return text
+
+
+def placed_rows(
+    center: NDArray[np.float64], size: NDArray[np.float64], rotation: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Centre, three sizes and rotation (row-major) of a body in one row. Shape (N, 15)."""
+    out = np.empty((len(center), 15))
+    out[:, :3], out[:, 3:6], out[:, 6:] = center, size, rotation.reshape(len(center), 9)
+    return sealed(out)
 
 
 def _ndim(value: ArrayLike) -> int:

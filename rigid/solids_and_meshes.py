@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Literal, cast, get_args, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
+from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
-from tauguard.rigid.motion import Motion, bounded, common_length
-from tauguard.rigid.queries import check_method, find_witness, rows, sharp_overlap
+from tauguard.rigid.motion import Motion, bounded, common_length, optional_poses
+from tauguard.rigid.queries import Poses, check_method, row_count, sharp_overlap
 from tauguard.rigid.results import (
     Distances,
     Impacts,
@@ -30,19 +31,46 @@ MOST_COORDINATE = 1e30
 
 
 @overload
-def overlap(a: Solid, b: Solid, method: OverlapMethod = "auto", threads: int = 1) -> Overlap: ...
+def overlap(
+    a: Solid,
+    b: Solid,
+    method: OverlapMethod = "auto",
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
+) -> Overlap: ...
 @overload
 def overlap(
-    a: MeshTree, b: Solid, method: OverlapMethod = "auto", threads: int = 1
+    a: MeshTree,
+    b: Solid,
+    method: OverlapMethod = "auto",
+    threads: int = 1,
+    *,
+    pose_b: ArrayLike | None = None,
 ) -> MeshOverlap: ...
 @overload
 def overlap(
-    a: Solid, b: MeshTree, method: OverlapMethod = "auto", threads: int = 1
+    a: Solid,
+    b: MeshTree,
+    method: OverlapMethod = "auto",
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
 ) -> MeshOverlap: ...
 def overlap(
-    a: Solid | MeshTree, b: Solid | MeshTree, method: OverlapMethod = "auto", threads: int = 1
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
+    method: OverlapMethod = "auto",
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
 ) -> Overlap | MeshOverlap:
     """Whether the convex bodies ``a[i]`` and ``b[i]`` share a point; touching is a hit.
+
+    For polytopes, also grown by radii, the answer is exact. For a cylinder, cone or ellipsoid it
+    is a hit where :func:`distance` is at most 0.
 
     Args:
         a: N bodies of one kind, with or without radii, or one body for all rows. Or a mesh: its
@@ -50,8 +78,10 @@ def overlap(
         b: As ``a``. The two kinds may differ, and at most one side may be a mesh.
         method: ``abfme``, ``sat`` (needs facets, so not for hulls) or ``auto`` (the fastest for the
             two kinds in the study ``rigid``). Each is exact for any finite input. For bodies with
-            radii and for meshes, only ``auto`` is available.
+            radii, for curved bodies and for meshes, only ``auto`` is available.
         threads: 0 means all processors; the answer does not depend on it.
+        pose_a: Poses of the bodies ``a``, as for :func:`distance`.
+        pose_b: Poses of the bodies ``b``.
 
     Returns:
         ``hit`` of shape (N,). For two batches of bodies also ``witness``, which is computed at the
@@ -59,9 +89,10 @@ def overlap(
 
     Raises:
         ArgumentError: lengths that do not match, a method that is unknown or not available for the
-            arguments, two meshes, or a coordinate beyond 1e100 of bodies with radii (with a mesh:
-            a coordinate of the bodies beyond 1e30).
+            arguments, two meshes, two half-spaces, a bad pose, or a coordinate beyond 1e100 of
+            bodies with radii and curved bodies (with a mesh: beyond 1e30).
     """
+    _check_place("method", method)
     check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
     if special and method != "auto":
@@ -69,68 +100,90 @@ def overlap(
             f"method: {method!r} needs bodies without radii, but {special[0]} is a "
             f"{type(a if special[0] == 'a' else b).__name__}; expected auto"
         )
+    at_a, at_b = optional_poses("pose_a", pose_a), optional_poses("pose_b", pose_b)
     if not special:
-        return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
-    if beside := _mesh_beside(a, b):
+        return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads, at_a, at_b)
+    if beside := _mesh_beside(a, b, at_a, at_b):
         mesh, bodies, count, swapped = beside
         face = np.empty(count, dtype=np.int32)
         mesh._mesh.meets(bodies, face, thread_count(threads))
         return MeshOverlap(face >= 0, _faces_of(face, swapped))
-    count, first, second = _both(a, b)
+    count, first, second = _both(a, b, at_a, at_b)
     hit = np.empty(count, dtype=np.uint8)
     _rigid.meets(first, second, hit, thread_count(threads))
     met = hit.view(np.bool_)
-    return Overlap(met, lambda: _rounded_witness(cast(Solid, a), cast(Solid, b), met, threads))
+    return Overlap(met, lambda: _witness(first, second, hit, threads))
 
 
-def _rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
+def _witness(a: _rigid.Batch, b: _rigid.Batch, hit: NDArray[np.uint8], threads: int = 1) -> Witness:
     """A common point or a separating plane of each row, up to rounding."""
-    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
-    cores = distance(core_a, core_b, threads)
-    # Cores that overlap have a common point. Otherwise the point is on the segment between them.
-    point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
-    gap = np.maximum(cores.distance, 0.0)
-    along = 0.5 * (np.maximum(gap - radius_b, 0.0) + np.minimum(gap, radius_a))
-    between = cores.point_a + along[:, None] * cores.normal
-    point = np.where((cores.distance > 0)[:, None], between, point)
-    middle = cores.point_a + 0.5 * (gap + radius_a - radius_b)[:, None] * cores.normal
-    offset = np.einsum("ij,ij->i", cores.normal, middle)
-    return Witness(
-        np.where(hit[:, None], point, np.nan),
-        np.where(hit[:, None], np.nan, cores.normal),
-        np.where(hit, np.nan, offset),
-    )
+    out, point = np.empty((len(hit), 10)), np.full((len(hit), 3), np.nan)
+    _rigid.distances(a, b, out, thread_count(threads))
+    _rigid.common_points(a, b, hit, point, thread_count(threads))
+    normal, met = out[:, 7:10], hit.view(np.bool_)
+    offset = np.einsum("ij,ij->i", normal, 0.5 * (out[:, 1:4] + out[:, 4:7]))
+    return Witness(point, np.where(met[:, None], np.nan, normal), np.where(met, np.nan, offset))
 
 
 @overload
-def distance(a: Solid, b: Solid, threads: int = 1) -> Distances: ...
+def distance(
+    a: Solid,
+    b: Solid,
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
+) -> Distances: ...
 @overload
-def distance(a: MeshTree, b: Solid, threads: int = 1) -> MeshDistances: ...
+def distance(
+    a: MeshTree, b: Solid, threads: int = 1, *, pose_b: ArrayLike | None = None
+) -> MeshDistances: ...
 @overload
-def distance(a: Solid, b: MeshTree, threads: int = 1) -> MeshDistances: ...
-def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Distances:
+def distance(
+    a: Solid, b: MeshTree, threads: int = 1, *, pose_a: ArrayLike | None = None
+) -> MeshDistances: ...
+def distance(
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
+) -> Distances:
     """Signed distance, nearest points and normal of the convex bodies ``a[i]`` and ``b[i]``.
 
-    The sign is exact, also for degenerate bodies: it agrees with :func:`overlap`, and the distance
-    is 0 if and only if the bodies touch. The error of the distance is at most 3e-14 times the
-    diagonal of the box around both bodies.
+    The bound of the error is relative to the diagonal of the box around both bodies:
+
+    * Polytopes (tetrahedra, boxes, parallelepipeds, hulls), half-spaces against them, and all of
+      these grown by radii: 3e-14. The sign is exact, also for degenerate bodies: it agrees with
+      :func:`overlap`, and the distance is 0 if and only if the bodies touch.
+    * A cylinder, cone or ellipsoid on either side: 1e-9. Beyond this bound the sign is certain.
+    * A half-space and a cylinder, cone or ellipsoid: 3e-14.
 
     The method is the descent of Gilbert, Johnson and Keerthi (1988) with the expanding polytope
-    (van den Bergen 2001). Both run in floating point, and a certificate checks each result. If the
-    certificate fails, or the bodies are closer to contact than 1e-10 of their size, both run in
-    exact arithmetic, which takes about a millisecond per pair.
+    (van den Bergen 2001). Both run in floating point, and a certificate checks each result of
+    polytopes. If the certificate fails, or the bodies are closer to contact than 1e-10 of their
+    size, both run in exact arithmetic, which takes about a millisecond per pair.
 
     Args:
         a: N bodies of one kind, with or without radii, or one body. Or a mesh: its surface is
             tested, not its inside, and the bodies' coordinates are in its frame.
         b: As ``a``. The two kinds may differ, and at most one side may be a mesh.
         threads: 0 means all processors; the answer does not depend on it.
+        pose_a: Homogeneous matrices that move the bodies ``a`` into the common frame, one for all
+            or one per row. Shape (4, 4) or (N, 4, 4). One body at N poses is not copied. A pose
+            transforms the numbers of a body (vertices; centre and rotation) and rounds them; the
+            answer is that for the rounded numbers.
+        pose_b: As ``pose_a``, for ``b``.
 
     Raises:
-        ArgumentError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
-            (with a mesh: a coordinate of the bodies beyond 1e30).
+        ArgumentError: lengths that do not match, polygons, two meshes, two half-spaces, a pose that
+            is no rigid motion (named with its row), or a coordinate beyond 1e100 (with a mesh: a
+            coordinate of the bodies beyond 1e30).
     """
-    if beside := _mesh_beside(a, b):
+    _check_place("threads", threads)
+    at_a, at_b = optional_poses("pose_a", pose_a), optional_poses("pose_b", pose_b)
+    if beside := _mesh_beside(a, b, at_a, at_b):
         mesh, bodies, count, swapped = beside
         out, face = np.empty((count, 10)), np.empty(count, dtype=np.int32)
         mesh._mesh.distances(bodies, out, face, thread_count(threads))
@@ -138,10 +191,16 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Dist
         if swapped:
             first, second, normal = second, first, -normal
         return MeshDistances(out[:, 0], first, second, normal, face)
-    count, one, other = _both(a, b)
+    count, one, other = _both(a, b, at_a, at_b)
     out = np.empty((count, 10))
     _rigid.distances(one, other, out, thread_count(threads))
     return Distances(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10])
+
+
+def _check_place(name: str, value: object) -> None:
+    """Raise an ``ArgumentError`` for a pose in the place of the argument ``name``."""
+    if isinstance(value, np.ndarray | list):
+        raise ArgumentError(f"{name}: an array; poses are passed by name, `pose_a=` and `pose_b=`")
 
 
 @overload
@@ -193,6 +252,12 @@ def time_of_impact(
     lengths = {"motion_a": len(motion_a), "motion_b": len(motion_b)}
     if beside := _mesh_beside(a, b):
         mesh, bodies, count, swapped = beside
+        if bodies.curved:
+            side = "a" if swapped else "b"
+            raise ArgumentError(
+                f"{side}: {type(a if swapped else b).__name__}, expected bodies with vertices or "
+                "radii against a moving mesh, such as Hulls of points on the surface"
+            )
         of_mesh, of_bodies = (motion_b, motion_a) if swapped else (motion_a, motion_b)
         count = common_length({"bodies": count} | lengths)
         out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
@@ -209,21 +274,26 @@ def time_of_impact(
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
 
 
-def _both(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[int, _rigid.Batch, _rigid.Batch]:
+def _both(
+    a: Solid | MeshTree, b: Solid | MeshTree, pose_a: Poses = None, pose_b: Poses = None
+) -> tuple[int, _rigid.Batch, _rigid.Batch]:
     """The number of rows, and the native forms of both sides."""
     (core_a, radius_a), (core_b, radius_b) = (
         solid_parts(name, cast(Solid, solid)) for name, solid in (("a", a), ("b", b))
     )
-    return rows(core_a, core_b), core_a.grown(radius_a), core_b.grown(radius_b)
+    if isinstance(core_a, HalfSpaces) and isinstance(core_b, HalfSpaces):
+        raise ArgumentError("a, b: two HalfSpaces always overlap unless they are parallel")
+    count = row_count(core_a, core_b, pose_a, pose_b)
+    return count, core_a.grown(radius_a, pose_a), core_b.grown(radius_b, pose_b)
 
 
 def _mesh_beside(
-    a: Solid | MeshTree, b: Solid | MeshTree
+    a: Solid | MeshTree, b: Solid | MeshTree, pose_a: Poses = None, pose_b: Poses = None
 ) -> tuple[MeshTree, _rigid.Batch, int, bool] | None:
     """The mesh, the bodies, their number, and whether the mesh is ``b``; ``None`` without a mesh.
 
     Raises:
-        ArgumentError: both are meshes.
+        ArgumentError: both are meshes, the mesh has a pose, or a half-space.
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ArgumentError(
@@ -234,8 +304,20 @@ def _mesh_beside(
     mesh, solid = (b, a) if swapped else (a, b)
     if not isinstance(mesh, MeshTree):
         return None
-    core, radius = solid_parts("a" if swapped else "b", cast(Solid, solid), MOST_COORDINATE)
-    return mesh, core.grown(radius), len(core), swapped
+    side, pose, of_mesh = ("a", pose_a, pose_b) if swapped else ("b", pose_b, pose_a)
+    if of_mesh is not None:
+        raise ArgumentError(
+            f"pose_{'b' if swapped else 'a'}: {'b' if swapped else 'a'} is a MeshTree, whose frame "
+            f"is the common one; give the bodies `pose_{side}=np.linalg.inv(pose_of_mesh) @ pose`"
+        )
+    core, radius = solid_parts(side, cast(Solid, solid), MOST_COORDINATE)
+    if isinstance(core, HalfSpaces):
+        raise ArgumentError(
+            f"{side}: HalfSpaces, expected bounded bodies against a mesh; the heights of the "
+            "vertices are vertices @ normal - offset"
+        )
+    count = row_count(core, core, pose, None)
+    return mesh, core.grown(radius, pose), count, swapped
 
 
 def _faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
-from tauguard.contacts.geoms import CONVEX, hull_vertices
+from tauguard.contacts.geoms import NATIVE_KINDS, hull_vertices
 
 _NONE = np.zeros((0, 3))
 
@@ -58,7 +58,7 @@ class ErodedShapes:
             vertices = self._hull(geom).core(layer)
         place, mat = frame_on_body(model, geom)
         body = int(model.geom_bodyid[geom])
-        return self._guard.add(CONVEX.index(kind), size, radius, body, place, mat, vertices)
+        return self._guard.add(NATIVE_KINDS[kind], size, radius, body, place, mat, vertices)
 
     def _hull(self, geom: int) -> _Hull:
         mesh = int(self._model.geom_dataid[geom])

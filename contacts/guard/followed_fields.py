@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
-from tauguard.contacts.geoms import hull_rows
 from tauguard.contacts.guard.engine import PHYSICS
 from tauguard.findings import ArgumentError
+from tauguard.rigid.imports import hull_rows
 
 #: Fields that determine the pairs.
 _PAIRS = (

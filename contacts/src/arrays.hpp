@@ -43,10 +43,10 @@ std::vector<T> list(const Array& values) {
   return std::vector<T>(values.data(), values.data() + values.size());
 }
 
-inline std::pair<Shape, LocalFrame> shape_of(int core, const Doubles& size, double radius,
+inline std::pair<Shape, LocalFrame> shape_of(int kind, const Doubles& size, double radius,
                                              const Doubles& pos, const Doubles& mat,
                                              const Rows3& vertices) {
-  Shape shape{static_cast<Core>(core),
+  Shape shape{static_cast<Kind>(kind),
               {size.data()[0], size.data()[1], size.data()[2]},
               radius,
               {},

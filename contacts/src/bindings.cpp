@@ -35,9 +35,9 @@ Answer answer(const std::vector<Row>& rows, const Counts& counts) {
 // The geoms of a scene and the pairs that may touch.
 class Scene {
  public:
-  void add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
+  void add(int kind, Doubles size, double radius, int body, Doubles pos, Doubles mat,
            Rows3 vertices, Rows3 normals, Rows3 edges) {
-    auto [shape, frame] = shape_of(core, size, radius, pos, mat, vertices);
+    auto [shape, frame] = shape_of(kind, size, radius, pos, mat, vertices);
     shape.normals = vectors(normals), shape.edges = vectors(edges);
     geoms_.add(std::move(shape), body, frame);
   }
@@ -139,7 +139,7 @@ NB_MODULE(_contacts, m) {
   m.doc() = "Contacts of a moving scene, and the guarded stepper. Arguments are checked in Python.";
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())
-      .def("add", &Scene::add, "core"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
+      .def("add", &Scene::add, "kind"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
            "vertices"_a, "normals"_a, "edges"_a)
       .def("pairs", &Scene::pairs, "pairs"_a, "reach"_a)
       .def("find", &Scene::find, "xpos_t0"_a, "xmat_t0"_a, "xpos_t1"_a, "xmat_t1"_a)

@@ -46,9 +46,9 @@ class Guard {
   Guard(const nb::dict& addresses, const nb::dict& settings, nb::object held)
       : engine_(read<Engine>(addresses)), held_(std::move(held)), s_(read<Settings>(settings)) {}
 
-  int add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
+  int add(int kind, Doubles size, double radius, int body, Doubles pos, Doubles mat,
           Rows3 vertices) {
-    const auto [shape, frame] = shape_of(core, size, radius, pos, mat, vertices);
+    const auto [shape, frame] = shape_of(kind, size, radius, pos, mat, vertices);
     return covered_.verdict.add(shape, body, frame);
   }
   void pair(Ints a, Ints b) {
@@ -253,7 +253,7 @@ void bind_guard(nb::module_& m) {
       .def(nb::init<nb::typed<nb::dict, nb::str, int>, nb::typed<nb::dict, nb::str, double>,
                     nb::object>(),
            "addresses"_a, "settings"_a, "held"_a)
-      .def("add", &Guard::add, "core"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
+      .def("add", &Guard::add, "kind"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
            "vertices"_a)
       .def("pair", &Guard::pair, "a"_a, "b"_a)
       .def("flex_pair", &Guard::flex_pair, "a"_a, "radii"_a, "elements"_a, "skip"_a)

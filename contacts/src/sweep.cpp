@@ -27,7 +27,7 @@ Aabb widened(Aabb box, double by) {
 rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const RigidMotion& motion,
                               const Vec3& origin) {
   rigid::MovingBody body(motion, origin);
-  if (s.core == Core::hull)
+  if (s.kind == Kind::hulls)
     for (std::size_t i = 0; i < s.x.size(); ++i)
       body.add_vertex(in_body.out({s.x[i], s.y[i], s.z[i]}));
   else
@@ -125,8 +125,8 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     cached = {true, false, {}};
     if (!widened(geoms.box(pair.a), pair.reach).overlaps(geoms.box(pair.b))) continue;
     ++counts.candidates;
-    const Vec3 origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0
-                                                                     : geoms.motion(pair.a).x0;
+    const Vec3 origin = geoms.shape(pair.a).kind == Kind::half_spaces ? geoms.motion(pair.b).x0
+                                                                      : geoms.motion(pair.a).x0;
     const auto touch_within = [&](double threshold) {
       SupportShape a = geoms.mover(pair.a, origin), b = geoms.mover(pair.b, origin);
       const bool polytopes = geoms.shape(pair.a).polytope() && geoms.shape(pair.b).polytope();

@@ -114,7 +114,7 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, const Lasts& lasts
 int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
   const double size = shape.extent() + shape.radius;
   const double extent = norm(in_body.at) + shape.extent() + shape.radius;
-  const bool plane = shape.core == Core::half_space;
+  const bool plane = shape.kind == Kind::half_spaces;
   entries_.push_back({std::move(shape), in_body, body, extent, size});
   boxes_.emplace_back(), boxed_.push_back(0);
   if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
@@ -223,7 +223,7 @@ double Verdict::turning(const Pair& pair) const {
   for (const int entry : {pair.a[0], pair.b[0]}) {
     const Entry& e = entries_[entry];
     const Way& w = ways_[e.body];
-    if (e.shape.core == Core::half_space && w.chord > 0) return INFINITY;
+    if (e.shape.kind == Kind::half_spaces && w.chord > 0) return INFINITY;
     sum += w.chord * e.extent;
   }
   return sum;
@@ -244,7 +244,7 @@ double Verdict::gap_of_balls(const Pair& pair) const {
     }
   }
   const Vec3 between = centre[1] - centre[0];
-  const bool plane = e[0]->shape.core == Core::half_space;
+  const bool plane = e[0]->shape.kind == Kind::half_spaces;
   const double needed = 2 * resting * (e[0]->extent + e[1]->extent) +
                         rounded * unit_roundoff * (norm(centre[0]) + norm(centre[1]));
   return (plane ? dot(up, between) : norm(between)) - e[0]->size - e[1]->size - needed;
@@ -279,7 +279,7 @@ void Verdict::judge_rigid(std::size_t number, Depth depth, std::vector<Hit>* hit
     return void(pair.known = apart);
   }
   if (!box(pair.a[0]).overlaps(box(pair.b[0]))) return void(pair.known = apart);
-  const bool plane = a.shape.core == Core::half_space;
+  const bool plane = a.shape.kind == Kind::half_spaces;
   const Vec3 origin = motion(plane ? b.body : a.body).x0;
   Hit hit{static_cast<std::int32_t>(number), -1, 0, 0, 0, 0};
   if (!judged(
@@ -312,7 +312,7 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
   const Entry& geom = entries_[pair.a[0]];
   const RigidMotion& motion = this->motion(geom.body);
   const Vec3& drift = motion.linear;
-  const bool sweeps = geom.shape.core == Core::half_space && motion.speed > 0;
+  const bool sweeps = geom.shape.kind == Kind::half_spaces && motion.speed > 0;
   const double turned = sweeps ? INFINITY : motion.speed * geom.extent;
   for (std::size_t begin = 0; begin < count; begin += block) {
     const std::size_t end = std::min(count, begin + block);

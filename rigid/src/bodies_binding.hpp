@@ -3,8 +3,13 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+
+#include <optional>
 
 #include "first_touch.hpp"
+#include "posed_body.hpp"
+#include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
@@ -29,22 +34,53 @@ inline void store(const FirstTouch& t, double* row) {
   for (int k = 0; k < 3; ++k) row[1 + k] = t.point[k], row[4 + k] = t.normal[k];
 }
 
-// A batch of bodies, each grown by a ball: one radius for each row, or one for all. It keeps the
-// Python arrays alive.
+// A batch of bodies, each grown by a ball: one radius for each row, or one for all. Poses, if any,
+// move them: one for all bodies, or one per row. It keeps the Python arrays alive.
 struct Batch : Bodies {
-  Batch(int kind, Packed data, Offsets offsets, Radii radii)
+  Batch(int kind, Packed data, Offsets offsets, Radii radii, std::optional<Poses> poses)
       : Bodies{static_cast<Kind>(kind), data.data(), offsets.data(),
                is_cloud(static_cast<Kind>(kind)) ? offsets.shape(0) - 1 : data.shape(0)},
         data_(data),
         offsets_(offsets),
-        radii_(radii) {}
+        radii_(radii),
+        poses_(poses) {}
   double radius(std::size_t i) const { return radii_.data()[radii_.shape(0) == 1 ? 0 : i]; }
+  // The pose of row i; null without poses.
+  const double* pose(std::size_t i) const {
+    return poses_ ? poses_->data() + 16 * (poses_->shape(0) == 1 ? 0 : i) : nullptr;
+  }
 
  private:
   Packed data_;
   Offsets offsets_;
   Radii radii_;
+  std::optional<Poses> poses_;
 };
+
+// The bodies of a batch at their poses, row by row.
+class Posed {
+ public:
+  explicit Posed(const Batch& batch) : batch_(batch) {}
+  // Bodies whose row i is the body; valid until the next call.
+  const Bodies& at(std::size_t i) {
+    const double* pose = batch_.pose(i);
+    return pose ? body_.place(batch_, i, pose) : batch_;
+  }
+
+ private:
+  const Batch& batch_;
+  PosedBody body_;
+};
+
+// Calls body(i, x, y) for all rows, with bodies whose row i is a pair. `grain`: rows a task.
+template <class Body>
+void each_pair(const Batch& a, const Batch& b, std::size_t rows, int threads, std::size_t grain,
+               const Body& body) {
+  geometry::interruptible_for(rows, threads, grain, [&](auto begin, auto end, auto) {
+    Posed x(a), y(b);
+    for (auto i = begin; i < end; ++i) body(i, x.at(i), y.at(i));
+  });
+}
 
 // A batch of motions: one for all rows of the query, or one per row.
 struct Motions {

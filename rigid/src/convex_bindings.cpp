@@ -20,7 +20,9 @@ using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 void bind_convex(nb::module_& m) {
   nb::class_<Batch>(m, "Batch")
-      .def(nb::init<int, Packed, Offsets, Radii>(), "kind"_a, "packed"_a, "offsets"_a, "radii"_a);
+      .def(nb::init<int, Packed, Offsets, Radii, std::optional<Poses>>(), "kind"_a, "packed"_a,
+           "offsets"_a, "radii"_a, "poses"_a = nb::none())
+      .def_prop_ro("curved", [](const Batch& b) { return !is_polytope(b.kind); });
   m.def("has_avx2", [] { return use_avx2(); });
   m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; }, "allowed"_a);
   m.def(
@@ -30,6 +32,27 @@ void bind_convex(nb::module_& m) {
         return overlap(a, b, hit.shape(0), static_cast<Method>(method), threads, hit.data());
       },
       "a"_a, "b"_a, "method"_a, "threads"_a, "hit"_a);
+  m.def(
+      "overlap_posed",
+      [](const Batch& a, const Batch& b, int method, int threads, Hits hit) {
+        const LongCall call;
+        const RowMethod decide = row_method(a.kind, b.kind, static_cast<Method>(method));
+        each_pair(a, b, hit.shape(0), threads, 256,
+                  [&](auto i, const Bodies& x, const Bodies& y) { decide(x, y, i, hit.data()); });
+      },
+      "a"_a, "b"_a, "method"_a, "threads"_a, "hit"_a);
+  m.def(
+      "sweep_posed",
+      [](const Batch& a, const Batch& b, Packed displacement, int method, int threads, Hits hit,
+         Rows out) {
+        const LongCall call;
+        each_pair(a, b, hit.shape(0), threads, 256, [&](auto i, const Bodies& x, const Bodies& y) {
+          std::int64_t ox[2], oy[2];
+          sweep(row_of(x, i, ox), row_of(y, i, oy), displacement.data() + 3 * i, 1,
+                static_cast<Method>(method), 1, true, hit.data() + i, out.data() + 7 * i);
+        });
+      },
+      "a"_a, "b"_a, "displacement"_a, "method"_a, "threads"_a, "hit"_a, "out"_a);
   m.def(
       "overlap_boxes",
       [](const Batch& a, Packed blocks_a, const Batch& b, Packed blocks_b, double skew, int threads,
@@ -74,7 +97,9 @@ void bind_convex(nb::module_& m) {
       "witnesses",
       [](const Batch& a, const Batch& b, int threads, Hits hit, Rows out) {
         const LongCall call;
-        witnesses(a, b, out.shape(0), threads, hit.data(), out.data());
+        each_pair(a, b, out.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
+          witness(x, y, i, hit.data()[i], out.data() + 7 * i);
+        });
       },
       "a"_a, "b"_a, "threads"_a, "hit"_a, "out"_a);
 }

@@ -133,19 +133,15 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
   return left;
 }
 
-RowMethod row_method(Kind a, Kind b) {
-  const Runner run = choose(a, b, Method::automatic);
+RowMethod row_method(Kind a, Kind b, Method method) {
+  const Runner run = choose(a, b, method);
   return [run](const Bodies& x, const Bodies& y, std::size_t row, std::uint8_t* hit) {
     run(Chunk{x, y, row, row + 1, hit});
   };
 }
 
-void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads,
-               const std::uint8_t* hit, double* out) {
-  geometry::interruptible_for(n, threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i)
-      find_witness(a, b, i, hit[i] ? common : separated, out + 7 * i);
-  });
+void witness(const Bodies& a, const Bodies& b, std::size_t row, bool hit, double* out) {
+  find_witness(a, b, row, hit ? common : separated, out);
 }
 
 }  // namespace tauguard::rigid

@@ -30,7 +30,7 @@ std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t
 // Decides one row by elimination and writes hit[row].
 using RowMethod =
     std::function<void(const Bodies& a, const Bodies& b, std::size_t row, std::uint8_t* hit)>;
-RowMethod row_method(Kind a, Kind b);
+RowMethod row_method(Kind a, Kind b, Method method = Method::automatic);
 
 // Like `overlap`, but tests the given normal of each row first (3 numbers; zeros if there is none).
 // A normal that does not separate a pair that is apart is replaced by one that does. Returns the
@@ -49,7 +49,7 @@ Skew box_skew(const double* rotation, std::size_t n, double tolerance);
 // Writes packed rows as blocks of eight; the last block is filled up with copies of the last box.
 void pack_boxes(const double* packed, std::size_t n, double* blocks);
 
-void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads,
-               const std::uint8_t* hit, double* out);
+// Writes a common point (3 numbers) or a separating plane (normal and offset) of a row.
+void witness(const Bodies& a, const Bodies& b, std::size_t row, bool hit, double* out);
 
 }  // namespace tauguard::rigid

@@ -2,7 +2,7 @@
 // convex bodies or meshes. Arguments are checked in Python.
 #include "bodies_binding.hpp"
 #include "mesh_body.hpp"
-#include "tauguard/geometry/interrupt_binding.hpp"
+#include "support_distance.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -14,6 +14,7 @@ namespace {
 
 using DistanceRows = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Vectors3 = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // Writes a row of distance, point of a, point of b, and normal.
@@ -25,16 +26,25 @@ void store(const SignedDistance& g, double* row) {
 
 void distances(const Batch& a, const Batch& b, DistanceRows out, int threads) {
   const LongCall call;
-  interruptible_for(out.shape(0), threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i)
-      store(signed_distance(a, b, i, a.radius(i), b.radius(i)), out.data() + 10 * i);
+  each_pair(a, b, out.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
+    store(signed_distance(x, y, i, a.radius(i), b.radius(i)), out.data() + 10 * i);
   });
 }
 
 void meets(const Batch& a, const Batch& b, Hits hit, int threads) {
   const LongCall call;
-  interruptible_for(hit.shape(0), threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) hit.data()[i] = meet(a, b, i, a.radius(i), b.radius(i));
+  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
+    hit.data()[i] = meet(x, y, i, a.radius(i), b.radius(i));
+  });
+}
+
+// A common point of each row that is a hit; other rows stay as they are.
+void common_points(const Batch& a, const Batch& b, Hits hit, Vectors3 out, int threads) {
+  const LongCall call;
+  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
+    if (!hit.data()[i]) return;
+    const Vec3 p = support_common_point(x, y, i, a.radius(i), b.radius(i));
+    std::copy(p.begin(), p.end(), out.data() + 3 * i);
   });
 }
 
@@ -53,7 +63,8 @@ template <class Body>
 void each_body(const Batch& bodies, std::size_t rows, int threads, Body body) {
   const LongCall call;
   interruptible_for(rows, threads, 1, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) body(i, RoundedBody(bodies, i, bodies.radius(i)));
+    Posed placed(bodies);
+    for (auto i = begin; i < end; ++i) body(i, RoundedBody(placed.at(i), i, bodies.radius(i)));
   });
 }
 
@@ -85,6 +96,7 @@ void mesh_impacts(const Mesh& mesh, const Batch& bodies, Poses pose_a, Vectors l
 void bind_distances(nb::module_& m) {
   m.def("distances", &distances, "a"_a, "b"_a, "out"_a, "threads"_a);
   m.def("meets", &meets, "a"_a, "b"_a, "hit"_a, "threads"_a);
+  m.def("common_points", &common_points, "a"_a, "b"_a, "hit"_a, "out"_a, "threads"_a);
   m.def("time_of_impact", &impacts, "a"_a, "b"_a, "pose_a"_a, "linear_a"_a, "angular_a"_a,
         "pose_b"_a, "linear_b"_a, "angular_b"_a, "out"_a, "threads"_a);
 }

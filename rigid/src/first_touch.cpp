@@ -49,9 +49,58 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
   return out;
 }
 
+namespace {
+
+FirstTouch turned(FirstTouch t) {
+  for (double& x : t.normal) x = -x;
+  return t;
+}
+
+// As bodies_impact, for curved bodies and half-spaces.
+FirstTouch supports_impact(const Bodies& a, const Bodies& b, std::size_t row, double radius_a,
+                           double radius_b, const RigidMotion& motion_a,
+                           const RigidMotion& motion_b) {
+  if (b.kind == Kind::half_spaces)
+    return turned(supports_impact(b, a, row, radius_b, radius_a, motion_b, motion_a));
+  geometry::Scratch<std::array<PlacedShape, 2>> placed;
+  auto& [first, second] = *placed;
+  place(a, row, radius_a, &first), place(b, row, radius_b, &second);
+  const Vec3 origin = motion_b.x0 + motion_b.turn(second.frame.at);
+  if (a.kind == Kind::half_spaces) {  // the point of the plane below the origin is its middle
+    const Vec3 y = {first.frame.row[0][2], first.frame.row[1][2], first.frame.row[2][2]},
+               n = motion_a.turn(y), from = origin - motion_a.x0;
+    const Vec3 below = from - (dot(n, from) - dot(y, first.frame.at)) * n;
+    first.frame.at =
+        below[0] * motion_a.r0[0] + below[1] * motion_a.r0[1] + below[2] * motion_a.r0[2];
+  }
+  SupportShape x(first.shape, first.frame, motion_a, origin),
+      y(second.shape, second.frame, motion_b, origin);
+  const Touch touch = first_contact(x, y, 0, 0);
+  if (!touch.hit) return no_touch;
+  FirstTouch out = no_touch;
+  out.toi = touch.t;
+  const bool inside = touch.t == 0 && touch.distance < 0;  // no normal is defined
+  Vec3 point = touch.point;
+  if (inside && !x.half_space()) {
+    const Distance d = distance_of(x, y, {}, INFINITY);
+    point = 0.5 * (d.on_a + d.on_b);
+    if (!d.overlap && d.upper > 0)
+      point = d.on_a + 0.5 * (1 + (x.radius() - y.radius()) / d.upper) * (d.on_b - d.on_a);
+  }
+  for (int k = 0; k < 3; ++k) {
+    out.point[k] = point[k] + origin[k];
+    if (!inside) out.normal[k] = touch.normal[k];
+  }
+  return out;
+}
+
+}  // namespace
+
 FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
                          double rounding_b, const RigidMotion& motion_a,
                          const RigidMotion& motion_b) {
+  if (!is_polytope(a.kind) || !is_polytope(b.kind))
+    return supports_impact(a, b, row, rounding_a, rounding_b, motion_a, motion_b);
   // Positions are relative to the first vertex of a at the start, so that scenes far from the world
   // origin lose no accuracy.
   const double* p = a.row(row);

@@ -5,11 +5,6 @@
 namespace tauguard::rigid {
 namespace {
 
-Bodies row_of(const Bodies& b, std::size_t row, std::int64_t* offsets) {
-  offsets[0] = 0, offsets[1] = static_cast<std::int64_t>(b.vertex_count(row));
-  return {b.kind, b.row(row), offsets, 1};
-}
-
 // The unit vector perpendicular to the unit u that is nearest to x; any one if x is parallel to u.
 Vec3 across(const Vec3& x, const Vec3& u) {
   const Vec3 y = x - dot(x, u) * u;
@@ -25,10 +20,10 @@ Vec3 across(const Vec3& x, const Vec3& u) {
 
 // Axes of an oriented box around the body. The first axis points from the first vertex to the
 // farthest one; the second is perpendicular to it, towards the vertex farthest from this line. For
-// boxes and parallelepipeds only the ends of the first vertex's edges are considered, so the axes
+// bodies with eight corners only the ends of the first vertex's edges are considered, so the axes
 // of a box are those of its edges.
 std::array<Vec3, 3> RoundedBody::axes() const {
-  const bool block = bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds;
+  const bool block = bodies.kind != Kind::tetrahedra && bodies.kind != Kind::hulls;
   Vec3 far{}, wide{};
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vec3 x = points[i] - points[0];

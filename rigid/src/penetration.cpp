@@ -4,11 +4,6 @@
 namespace tauguard::rigid {
 namespace {
 
-constexpr int most_faces = 396;  // a convex polytope with 200 corners has at most this many
-// Largest error of the depth of curved cores, as a fraction of their size. For two polytopes the
-// search usually ends at a facet, whose depth is exact up to rounding.
-constexpr double resolution = 1e-7;
-
 // The set of differences b - a of two shapes, by their support functions.
 class ShapeDifferences {
  public:
@@ -16,8 +11,8 @@ class ShapeDifferences {
     Vec3 a, b;
   };
 
-  ShapeDifferences(const SupportShape& a, const SupportShape& b)
-      : a_(a), b_(b), size_(a.reach() + b.reach()) {}
+  ShapeDifferences(const SupportShape& a, const SupportShape& b, double resolution)
+      : a_(a), b_(b), size_(a.reach() + b.reach()), resolution_(resolution) {}
 
   Vec3 at(const Source& s) const { return s.b - s.a; }
   Source farthest(const Vec3& n) const { return {a_.support(-1.0 * n), b_.support(n)}; }
@@ -51,7 +46,7 @@ class ShapeDifferences {
   }
 
   bool is_final(double excess, double square, const Source&) const {
-    return excess <= resolution * size_ * std::sqrt(square);
+    return excess <= resolution_ * size_ * std::sqrt(square);
   }
   bool sees(double excess, double square) const {
     return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
@@ -63,7 +58,7 @@ class ShapeDifferences {
 
  private:
   const SupportShape &a_, &b_;
-  double size_;
+  double size_, resolution_;
 };
 
 using Polytope = ExpandingPolytope<double, ShapeDifferences>;
@@ -91,8 +86,9 @@ Barycentric weights(const Polytope& polytope, const Polytope::Face& face, const 
 
 }  // namespace
 
-void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
-  Polytope polytope(ShapeDifferences(a, b));
+void penetration(const SupportShape& a, const SupportShape& b, Distance* d, double resolution,
+                 int most_faces) {
+  Polytope polytope(ShapeDifferences(a, b, resolution));
   const bool flat = polytope.solve(most_faces) == Polytope::Answer::flat;
   const Vec3& normal = polytope.nearest.normal;
   const double length = norm(normal);

@@ -7,6 +7,7 @@
 #include "exact_facets.hpp"
 #include "exact_nearest.hpp"
 #include "facet_depth.hpp"
+#include "support_distance.hpp"
 #include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
@@ -242,7 +243,8 @@ ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std
   return exact_together(x, y, a, b, nearest, radii, size);
 }
 
-// The result for bodies grown by balls. If `known`, `sign` is the exact sign of the distance.
+}  // namespace
+
 SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sign, bool known) {
   g.point_a = g.point_a + radius_a * g.normal;
   g.point_b = g.point_b - radius_b * g.normal;
@@ -253,10 +255,10 @@ SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sig
   return g;
 }
 
-}  // namespace
-
 SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                                double radius_a, double radius_b) {
+  if (!is_polytope(bodies_a.kind) || !is_polytope(bodies_b.kind))
+    return support_distance(bodies_a, bodies_b, row, radius_a, radius_b);
   geometry::Scratch<LocalPair> pair;
   pair->set(bodies_a, bodies_b, row);
   const Points<double>&a = pair->a, &b = pair->b;
@@ -285,6 +287,8 @@ SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, s
 
 bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
           double radius_b) {
+  if (!is_polytope(bodies_a.kind) || !is_polytope(bodies_b.kind))
+    return support_distance(bodies_a, bodies_b, row, radius_a, radius_b).distance <= 0;
   geometry::Scratch<LocalPair> pair;
   pair->set(bodies_a, bodies_b, row);
   const Points<double>&a = pair->a, &b = pair->b;

@@ -13,10 +13,14 @@ struct SignedDistance {
   Vec3 point_a, point_b, normal;
 };
 
-// The signed distance of row `row`, with each body grown by a ball of the given radius. The sign is
-// exact. The error is at most 2^-45 times the largest coordinate relative to a point of a.
+// The signed distance of row `row`, with each body grown by a ball of the given radius. For other
+// bodies than polytopes it is that of support_distance.hpp; for polytopes the sign is
+// exact, and the error is at most 2^-45 times the largest coordinate relative to a point of a.
 SignedDistance signed_distance(const Bodies& a, const Bodies& b, std::size_t row, double radius_a,
                                double radius_b);
+
+// The result for bodies grown by balls. If `known`, `sign` is the exact sign of the distance.
+SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sign, bool known);
 
 // Whether the grown bodies of row `row` share a point, exactly. Touching counts.
 bool meet(const Bodies& a, const Bodies& b, std::size_t row, double radius_a, double radius_b);

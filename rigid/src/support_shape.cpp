@@ -4,55 +4,128 @@
 
 namespace tauguard::rigid {
 
+std::size_t Shape::highest_vertex(const Vec3& d) const {
+  std::size_t best = 0;
+  double most = -INFINITY;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double p = d[0] * x[i] + d[1] * y[i] + d[2] * z[i];
+    if (p > most) most = p, best = i;
+  }
+  return best;
+}
+
 Vec3 Shape::support(const Vec3& d) const {
-  switch (core) {
-    case Core::half_space:
-    case Core::point:
+  switch (kind) {
+    case Kind::half_spaces:
+    case Kind::points:
       return {0, 0, 0};
-    case Core::segment:
+    case Kind::segments:
       return {0, 0, d[2] >= 0 ? size[1] : -size[1]};
-    case Core::box:
+    case Kind::boxes:
       return {d[0] >= 0 ? size[0] : -size[0], d[1] >= 0 ? size[1] : -size[1],
               d[2] >= 0 ? size[2] : -size[2]};
-    case Core::ellipsoid: {
+    case Kind::ellipsoids: {
       const Vec3 e = {size[0] * d[0], size[1] * d[1], size[2] * d[2]};
       const double length = norm(e);
       if (!(length > 0)) return {size[0], 0, 0};
       return {size[0] * e[0] / length, size[1] * e[1] / length, size[2] * e[2] / length};
     }
-    case Core::disc_prism: {
+    case Kind::cylinders: {
       const double across = std::sqrt(d[0] * d[0] + d[1] * d[1]),
                    z = d[2] >= 0 ? size[1] : -size[1];
       if (!(across > 0)) return {0, 0, z};
       return {size[0] * d[0] / across, size[0] * d[1] / across, z};
     }
-    case Core::hull: {
-      std::size_t best = 0;
-      double most = -INFINITY;
-      for (std::size_t i = 0; i < x.size(); ++i) {
-        const double p = d[0] * x[i] + d[1] * y[i] + d[2] * z[i];
-        if (p > most) most = p, best = i;
-      }
+    case Kind::cones: {
+      const double across = std::sqrt(d[0] * d[0] + d[1] * d[1]);
+      if (size[0] * across <= 2 * size[1] * d[2]) return {0, 0, size[1]};
+      if (!(across > 0)) return {0, 0, -size[1]};
+      return {size[0] * d[0] / across, size[0] * d[1] / across, -size[1]};
+    }
+    case Kind::tetrahedra:
+    case Kind::parallelepipeds:
+    case Kind::polygons:
+    case Kind::hulls: {
+      const std::size_t best = highest_vertex(d);
       return {x[best], y[best], z[best]};
     }
   }
   return {};
 }
 
-double Shape::extent() const {
-  switch (core) {
-    case Core::half_space:
-    case Core::point:
+int Shape::piece(const Vec3& d) const {
+  switch (kind) {
+    case Kind::half_spaces:
+    case Kind::points:
+    case Kind::ellipsoids:
       return 0;
-    case Core::segment:
+    case Kind::segments:
+    case Kind::cylinders:
+      return d[2] >= 0;
+    case Kind::cones:
+      return size[0] * std::sqrt(d[0] * d[0] + d[1] * d[1]) <= 2 * size[1] * d[2];
+    case Kind::boxes:
+      return (d[0] >= 0 ? 1 : 0) | (d[1] >= 0 ? 2 : 0) | (d[2] >= 0 ? 4 : 0);
+    default:
+      return static_cast<int>(highest_vertex(d));
+  }
+}
+
+Vec3 Shape::point_of(int piece, const Vec3& d) const {
+  switch (kind) {
+    case Kind::segments:
+      return {0, 0, piece ? size[1] : -size[1]};
+    case Kind::cylinders:
+    case Kind::cones: {
+      const double z = piece ? size[1] : -size[1], across = std::sqrt(d[0] * d[0] + d[1] * d[1]);
+      if (!(across > 0) || (piece && kind == Kind::cones)) return {0, 0, z};
+      return {size[0] * d[0] / across, size[0] * d[1] / across, z};
+    }
+    case Kind::boxes:
+      return {piece & 1 ? size[0] : -size[0], piece & 2 ? size[1] : -size[1],
+              piece & 4 ? size[2] : -size[2]};
+    case Kind::hulls:
+      return {x[piece], y[piece], z[piece]};
+    default:
+      return support(d);
+  }
+}
+
+double Shape::curvature(int piece, const Vec3& d, const Vec3& u, const Vec3& v) const {
+  if (kind == Kind::cylinders || (kind == Kind::cones && !piece)) {  // of the rim, r |d_xy|
+    const double square = d[0] * d[0] + d[1] * d[1], turn = d[0] * u[1] - d[1] * u[0];
+    return square > 0 ? size[0] * turn * (d[0] * v[1] - d[1] * v[0]) / (square * std::sqrt(square))
+                      : 0;
+  }
+  if (kind == Kind::ellipsoids) {  // of the norm of e
+    const auto scaled = [&](const Vec3& w) {
+      return Vec3{size[0] * w[0], size[1] * w[1], size[2] * w[2]};
+    };
+    const Vec3 e = scaled(d), eu = scaled(u), ev = scaled(v);
+    const double length = norm(e);
+    return length > 0 ? (dot(eu, ev) - dot(e, eu) / length * (dot(e, ev) / length)) / length : 0;
+  }
+  return 0;
+}
+
+double Shape::extent() const {
+  switch (kind) {
+    case Kind::half_spaces:
+    case Kind::points:
+      return 0;
+    case Kind::segments:
       return size[1];
-    case Core::box:
+    case Kind::boxes:
       return norm(Vec3{size[0], size[1], size[2]});
-    case Core::ellipsoid:
+    case Kind::ellipsoids:
       return std::max({size[0], size[1], size[2]});
-    case Core::disc_prism:
+    case Kind::cylinders:
+    case Kind::cones:
       return std::hypot(size[0], size[1]);
-    case Core::hull: {
+    case Kind::tetrahedra:
+    case Kind::parallelepipeds:
+    case Kind::polygons:
+    case Kind::hulls: {
       double most = 0;
       for (std::size_t i = 0; i < x.size(); ++i)
         most = std::max(most, norm(Vec3{x[i], y[i], z[i]}));
@@ -62,7 +135,50 @@ double Shape::extent() const {
   return 0;
 }
 
+void place(const Bodies& bodies, std::size_t r, double radius, PlacedShape* out) {
+  const double* p = bodies.row(r);
+  Shape& shape = out->shape;
+  LocalFrame& frame = out->frame;
+  shape.kind = bodies.kind, shape.radius = radius;
+  switch (bodies.kind) {
+    case Kind::boxes:
+    case Kind::ellipsoids:
+    case Kind::cylinders:
+    case Kind::cones:
+      std::copy(p + 3, p + 6, shape.size);
+      frame = {{geometry::load(p + 6), geometry::load(p + 9), geometry::load(p + 12)},
+               geometry::load(p)};
+      return;
+    case Kind::half_spaces: {
+      const Vec3 raw = geometry::load(p), n = (1 / norm(raw)) * raw;
+      Vec3 side{};
+      side[geometry::smallest_axis(n)] = 1;
+      const Vec3 across = cross(n, side), u = (1 / norm(across)) * across, v = cross(n, u);
+      for (int i = 0; i < 3; ++i) frame.row[i] = {u[i], v[i], n[i]};
+      frame.at = (p[3] / norm(raw)) * n;
+      return;
+    }
+    default: {
+      shape.kind = Kind::hulls;
+      frame = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {}};
+      const Points<double> vertices = vertices_of<double>(bodies, r);
+      frame.at = vertices[0];
+      shape.x.clear(), shape.y.clear(), shape.z.clear();
+      for (const Vec3& v : vertices) {
+        const Vec3 y = v - frame.at;
+        shape.x.push_back(y[0]), shape.y.push_back(y[1]), shape.z.push_back(y[2]);
+      }
+    }
+  }
+}
+
 namespace {
+
+const RigidMotion& no_motion() {
+  static const double pose[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, zero[3] = {};
+  static const RigidMotion motion(pose, zero, zero);
+  return motion;
+}
 
 // Adds full turns to the rotation vector `angular` so that it is as near as possible to `turn`.
 void add_turns(const double* turn, double* angular) {
@@ -128,6 +244,12 @@ SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const 
       radius_(shape.radius) {
   reach_ = norm(in_body.at) + shape.extent();
   magnitude_ = norm(shift_) + norm(motion.linear) + (4 + motion.speed) * reach_ + radius_;
+}
+
+SupportShape::SupportShape(const PlacedShape& at_rest, const Vec3& origin)
+    : SupportShape(at_rest.shape, at_rest.frame, no_motion(), origin) {
+  centre_ = -1.0 * origin;
+  frame_ = {{in_body_.row[0], in_body_.row[1], in_body_.row[2]}, in_body_.at - origin};
 }
 
 SupportShape::SupportShape(const double* const* x_t0, const double* const* x_t1, int count,

@@ -121,14 +121,18 @@ Tally scenes(Random& random, int rounds) {
   return all;
 }
 
+constexpr Kind curved_or_polytope[] = {Kind::points,    Kind::segments, Kind::ellipsoids,
+                                       Kind::cylinders, Kind::cones,    Kind::boxes,
+                                       Kind::hulls};
+
 Shape shape_of(Random& random, bool hard) {
-  Shape shape{static_cast<Core>(1 + random() % 6), {}, 0, {}, {}, {}, {}, {}};
+  Shape shape{curved_or_polytope[random() % 7], {}, 0, {}, {}, {}, {}, {}};
   const auto number = [&] {
     return hard ? std::fabs(hard_number(random)) : uniform(random, 0.05, 0.5);
   };
   for (double& s : shape.size) s = number();
-  if (shape.core == Core::point || shape.core == Core::segment) shape.radius = number();
-  if (shape.core == Core::hull)
+  if (shape.kind == Kind::points || shape.kind == Kind::segments) shape.radius = number();
+  if (shape.kind == Kind::hulls)
     for (std::size_t k = 1 + random() % 9; k > 0; --k) {
       for (auto* axis : {&shape.x, &shape.y, &shape.z})
         axis->push_back(hard ? hard_number(random) : uniform(random, -0.4, 0.4));
@@ -200,7 +204,7 @@ int shapes(Random& random, int rounds) {
     if (hard) continue;
     const bool touched = !rows.empty() && rows[0].distance < 1e-7;
     check(!touch_before(geoms, touched ? rows[0].t : 1), "a touch that is found late");
-    if (a.core == Core::point && b.core == Core::point) {
+    if (a.kind == Kind::points && b.kind == Kind::points) {
       const double t = balls(way, a.radius + b.radius);
       check(touched ? std::fabs(rows[0].t - t) < 1e-6 : t > 1 - 1e-9, "balls at another time");
     }

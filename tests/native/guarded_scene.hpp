@@ -120,10 +120,12 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   return e;
 }
 
-inline Core core_of(int type) {
+inline Kind kind_of(int type) {
+  constexpr Kind kinds[] = {Kind::half_spaces, Kind::points,    Kind::segments,
+                            Kind::ellipsoids,  Kind::cylinders, Kind::boxes};
   int k = 0;
   while (geom_kinds[k] != type) ++k;
-  return static_cast<Core>(k);
+  return kinds[k];
 }
 
 inline double thickness(const mjModel* m, int geom) {
@@ -142,7 +144,7 @@ inline double thickness(const mjModel* m, int geom) {
 }
 
 inline int add_shape(const mjModel* m, int geom, double layer, Verdict* verdict) {
-  Shape shape{core_of(m->geom_type[geom]), {}, 0, {}, {}, {}, {}, {}};
+  Shape shape{kind_of(m->geom_type[geom]), {}, 0, {}, {}, {}, {}, {}};
   const bool round = m->geom_type[geom] == mjGEOM_SPHERE || m->geom_type[geom] == mjGEOM_CAPSULE;
   for (int k = 0; k < 3; ++k)
     shape.size[k] = std::max(m->geom_size[3 * geom + k] - (round ? 0 : layer), 0.0);

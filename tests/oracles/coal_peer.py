@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +79,7 @@ def geometries(bodies: Solid) -> list[tuple[Any, Any]]:
         ]
     return [
         (_convex(coal, points, faces), coal.Transform3s.Identity())
-        for points, faces in _hulls(bodies)
+        for points, faces in _hulls(cast(Bodies, bodies))
     ]
 
 

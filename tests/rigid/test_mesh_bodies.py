@@ -120,7 +120,7 @@ def test_mesh_queries_refuse_what_they_cannot_answer():
     ball = Spheres(np.zeros((2, 3)), 1.0)
     with pytest.raises(ValueError, match=r"both are meshes; MeshTree\.overlap"):
         overlap(tree, tree)  # type: ignore[call-overload]
-    with pytest.raises(ValueError, match=r"^a: MeshTree, .*; for two meshes use MeshTree\.sweep"):
+    with pytest.raises(ValueError, match=r"^a: MeshTree, .*use MeshTree\.sweep for two meshes"):
         sweep(tree, tree, [1, 0, 0])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"a mesh is MeshTree\(mesh\.vertices, mesh\.faces\)"):
         overlap(trimesh.creation.box(), ball)

@@ -247,7 +247,7 @@ def test_bad_arguments():
     a, b = Tetrahedra(np.zeros((3, 4, 3))), Tetrahedra(np.zeros((2, 4, 3)))
     with pytest.raises(ValueError, match="b: 2 bodies against 3; expected the same number, or 1"):
         overlap(a, b)
-    with pytest.raises(ValueError, match="method: a ndarray, expected one of abfme, sat, auto"):
+    with pytest.raises(ValueError, match="method: an array; poses are passed by name, `pose_a=`"):
         overlap(a, a, np.eye(4))
     with pytest.raises(ValueError, match="method: 'fast', expected one of abfme, sat, auto"):
         overlap(a, a, method="fast")

@@ -112,7 +112,7 @@ def test_other_methods_and_queries_say_what_they_take():
     ball, box = Spheres([[0, 0, 0]], 1.0), Boxes([[0, 0, 0]], [[1, 1, 1]], EYE)
     with pytest.raises(ValueError, match="'sat' needs bodies without radii, but a is a"):
         overlap(ball, box, "sat")
-    with pytest.raises(ValueError, match="b: Spheres, expected bodies without a radius"):
+    with pytest.raises(ValueError, match="b: Spheres, expected Tetrahedra, Boxes"):
         sweep(box, ball, [1, 0, 0])
     with pytest.raises(ValueError, match="b: str, expected one of Tetrahedra"):
         overlap(ball, "box")  # type: ignore[call-overload]

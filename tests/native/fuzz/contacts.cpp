@@ -7,12 +7,16 @@ namespace {
 
 using namespace tauguard::contacts;
 
+constexpr Kind curved_or_polytope[] = {Kind::points,    Kind::segments, Kind::ellipsoids,
+                                       Kind::cylinders, Kind::cones,    Kind::boxes,
+                                       Kind::hulls};
+
 Shape shape_of(Input& in) {
-  Shape shape{static_cast<Core>(in.between(1, 6)), {}, 0, {}, {}, {}, {}, {}};
+  Shape shape{curved_or_polytope[in.between(0, 6)], {}, 0, {}, {}, {}, {}, {}};
   for (double& s : shape.size) s = std::fabs(in.number());
-  if (shape.core == Core::point || shape.core == Core::segment)
+  if (shape.kind == Kind::points || shape.kind == Kind::segments)
     shape.radius = std::fabs(in.number());
-  if (shape.core == Core::hull)
+  if (shape.kind == Kind::hulls)
     for (int k = in.between(1, 9); k > 0; --k)
       for (auto* axis : {&shape.x, &shape.y, &shape.z}) axis->push_back(in.number());
   return shape;

@@ -78,7 +78,7 @@ void resting(Input& in) {
     require(hit_in_batch(p.a, p.b) == exact, "a batch of boxes differs from exact");
   if (p.flat) return;
   double witness[7];
-  witnesses(p.a.rows, p.b.rows, 1, 1, &hit, witness);
+  tauguard::rigid::witness(p.a.rows, p.b.rows, 0, hit, witness);
   auto normal = in.numbers(3, 1e3);
   for (int again = 0; again < 2; ++again) {
     overlap_cached(p.a.rows, p.b.rows, 1, 1, normal.data(), &hit);

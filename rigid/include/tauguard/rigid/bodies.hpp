@@ -14,21 +14,39 @@ using geometry::Dyadic;
 using geometry::Vec3;
 using geometry::Vector3;
 
-enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3, polygons = 4 };
+// The first three and hulls are polytopes, whose queries are exact. The kernel of support functions
+// (support_shape.hpp) takes every kind but polygons.
+enum class Kind : int {
+  tetrahedra = 0,
+  boxes = 1,
+  parallelepipeds = 2,
+  hulls = 3,
+  polygons = 4,
+  half_spaces = 5,
+  points = 6,
+  segments = 7,
+  ellipsoids = 8,
+  cylinders = 9,
+  cones = 10,
+};
+
+inline bool is_polytope(Kind kind) { return kind <= Kind::hulls; }
 
 // Whether bodies of this kind may differ in the number of vertices.
 inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
 // A tetrahedron is a row of 12 doubles (vertices), a box of 15 (centre, half extents, rotation by
-// rows), a parallelepiped of 12 (origin, edges). Hulls and polygons have one array of vertices for
-// all bodies; body i has the vertices offsets[i] to offsets[i + 1] - 1.
+// rows), a parallelepiped of 12 (origin, edges), a half-space of 4 (normal, offset). Ellipsoids,
+// cylinders and cones have rows as boxes, with three sizes instead of the half extents. Hulls and
+// polygons have one array of vertices for all bodies; body i has the vertices offsets[i] to
+// offsets[i + 1] - 1. Points and segments occur in Shape only.
 struct Bodies {
   Kind kind;
   const double* data;
   const std::int64_t* offsets;  // hulls and polygons only
   std::size_t count;            // a single body is paired with each body of the other side
 
-  static constexpr std::size_t strides[] = {12, 15, 12, 3, 2};
+  static constexpr std::size_t strides[] = {12, 15, 12, 3, 2, 4, 0, 0, 15, 15, 15};
 
   std::size_t index(std::size_t row) const { return count == 1 ? 0 : row; }
   const double* row(std::size_t r) const {
@@ -44,10 +62,17 @@ struct Bodies {
   }
 };
 
+// The body of row r as a batch of one; `offsets` is its memory.
+inline Bodies row_of(const Bodies& b, std::size_t r, std::int64_t* offsets) {
+  offsets[0] = 0, offsets[1] = static_cast<std::int64_t>(b.vertex_count(r));
+  return {b.kind, b.row(r), offsets, 1};
+}
+
 template <class Number>
 using Points = std::vector<Vector3<Number>>;
 
 // The vertices of the body of row r in `Number` arithmetic: exact with Dyadic, rounded with double.
+// Of an ellipsoid, cylinder or cone: the corners of a box around it.
 template <class Number>
 Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   const double* p = bodies.row(r);
@@ -62,13 +87,15 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
       for (int k = 0; k < 3; ++k) out[i][k] = Number(p[3 * i + k]);
     return out;
   }
-  const bool box = bodies.kind == Kind::boxes;
+  const bool box = bodies.kind != Kind::parallelepipeds;
+  double half[3] = {p[3], p[4], p[5]};
+  if (bodies.kind == Kind::cylinders || bodies.kind == Kind::cones) half[1] = p[3], half[2] = p[4];
   for (int k = 0; k < 3; ++k) {
     const Number origin(p[k]);
     Number g[3];
     for (int axis = 0; axis < 3; ++axis)
       g[axis] =
-          box ? Number(p[6 + 3 * k + axis]) * Number(p[3 + axis]) : Number(p[3 + 3 * axis + k]);
+          box ? Number(p[6 + 3 * k + axis]) * Number(half[axis]) : Number(p[3 + 3 * axis + k]);
     for (int corner = 0; corner < 8; ++corner) {
       Number x = origin;
       for (int axis = 0; axis < 3; ++axis) {

@@ -38,7 +38,9 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& g
 
 // Replaces the fields of an overlapping `d`. `lower` becomes minus the penetration depth of the
 // cores, and `n` the direction of the shortest translation that separates b from a. Both points
-// become the middle of the overlap along `n`.
-void penetration(const SupportShape& a, const SupportShape& b, Distance* d);
+// become the middle of the overlap along `n`. The search ends when the depth is known to
+// `resolution` times the size, or when the polytope has `most_faces`.
+void penetration(const SupportShape& a, const SupportShape& b, Distance* d,
+                 double resolution = 1e-7, int most_faces = 396);
 
 }  // namespace tauguard::rigid

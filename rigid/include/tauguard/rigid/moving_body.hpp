@@ -24,9 +24,13 @@ struct RigidMotion {
       linear[i] = lin[i];
       axis[i] = angular[i];
     }
+    // Below 2^-900, where 1 / most may overflow, the vector is lifted by a power of two (exact).
+    const double lift = largest(axis) < 0x1p-900 ? 0x1p900 : 1;
+    axis = lift * axis;
     const double most = largest(axis);
     speed = most == 0 ? 0 : most * norm((1 / most) * axis);
     axis = speed == 0 ? Vec3{} : (1 / speed) * axis;
+    speed /= lift;
   }
   Vec3 turn(const Vec3& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
 };
