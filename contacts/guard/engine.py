@@ -31,8 +31,10 @@ FUNCTIONS = {
     "get_state": "mj_getState",
     "set_state": "mj_setState",
     "copy_state": "mj_copyState",
+    "copy_model": "mj_copyModel",
     "mul_m": "mj_mulM",
     "mul_jac": "mj_mulJacVec",
+    "mul_jac_t": "mj_mulJacTVec",
     "jac_com": "mj_jacBodyCom",
     "jac": "mj_jac",
     "solve_m": "mj_solveM",
@@ -53,13 +55,15 @@ _MODEL_ARRAYS = (
     *("pair_geom1", "pair_geom2", "flex_vertbodyid", "flex_vert"),
     *("geom_bodyid", "body_rootid", "body_mocapid", "body_dofnum", "body_weldid"),
 )
-#: Arrays of contact parameters, by their number in the native guard.
+#: Contact parameters that sub-steps change, by the number of their kind in the native guard.
 _PARAMETERS = {
-    f"{name}[{k}]": f"{kind}_{name}"
+    f"at_{name}[{k}]": f"{kind}_{name}"
     for k, kind in enumerate(("pair", "geom", "flex"))
     for name in ("margin", "solref", "solimp", "friction", "priority")
     if hasattr(mujoco.MjModel, f"{kind}_{name}")  # pairs have no priority
 }
+#: MuJoCo's global callbacks, except the contact filter.
+_CALLBACKS = ("passive", "control", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 _DATA_ARRAYS = (
     *("qpos", "qvel", "energy", "qfrc_actuator", "qfrc_applied", "xfrc_applied"),
     *("xpos", "xmat", "xipos", "flexvert_xpos", "mocap_pos", "mocap_quat"),
@@ -68,11 +72,11 @@ _END_ARRAYS = ("qvel", "energy", "xpos", "xmat", "flexvert_xpos", "cvel")
 _OTHER_ARRAYS = ("energy", "xpos", "xmat", "flexvert_xpos", "mocap_pos", "mocap_quat")
 _MOVING = (
     *("ncon", "nefc", "contact", "efc_aref", "efc_margin", "efc_vel", "efc_pos", "efc_force"),
-    *("efc_type", "efc_id"),
+    *("efc_type", "efc_id", "efc_diagA"),
 )
 OPTIONS = (
     *("timestep", "disableflags", "enableflags", "integrator", "cone", "solver", "iterations"),
-    *("o_margin", "o_solref"),
+    *("o_margin", "o_solref", "o_solimp"),
 )
 #: Physical options, which must be finite.
 PHYSICS = (
@@ -117,7 +121,6 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     """
     out = {own: function_address(name) for own, name in FUNCTIONS.items()}
     out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
-    out |= {own: _array(model, name) for own, name in _PARAMETERS.items()}
     out |= {name: _array(data, name) for name in _DATA_ARRAYS}
     out |= {f"end_{name}": _array(end, name) for name in _END_ARRAYS}
     out |= {f"other_{name}": _array(other, name) for name in _OTHER_ARRAYS}
@@ -129,9 +132,13 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     for k, kind in enumerate(_RESETS):
         at = kind * ctypes.sizeof(warning) + int(warning.number.offset)
         out[f"resets[{k}]"] = base + int(fields.warning.offset) + at
-    names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
+    names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame", "surfacevel")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
-    option = model._address + int(_layout("mjModel", "opt").opt.offset)
+    out["at_friction_of"] = int(contact.friction.offset)
+    struct = _layout("mjModel")
+    out |= {own: int(getattr(struct, name).offset) for own, name in _PARAMETERS.items()}
+    out |= {f"callbacks[{k}]": variable_address(f"mjcb_{n}") for k, n in enumerate(_CALLBACKS)}
+    option = model._address + int(struct.opt.offset)
     out |= {
         name: option + int(getattr(_layout("mjOption"), name).offset)
         for name in (*OPTIONS, *PHYSICS)
@@ -142,6 +149,8 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
         "data": base,
         "end": end._address,
         "other": other._address,
+        "model_size": ctypes.sizeof(struct),
+        "surfaces_move": model._address + int(struct.flg_surfacevel.offset),
         "contact_size": ctypes.sizeof(contact),
         "interpolated": bool(model.nflex) and bool(model.flex_interp.any()),
         "state_size": mujoco.mj_stateSize(model, INTEGRATION),
@@ -173,6 +182,11 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
         ctypes.c_int.from_address(found["ncon"]).value == data.ncon,
         ctypes.c_int.from_address(found["nefc"]).value == data.nefc,
         ctypes.c_int.from_address(found["resets[2]"]).value == data.warning[_RESETS[2]].number,
+        *(
+            ctypes.c_size_t.from_address(model._address + found[own]).value == _array(model, name)
+            for own, name in _PARAMETERS.items()
+            if getattr(model, name).size
+        ),
         not model.nq or ctypes.c_size_t.from_address(qpos).value == found["qpos"],
     )
     if not all(same):
@@ -194,19 +208,19 @@ def _structs() -> Any:
 
 
 @functools.cache
-def _layout(struct: str, last: str | None = None) -> Any:
-    """The ctypes layout of a MuJoCo struct; ``last`` names the last field to include."""
-    fields = []
-    for field in _structs()[struct].fields:
-        if not hasattr(field, "type"):
-            raise RuntimeError(
-                f"MuJoCo {mujoco.__version__}: {struct} has a field without a type; guarded steps "
-                "need MuJoCo 4.0"
-            )
-        fields.append((field.name, _ctype(field.type)))
-        if field.name == last:
-            break
-    return type(struct, (ctypes.Structure,), {"_fields_": fields})
+def _layout(struct: str) -> Any:
+    """The ctypes layout of a MuJoCo struct."""
+    return _structure(struct, _structs()[struct])
+
+
+def _structure(name: str, declared: Any) -> Any:
+    if any(not hasattr(field, "type") for field in declared.fields):
+        raise RuntimeError(
+            f"MuJoCo {mujoco.__version__}: {name} has a field without a type; guarded steps need "
+            "MuJoCo 4.0"
+        )
+    fields = [(field.name, _ctype(field.type)) for field in declared.fields]
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
 def _ctype(kind: Any) -> Any:
@@ -217,6 +231,8 @@ def _ctype(kind: Any) -> Any:
         for extent in reversed(kind.extents):
             out = out * extent
         return out
+    if isinstance(kind, ast_nodes.AnonymousStructDecl):
+        return _structure("anonymous", kind)
     name = kind.name.removeprefix("struct ").rstrip("_")
     if name in _TYPES:
         return _TYPES[name]

@@ -1,8 +1,7 @@
 """The model's fields that a guard compares between two steps, and values that it refuses.
 
 The guard copies some fields; if one of them has changed, it reads pairs and shapes again. All other
-numbers may change, but must be valid. The contact parameters that the guard itself writes are
-compared by the native part (stiffening.hpp).
+numbers may change, but must be valid.
 """
 
 import functools
@@ -51,7 +50,6 @@ _OBJECTS = re.compile("(body|jnt|dof|geom|pair|flex|eq|site|tendon|wrap|actuator
 _FINITE, _NOT_NAN, _NOT_NEGATIVE = range(3)
 _LIMITS = re.compile("range|yield|_user")  # these fields may be infinite
 _MASSES = ("body_mass", "body_inertia", "dof_armature", "tendon_armature", "flex_radius")
-_WRITTEN = re.compile("(pair|geom|flex)_(solref|solimp)$")  # written by the guard itself
 #: Largest deviation of a quaternion's length from 1. MuJoCo normalizes quaternions when it compiles
 #: a model, and later assumes unit length.
 _UNIT = 1e-6
@@ -141,7 +139,7 @@ def numbers(model: Any, physics: Regions) -> list[tuple[int, int, int]]:
     out = [(*region, _FINITE) for region in physics]
     for name, rule in _rules().items():
         array = getattr(model, name)
-        if array.size and not _WRITTEN.match(name):
+        if array.size:
             out.append((array.ctypes.data, array.nbytes, rule))
     return out
 

@@ -32,12 +32,10 @@ class Cut:
     Attributes:
         time: Time at which the next attempt ends [s].
         pair: Pair that passed through, got too deep, or touched without a listed contact.
-        stiffened: Whether the pair's contact parameters are changed until it separates.
     """
 
     time: float
     pair: Pair
-    stiffened: bool
 
 
 @dataclass(frozen=True)
@@ -48,20 +46,18 @@ class StepReport:
         steps: Calls of ``mj_step``, including those that were rolled back.
         contacts: Largest number of contacts that MuJoCo listed in an accepted sub-step.
         cuts: Sub-steps that were rolled back, in their order.
-        restored: Pairs that have separated and whose original contact parameters were restored.
         passed: Pairs that may have passed through each other.
         impact_zones: Pairs that moved rigidly together in a sub-step.
         energy_added: Sum of the energy gains of accepted sub-steps [J]. The gain of a sub-step is
             the change of kinetic, potential and elastic energy minus the work of drives, mocap
-            bodies and applied forces. Sub-steps that lose energy count as 0, so the sum can be
-            positive while the total energy falls: see ``balance``. It is 0 in a plain step, in
-            which the guard does not act.
+            bodies, moving surfaces and applied forces. Sub-steps that lose energy count as 0,
+            so the sum can be positive while the total energy falls: see ``balance``. It is 0 in
+            a plain step, in which the guard does not act.
     """
 
     steps: int
     contacts: int
     cuts: tuple[Cut, ...] = ()
-    restored: tuple[Pair, ...] = ()
     passed: tuple[Pair, ...] = ()
     impact_zones: tuple[Pair, ...] = ()
     energy_added: float = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable, Sequence
 from types import TracebackType
@@ -34,9 +35,8 @@ SETTINGS = {
     "beyond": 1e-5,  # a cut sub-step ends this deep, so that MuJoCo lists the contact [m]
     "room": 1.25,  # margin of a held pair divided by its approach in the failed attempt
     "smallest": 1 / 64,  # sub-steps of at most this fraction of the step are not cut further
-    "push": 0.2,  # fraction of a penetration that is pushed out in each step
     "watched": 10,  # number of accepted steps after a rollback in which energy is counted
-    "look": 16,  # largest number of steps between two tests whether held pairs have separated
+    "look": 16,  # largest number of steps between two tests whether pairs have separated
     "allowed": 0.01,  # energy that contacts may add, as a fraction of the initial kinetic energy
     "deeper_geom": 1 / 8,  # longest sub-step in which a held pair may get deeper [step]
     "deeper_flex": 1 / 2,  # the same for pairs with a flex
@@ -51,9 +51,9 @@ class GuardedStepper:
 
     1. A plain step is accepted, with the bits of ``mj_step``, unless a pair becomes too deep or
        touches and separates without a contact in MuJoCo's list.
-    2. Otherwise the state is rolled back, and the pair is made stiff until it separates. The step
-       is taken in sub-steps: one up to the touch, and others in which the solver stops the
-       approach. A sub-step that still fails is halved.
+    2. Otherwise the state is rolled back. The step is taken in sub-steps: one up to the touch, and
+       others in which the solver stops the approach; these impacts are inelastic, with the
+       friction of Coulomb's law. A sub-step that still fails is halved.
     3. If this does not help, the partners move rigidly together in the sub-step: the velocity
        changes by as little as possible, in the metric of the inertia (rigid impact zones: Provot
        1997; Bridson, Fedkiw and Anderson 2002). If even then some pass through, all stand still.
@@ -63,13 +63,15 @@ class GuardedStepper:
     MuJoCo or an exception in ``each``, the state before the step is restored. Copies, deep copies
     and unpickled guards continue with the same bits; a shallow copy shares model and data.
 
+    The model is only read, so many guards, each with its own MjData, may share one in any number of
+    threads. Sub-steps use a copy of it. Callbacks in Python (``mjcb_control`` and others) get this
+    copy as ``model`` in sub-steps; what they write to it is lost.
+
     Args:
-        model: MjModel. A step changes and restores ``opt.timestep``, margins and contact
-            parameters; the parameters of ``stiff`` pairs are restored when the pair separates.
+        model: MjModel.
         data: The MjData to step.
         checkers: The covered pairs: ``rigid`` for geoms with geoms, ``cloth`` for flexes with
             geoms, other flexes and themselves. :attr:`uncovered` lists the other pairs.
-        stiff: Whether pairs that cause a rollback are made stiff.
         most: Largest number of calls of ``mj_step`` in one step; at this number stage 3 follows.
 
     Raises:
@@ -81,14 +83,13 @@ class GuardedStepper:
         model: Any,
         data: Any,
         checkers: Sequence[str] = ("cloth", "rigid"),
-        stiff: bool = True,
         most: int = 40,
     ) -> None:
         """Check the model, and make the native guard."""
         if most < 2:
             raise ArgumentError(f"most {most}: expected 2 or more calls of mj_step")
         self._rigid, self._cloth = names(checkers)
-        self._model, self._data, self._stiff, self._most = model, data, stiff, most
+        self._model, self._data, self._most = model, data, most
         warn_of_sparse_newton(model)
         self._start()
 
@@ -96,7 +97,7 @@ class GuardedStepper:
         model = self._model
         _refuse(model, self._data)
         end = mujoco.MjData(model)
-        settings = {**SETTINGS, "stiff": self._stiff, "most": self._most}
+        settings = {**SETTINGS, "most": self._most}
         other = mujoco.MjData(model) if model.nmocap else end
         held = (model, self._data, end, other)
         found = addresses(*held)
@@ -137,7 +138,7 @@ class GuardedStepper:
     def __getstate__(self) -> dict[str, Any]:
         """Model, data and the memory of earlier steps."""
         self._follow()
-        names = ("_model", "_data", "_rigid", "_cloth", "_stiff", "_most")
+        names = ("_model", "_data", "_rigid", "_cloth", "_most")
         return {name: getattr(self, name) for name in names} | {"saved": self._guard.saved()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -194,11 +195,6 @@ class GuardedStepper:
         """
         return self._named(self._guard.sunk())
 
-    @property
-    def stiffened(self) -> tuple[Pair, ...]:
-        """Pairs whose contact parameters are changed at present."""
-        return self._named(self._guard.stiffened())
-
     def step(self, each: Callable[[], None] | None = None) -> StepReport:
         """Advance by one ``model.opt.timestep``.
 
@@ -226,14 +222,14 @@ class GuardedStepper:
     def reset(self) -> None:
         """Start again at the present state, with mocap bodies at their present poses.
 
-        Contact parameters are restored and the memory of earlier steps is cleared. If ``data.time``
-        is changed between two steps, mocap bodies also start at their present poses.
+        The memory of earlier steps is cleared. If ``data.time`` is changed between two steps, mocap
+        bodies also start at their present poses.
         """
         self._guard.reset()
 
     def close(self) -> None:
-        """Restore all contact parameters."""
-        self._guard.close()
+        """Clear the memory of earlier steps. The model was only read, so it needs no repair."""
+        self._guard.reset()
 
     def __enter__(self) -> GuardedStepper:
         """The guard itself; leaving the block calls :meth:`close`."""
@@ -245,19 +241,18 @@ class GuardedStepper:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Restore all contact parameters."""
+        """Call :meth:`close`."""
         self.close()
 
     def _named(self, numbers: Sequence[int]) -> tuple[Pair, ...]:
         return tuple(sorted([self._pairs[k] for k in numbers])) if numbers else ()
 
     def _report(self) -> StepReport:
-        steps, contacts, cuts, restored, passed, zones, added, states = self._guard.report()
+        steps, contacts, cuts, passed, zones, added, states = self._guard.report()
         return StepReport(
             steps,
             contacts,
-            tuple([Cut(time, self._pairs[pair], stiff) for time, pair, stiff in cuts]),
-            self._named(restored),
+            tuple([Cut(time, self._pairs[pair]) for time, pair in cuts]),
             self._named(passed),
             self._named(zones),
             added,
@@ -269,6 +264,11 @@ class GuardedStepper:
             self._meter = EnergyMeter(self.model)
         first, last = np.frombuffer(states).reshape(2, -1)
         return self._meter.between(first, last)
+
+    def _bound_copy(self) -> int:
+        """The address of a copy of the model that callbacks in Python may get."""
+        self._copy = copy.copy(self._model)
+        return int(self._copy._address)
 
     def _tunnelling_events(self, x_t1: Array) -> list[tuple[int, list[int], float]]:
         assert self._tunnelling is not None

@@ -33,7 +33,8 @@ EnergyChange EnergyBudget::change(const double* velocity, double length, const d
     mean[i] = 0.5 * (mean[i] + e_.qvel[i]);
     driven += (e_.qfrc_actuator[i] + e_.qfrc_applied[i]) * mean[i];
   }
-  driven = length * (driven + pushed(mean.data())) + mocap_.work(mean.data(), length);
+  driven = length * (driven + pushed(mean.data())) + mocap_.work(mean.data(), length) +
+           moved_by_surfaces(velocity, length);
   return {kinetic_end + e_.end_energy[0] + stretch(x_t1) - before - driven, kinetic_end};
 }
 
@@ -48,6 +49,18 @@ double EnergyBudget::stretch(const double* x) const {
   double sum = 0;
   for (const Sheet& sheet : sheets_) sum += sheet.energy(x);
   return sum;
+}
+
+// Work of surfaces that move while their geom does not, such as belts [J]. `velocity` is that at
+// the start. MuJoCo's efc_vel is relative to the surface.
+double EnergyBudget::moved_by_surfaces(const double* velocity, double length) {
+  if (!*e_.surfaces_move || !*e_.nefc) return 0;
+  rows_.resize(*e_.nefc);
+  e_.mul_jac(e_.model, e_.data, rows_.data(), velocity);
+  double work = 0;
+  for (int row = 0; row < *e_.nefc; ++row)
+    work += length * (*e_.efc_force)[row] * (rows_[row] - (*e_.efc_vel)[row]);
+  return work;
 }
 
 // Power of the applied forces [W].

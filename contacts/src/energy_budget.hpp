@@ -54,12 +54,13 @@ class EnergyBudget {
   double kinetic(const void* data, const double* velocity);
   double stretch(const double* x) const;
   double pushed(const double* velocity);
+  double moved_by_surfaces(const double* velocity, double length);
 
   const Engine& e_;
   Mocap& mocap_;
   std::vector<Sheet> sheets_;
   double fraction_, gained_ = 0, allowed_ = 0;
-  std::vector<double> momentum_;
+  std::vector<double> momentum_, rows_;
 };
 
 }  // namespace tauguard::contacts

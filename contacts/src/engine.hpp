@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct Contact {
   int dim, row;  // condim; first constraint row, or -1
   int geom[2], flex[2];
   const double *at, *normal;  // point; unit vector from the first partner to the second
+  const double* friction;     // coefficients: two of sliding, then of torsion and rolling
+  double* surface;            // velocity of the second surface relative to the first (3)
 };
 
 struct Engine {
@@ -37,7 +40,8 @@ struct Engine {
   Call<const void*, const void*, double*, int> get_state;
   Call<const void*, void*, const double*, int> set_state;
   Call<const void*, const void*, void*, int> copy_state;
-  Call<const void*, const void*, double*, const double*> mul_m, mul_jac;
+  Call<void*, const void*> copy_model;
+  Call<const void*, const void*, double*, const double*> mul_m, mul_jac, mul_jac_t;
   Call<const void*, const void*, double*, double*, int> jac_com;
   Call<const void*, const void*, double*, double*, const double*, int> jac;
   Call<const void*, void*, double*, const double*, int> solve_m;
@@ -48,13 +52,13 @@ struct Engine {
   int state_size;
   bool interpolated;  // whether some flex has vertices without their own bodies
 
-  // Fields of the model. A step changes and restores timestep, flags, margins and parameters.
-  double* timestep;
-  int *disableflags, *enableflags, *integrator, *cone, *solver, *iterations;
-  double *o_margin, *o_solref;                // for all contacts, if the flag `override` is set
-  double *margin[3], *solref[3], *solimp[3];  // indexed by Place::Kind: explicit pair, geom, flex
-  double* friction[3];
-  int* priority[3];
+  // Fields of the model, which are only read. Sub-steps change a copy (model_copy.hpp).
+  const double* timestep;
+  const int *disableflags, *enableflags, *integrator, *cone, *solver, *iterations;
+  const double *o_margin, *o_solref, *o_solimp;  // for all contacts, if the flag `override` is set
+  const bool* surfaces_move;                     // whether any geom has a surface velocity
+  // The size of the struct, and the offsets of its arrays of contact parameters, by Place::Kind.
+  std::size_t model_size, at_margin[3], at_solref[3], at_solimp[3], at_friction[3], at_priority[3];
   const int *pair_geom1, *pair_geom2;
   const int *flex_vertbodyid, *geom_bodyid, *body_rootid, *body_mocapid;
   const int *body_dofnum, *body_weldid;
@@ -66,9 +70,10 @@ struct Engine {
   const double *xpos, *xmat, *xipos, *flexvert_xpos;
   const int *ncon, *nefc;
   char* const* contact;
-  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_efc_address, at_pos, at_frame;
+  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_efc_address, at_pos, at_frame,
+      at_friction_of, at_surfacevel;
   double *const *efc_aref, *const *efc_margin;
-  double *const *efc_vel, *const *efc_pos, *const *efc_force;
+  double *const *efc_vel, *const *efc_pos, *const *efc_force, *const *efc_diagA;
   int *const *efc_type, *const *efc_id;
 
   int* resets[3];  // MuJoCo's counts of warnings of bad positions, velocities and accelerations
@@ -84,30 +89,35 @@ struct Engine {
   // Values of MuJoCo's enumerations, and refused flags.
   int discrete, runge_kutta, pyramidal, elliptic, refsafe, newton, equality, override_flag, refused;
   void* const* contact_filter;      // MuJoCo's global callback
+  void* const* callbacks[7];        // all other global callbacks
   std::size_t at_pstack, at_pbase;  // offsets of mjData's pointers into its stack
 
   // The names in Python's dict of addresses and numbers.
   TAUGUARD_FIELDS(model, data, end, other, logging.set, logging.global, logging.error,
                   logging.at_subject, step, step1, step2, kinematics, com_pos, com_vel, flex,
                   tendon, make_m, energy_pos, get_state, set_state, copy_state, mul_m, mul_jac,
-                  jac_com, jac, solve_m, integrate, nq, nv, nbody, nmocap, ngeom, npair, nflex,
-                  nflexvert, ntendon, signature.integration, signature.pose, state_size,
-                  interpolated, timestep, disableflags, enableflags, integrator, cone, solver,
-                  iterations, o_margin, o_solref, margin[0], margin[1], margin[2], solref[0],
-                  solref[1], solref[2], solimp[0], solimp[1], solimp[2], friction[0], friction[1],
-                  friction[2], priority[1], priority[2], pair_geom1, pair_geom2, flex_vertbodyid,
-                  geom_bodyid, body_rootid, body_mocapid, body_dofnum, body_weldid, flex_vert, time,
-                  qpos, qvel, energy, mocap_pos, mocap_quat, qfrc_actuator, qfrc_applied,
-                  xfrc_applied, xpos, xmat, xipos, flexvert_xpos, ncon, nefc, contact, contact_size,
-                  at_dist, at_dim, at_geom, at_flex, at_efc_address, at_pos, at_frame, efc_aref,
-                  efc_margin, efc_vel, efc_pos, efc_force, efc_type, efc_id, resets[0], resets[1],
-                  resets[2], end_qvel, end_energy, end_xpos, end_xmat, end_flexvert_xpos, end_cvel,
+                  mul_jac_t, copy_model, jac_com, jac, solve_m, integrate, nq, nv, nbody, nmocap,
+                  ngeom, npair, nflex, nflexvert, ntendon, signature.integration, signature.pose,
+                  state_size, interpolated, timestep, disableflags, enableflags, integrator, cone,
+                  solver, iterations, o_margin, o_solref, o_solimp, surfaces_move, model_size,
+                  at_margin[0], at_margin[1], at_margin[2], at_solref[0], at_solref[1],
+                  at_solref[2], at_solimp[0], at_solimp[1], at_solimp[2], at_friction[0],
+                  at_friction[1], at_friction[2], at_priority[1], at_priority[2], pair_geom1,
+                  pair_geom2, flex_vertbodyid, geom_bodyid, body_rootid, body_mocapid, body_dofnum,
+                  body_weldid, flex_vert, time, qpos, qvel, energy, mocap_pos, mocap_quat,
+                  qfrc_actuator, qfrc_applied, xfrc_applied, xpos, xmat, xipos, flexvert_xpos, ncon,
+                  nefc, contact, contact_size, at_dist, at_dim, at_geom, at_flex, at_efc_address,
+                  at_pos, at_frame, at_friction_of, at_surfacevel, efc_aref, efc_margin, efc_vel,
+                  efc_pos, efc_force, efc_diagA, efc_type, efc_id, resets[0], resets[1], resets[2],
+                  end_qvel, end_energy, end_xpos, end_xmat, end_flexvert_xpos, end_cvel,
                   other_energy, other_mocap_pos, other_mocap_quat, other_xpos, other_xmat,
                   other_flexvert_xpos, discrete, runge_kutta, pyramidal, elliptic, refsafe, newton,
-                  equality, override_flag, refused, contact_filter, at_pstack, at_pbase)
+                  equality, override_flag, refused, contact_filter, callbacks[0], callbacks[1],
+                  callbacks[2], callbacks[3], callbacks[4], callbacks[5], callbacks[6], at_pstack,
+                  at_pbase)
 
   Contact contact_at(int k) const {
-    const char* p = *contact + static_cast<std::size_t>(k) * contact_size;
+    char* p = *contact + static_cast<std::size_t>(k) * contact_size;
     const int* geom_ids = reinterpret_cast<const int*>(p + at_geom);
     const int* flex_ids = reinterpret_cast<const int*>(p + at_flex);
     return {*reinterpret_cast<const double*>(p + at_dist),
@@ -116,21 +126,18 @@ struct Engine {
             {geom_ids[0], geom_ids[1]},
             {flex_ids[0], flex_ids[1]},
             reinterpret_cast<const double*>(p + at_pos),
-            reinterpret_cast<const double*>(p + at_frame)};
+            reinterpret_cast<const double*>(p + at_frame),
+            reinterpret_cast<const double*>(p + at_friction_of),
+            reinterpret_cast<double*>(p + at_surfacevel)};
   }
   // The number of rows of a contact that act along its normal, counted from its first row.
   int normal_rows(const Contact& c) const {
     return *cone == pyramidal && c.dim > 1 ? 2 * (c.dim - 1) : 1;
   }
-  // Whether the contact parameters that a guard writes are finite.
-  bool parameters_finite() const {
-    const int count[3] = {npair, ngeom, nflex};
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      for (int i = 0; i < 2 * count[k]; ++i) sum += solref[k][i] - solref[k][i];
-      for (int i = 0; i < 5 * count[k]; ++i) sum += solimp[k][i] - solimp[k][i];
-    }
-    return sum == 0;
+  bool has_callbacks() const {
+    for (void* const* callback : callbacks)
+      if (callback && *callback) return true;
+    return false;
   }
   bool is_discrete() const { return *integrator == discrete; }
 };

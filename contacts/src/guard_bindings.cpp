@@ -103,6 +103,11 @@ class Guard {
     const Stepping stepping(this);
     owner_ = owner;
     if (model_.needs_check() || !stepper_->acceptable()) owner.attr("_follow")();
+    if (engine_.has_callbacks() != bound_) {
+      bound_ = !bound_;
+      const nb::object address = bound_ ? owner.attr("_bound_copy")() : nb::int_(0);
+      stepper_->bind(reinterpret_cast<void*>(nb::cast<std::uintptr_t>(address)));
+    }
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {
@@ -142,9 +147,8 @@ class Guard {
 
   // The fields of StepReport; if the step was rolled back, the last item has the states at its
   // start and its end, one after the other.
-  using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int, bool>>;
-  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double,
-            std::optional<nb::bytes>>
+  using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int>>;
+  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, double, std::optional<nb::bytes>>
   report() const {
     const Report& r = stepper_->report();
     const auto ids = [](const std::vector<int>& values) {
@@ -153,20 +157,17 @@ class Guard {
       return out;
     };
     nb::list cuts;
-    for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair, cut.stiffened));
-    return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.restored), ids(r.passed),
-                          ids(r.impact_zones), r.added, r.rolled_back ? states() : nb::none());
+    for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair));
+    return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.passed), ids(r.impact_zones), r.added,
+                          r.rolled_back ? states() : nb::none());
   }
 
-  Integers stiffened() const { return listed(&Stepper::stiffened); }
-  Integers sunk() const { return listed(&Stepper::sunk); }
-  Integers listed(std::vector<int> (Stepper::*ask)() const) const {
+  Integers sunk() const {
     if (stepping_ != std::this_thread::get_id()) refuse_within_step();
     Integers out;
-    for (const int pair : ((*stepper_).*ask)()) out.append(pair);
+    for (const int pair : stepper_->sunk()) out.append(pair);
     return out;
   }
-  void close() { refuse_within_step(), stepper_->close(); }
   void reset() { refuse_within_step(), stepper_->reset(); }
 
  private:
@@ -235,6 +236,7 @@ class Guard {
   Settings s_;
   Coverage covered_;  // added since the last start
   std::unique_ptr<Stepper> stepper_;
+  bool bound_ = false;        // whether callbacks are set, which need a model that Python knows
   std::thread::id stepping_;  // the thread that is in a step, or none
 };
 
@@ -264,14 +266,12 @@ void bind_guard(nb::module_& m) {
       .def("start", &Guard::start, "sheets"_a)
       .def("step", &Guard::step, "owner"_a, "each"_a.none())
       .def("report", &Guard::report)
-      .def("stiffened", &Guard::stiffened)
       .def("sunk", &Guard::sunk)
       .def("follow", &Guard::follow, "fields"_a, "numbers"_a)
       .def("changed", &Guard::changed)
       .def("clear", &Guard::clear)
       .def("saved", &Guard::saved)
       .def("restore", &Guard::restore, "state"_a)
-      .def("close", &Guard::close)
       .def("reset", &Guard::reset);
 }
 

@@ -6,7 +6,7 @@
 #pragma once
 
 #include "engine.hpp"
-#include "stiffening.hpp"
+#include "partners.hpp"
 #include "tauguard/rigid/support_shape.hpp"
 
 namespace tauguard::contacts {

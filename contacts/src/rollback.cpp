@@ -25,15 +25,13 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   report_.rolled_back = true;
   std::fill(in_zone_.begin(), in_zone_.end(), 0);
   speeds_.clear();
+  rows_.begin();
   e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
-  push_ = s_.push / whole_;
-  if (hits.empty()) {  // no hits: contacts added too much energy, so nothing is pushed out
-    push_ = 0;
-    for (std::size_t i = 0; i < guarded_.size(); ++i)
-      if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
-  }
+  // No hits: contacts added too much energy.
+  for (std::size_t i = 0; hits.empty() && i < guarded_.size(); ++i)
+    if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
   const bool stuck = !fresh && stops_ > 0;
   least_ = stuck ? longest : s_.smallest;
   stops_ = 0;
@@ -47,7 +45,7 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
     length = stops_ > stops ? least_ * whole_ : rest_;
   }
   *e_.time = end;
-  report_.restored = release();
+  release();
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (passed_[i]) report_.passed.push_back(static_cast<int>(i));
     if (in_zone_[i]) report_.impact_zones.push_back(static_cast<int>(i));
@@ -67,7 +65,8 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
   for (;;) {
     mocap_.sub_step(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
     const ResetWatch watch(e_);
-    rows_.step(length, held(length), push_);
+    length_ = length;
+    rows_.step(saved_.data(), length, held(length));
     ++report_.steps;
     if (watch.happened() || *e_.time != begin + length || !finite()) {
       note_reset();
@@ -85,12 +84,7 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
       break;
     }
     e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
-    if (fails)
-      length = shorter(hits, length);
-    else if (push_ != 0)
-      push_ = 0;
-    else
-      length *= 0.5;
+    length = fails ? shorter(hits, length) : 0.5 * length;
   }
   report_.contacts = std::max(report_.contacts, *e_.ncon);
   budget_.record(change);
@@ -213,8 +207,7 @@ double Stepper::shorter(const std::vector<PairHit>& hits, double length) {
   if (!fresh && !hits.empty()) share = 0.5;
   for (const PairHit& hit : hits) {
     if (!guarded_[hit.pair]) guarded_[hit.pair] = 1, ++guarded_count_;
-    const bool stiffened = s_.stiff && stiffening_.stiffen(hit.pair);
-    report_.cuts.push_back({*e_.time + share * length, hit.pair, stiffened});
+    report_.cuts.push_back({*e_.time + share * length, hit.pair});
   }
   return std::max(share * length, std::min(length, 0.5 * s_.smallest * whole_));
 }

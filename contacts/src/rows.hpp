@@ -1,21 +1,25 @@
 // A sub-step in which the solver stops the approach of chosen ("held") pairs before they are deep.
 //
 // * The margin of a held pair is the largest approach in the sub-step, so that MuJoCo lists all
-//   places in which the pair may meet.
+//   places in which the pair may meet. Its contacts are rigid: with soft ones the solver would only
+//   slow the approach.
 // * Between mj_step1 and mj_step2 each constraint row of these contacts gets a target velocity for
 //   the end of the sub-step. At a signed distance d > 0 the bodies approach at most at d / h, where
 //   h is the length of the sub-step. In overlap they do not approach.
 // * The solver finds the least change of velocity, in the metric of the inertia, that satisfies the
-//   rows. All rows allow standing still, so the change removes energy and adds none, except to push
-//   out an overlap.
+//   rows. All rows allow standing still, so the change removes energy and adds none. The user's
+//   contacts push out overlaps in the next plain step.
+// * MuJoCo's cones are convex: bodies that slide at a speed v separate at friction * v. So the
+//   targets of the tangential rows are the velocities with which Coulomb's law is satisfied
+//   (sliding_friction.hpp), and no sliding is left that could lift a body.
 // * MuJoCo's rows do not contain the velocity of mocap bodies, so it is added here. Mocap bodies
-//   push without friction: with MuJoCo's friction, bodies that slide at a speed v separate at mu v.
-//   A ball between a paddle and a table, which must slide on one of them, would leave at many times
-//   the speed of the paddle.
+//   push without friction. A ball between a paddle and a table, which must slide on one of them,
+//   would leave at many times the speed of the paddle.
 #pragma once
 
 #include "mocap.hpp"
-#include "stiffening.hpp"
+#include "model_copy.hpp"
+#include "sliding_friction.hpp"
 
 namespace tauguard::contacts {
 
@@ -31,20 +35,29 @@ class Rows {
       : e_(engine),
         pairs_(pairs),
         mocap_(mocap),
+        copy_(engine),
         geoms_(engine.ngeom, 0),
         flexes_(static_cast<std::size_t>(engine.nflex), 0) {}
 
-  // One mj_step of `length` [s]. Overlaps are pushed out at `push` [1/s] times the depth.
-  void step(double length, const std::vector<Held>& held, double push);
+  // Call this before the sub-steps of a step: takes the present values of the model.
+  void begin() { copy_.take(); }
+  void bind(void* model) { copy_.bind(model); }
+  // One mj_step of `length` [s] from the data's state, which `start` contains
+  // (mjSTATE_INTEGRATION).
+  void step(const double* start, double length, const std::vector<Held>& held);
 
  private:
-  void aim(double length, double push);
-  void aim_contact(const Contact& contact, double length, double push);
+  void hold(const Held& held);
+  void choose();
+  void solve(double length, const std::vector<double>& tangents);
+  void aim(double length, const std::vector<double>& tangents);
 
   const Engine& e_;
   const std::vector<Partners>& pairs_;
   const Mocap& mocap_;
+  ModelCopy copy_;
   std::vector<char> geoms_, flexes_;
+  std::vector<Contact> chosen_;  // contacts of held objects
 };
 
 }  // namespace tauguard::contacts

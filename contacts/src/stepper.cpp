@@ -30,12 +30,10 @@ std::vector<int> marked(const std::vector<char>& marks) {
   return out;
 }
 
-// Restores the timestep and mocap poses when it is destroyed, also by an exception.
+// Restores the mocap poses when it is destroyed, also by an exception.
 struct Back {
-  const Engine& e;
-  double whole;
   Mocap& mocap;
-  ~Back() { *e.timestep = whole, mocap.command(); }
+  ~Back() { mocap.command(); }
 };
 
 }  // namespace
@@ -48,7 +46,6 @@ Stepper::Stepper(const Engine& engine, Coverage covered, const Settings& setting
       verdict_(std::move(covered.verdict)),
       mocap_(e_, std::move(covered.pulled)),
       budget_(e_, mocap_, std::move(covered.sheets), settings.allowed),
-      stiffening_(e_, pairs_),
       rows_(e_, pairs_, mocap_),
       spins_(std::move(covered.spins)),
       first_(engine.state_size),
@@ -72,29 +69,23 @@ void Stepper::number_pairs() {
 void Stepper::follow(Coverage covered) {
   struct Before {
     std::vector<char> known;
-    bool guarded, stiff;
+    bool guarded;
   };
   std::unordered_map<std::uint64_t, Before> before;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const int pair = static_cast<int>(i);
-    before[key(pairs_[i].first, pairs_[i].second)] = {verdict_.known(i), guarded_[i] != 0,
-                                                      stiffening_.is_stiff(pair)};
+    before[key(pairs_[i].first, pairs_[i].second)] = {verdict_.known(i), guarded_[i] != 0};
   }
-  stiffening_.follow();
-  close();
-  const int watched = watched_;
   verdict_ = std::move(covered.verdict), pairs_ = std::move(covered.pairs);
   last_level_ = std::move(covered.last_level), spins_ = std::move(covered.spins);
   budget_.set_sheets(std::move(covered.sheets)), mocap_.set_pulled(std::move(covered.pulled));
-  watched_ = watched;
-  stiffening_.resize(), number_pairs();
+  guarded_count_ = 0;
+  number_pairs();
   for (std::vector<char>* marks : {&guarded_, &passed_, &in_zone_}) marks->assign(pairs_.size(), 0);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const auto found = before.find(key(pairs_[i].first, pairs_[i].second));
     if (found == before.end()) continue;
     verdict_.set_known(i, found->second.known);
     guarded_[i] = found->second.guarded, guarded_count_ += guarded_[i];
-    if (found->second.stiff) stiffening_.stiffen(static_cast<int>(i));
   }
 }
 
@@ -103,7 +94,7 @@ bool Stepper::acceptable() const {
   return h > 0 && h <= std::numeric_limits<double>::max() && !(*e_.enableflags & e_.refused) &&
          *e_.integrator != e_.runge_kutta &&
          (*e_.cone == e_.pyramidal || *e_.cone == e_.elliptic) &&
-         !(e_.contact_filter && *e_.contact_filter) && mocap_.finite() && e_.parameters_finite();
+         !(e_.contact_filter && *e_.contact_filter) && mocap_.finite();
 }
 
 void Stepper::abandon() {
@@ -120,13 +111,12 @@ bool Stepper::finite() const {
 }
 
 bool Stepper::step(const std::function<void()>& each) {
-  stiffening_.follow();
   if (!mocap_.begin()) verdict_.forget();
   e_.get_state(e_.model, e_.data, first_.data(), e_.signature.integration);
   stepping_ = true;
   const bool watched = watched_ > 0;
   if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
-  whole_ = *e_.timestep;
+  whole_ = length_ = *e_.timestep;
   const double after = *e_.time + whole_;
   bool lost;
   {
@@ -145,15 +135,15 @@ bool Stepper::step(const std::function<void()>& each) {
   report_ = Report{};
   if (hits.empty() && (!watched || within_budget())) {
     report_.contacts = *e_.ncon;
-    const bool released = accept_step();
+    accept_step();
     if (lost) report_.passed = marked(passed_);
     mocap_.remember();
     stepping_ = false;
-    return !released && !lost;
+    return !lost;
   }
   watched_ = s_.watched;
   {
-    const Back back{e_, whole_, mocap_};
+    const Back back{mocap_};
     roll_back(std::move(hits), !watched, each);
   }
   mocap_.remember();
@@ -161,15 +151,14 @@ bool Stepper::step(const std::function<void()>& each) {
   return false;
 }
 
-// Accepts the plain step. True if the contact parameters of some pair were restored.
-bool Stepper::accept_step() {
+// Accepts the plain step.
+void Stepper::accept_step() {
   watched_ = std::max(watched_ - 1, 0);
-  if (!guarded_count_) return false;
+  if (!guarded_count_) return;
   ++since_;
-  if (*e_.ncon == contacts_ && since_ < s_.look) return false;
+  if (*e_.ncon == contacts_ && since_ < s_.look) return;
   since_ = 0, contacts_ = *e_.ncon;
-  report_.restored = release();
-  return !report_.restored.empty();
+  release();
 }
 
 std::vector<PairHit> Stepper::judge(Depth depth) {
@@ -203,7 +192,7 @@ std::vector<PairHit> Stepper::judge(Depth depth) {
 // all are slow.
 const double* Stepper::turns() {
   double most = 0;
-  const double h = *e_.timestep;
+  const double h = length_;
   for (const int dof : spins_) most = std::max(most, std::fabs(e_.qvel[dof]));
   if (!(most * h > s_.turned)) return nullptr;
   std::copy_n(e_.qvel, e_.nv, e_.end_qvel);
@@ -271,36 +260,20 @@ std::vector<char> Stepper::listed() const {
   return seen;
 }
 
-// Releases the pairs that have separated. Returns those whose contact parameters were restored.
-std::vector<int> Stepper::release() {
-  std::vector<int> out;
-  if (!guarded_count_) return out;
+// Releases the pairs that have separated.
+void Stepper::release() {
+  if (!guarded_count_) return;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
     // Pairs with a moving mocap body are always released: in a whole step the mocap body sinks into
-    // other bodies, and a stiff contact would eject these.
-    if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
-    guarded_[i] = 0, --guarded_count_;
-    if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));
+    // other bodies, so a pair that is held would be ejected.
+    if (guarded_[i] && (!seen[i] || mocap_.carries(pairs_[i]))) guarded_[i] = 0, --guarded_count_;
   }
-  return out;
-}
-
-std::vector<int> Stepper::stiffened() const {
-  std::vector<int> out;
-  for (std::size_t i = 0; i < pairs_.size(); ++i)
-    if (stiffening_.is_stiff(static_cast<int>(i))) out.push_back(static_cast<int>(i));
-  return out;
-}
-
-void Stepper::close() {
-  for (const int pair : stiffened()) stiffening_.restore(pair);
-  std::fill(guarded_.begin(), guarded_.end(), 0);
-  guarded_count_ = watched_ = 0;
 }
 
 void Stepper::reset() {
-  close();
+  std::fill(guarded_.begin(), guarded_.end(), 0);
+  guarded_count_ = watched_ = 0;
   verdict_.forget();
   mocap_.remember();
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <unordered_map>
 
 #include "energy_budget.hpp"
@@ -27,32 +28,30 @@ struct PairHit {
   std::vector<std::int32_t> corners;   // of a pair of flexes: the vertices that crossed
 };
 
-// A sub-step that was rolled back: the end time of the next attempt [s], the pair that caused the
-// rollback, and whether the contact parameters of this pair were stiffened.
+// A sub-step that was rolled back: the end time of the next attempt [s], and the pair that caused
+// the rollback.
 struct Cut {
   double time;
   int pair;
-  bool stiffened;
 };
 
 // The report of a step.
 struct Report {
   int steps = 1, contacts = 0;
   std::vector<Cut> cuts;
-  std::vector<int> restored, passed, impact_zones;
+  std::vector<int> passed, impact_zones;
   double added = 0;
   bool rolled_back = false;
 };
 
 // SETTINGS and GuardedStepper in contacts/guard/stepper.py explain the fields.
 struct Settings {
-  bool stiff;
   int most;
-  double beyond, room, smallest, push;
+  double beyond, room, smallest;
   int watched, look;
   double deeper_geom, deeper_flex, turned, allowed;
-  TAUGUARD_FIELDS(stiff, most, beyond, room, smallest, push, watched, look, deeper_geom,
-                  deeper_flex, turned, allowed)
+  TAUGUARD_FIELDS(most, beyond, room, smallest, watched, look, deeper_geom, deeper_flex, turned,
+                  allowed)
 };
 
 // What a guard covers.
@@ -80,8 +79,6 @@ class Stepper {
   // contacts is all that the report contains.
   bool step(const std::function<void()>& each);
   std::vector<int> sunk() const { return verdict_.sunk_pairs(); }
-  // Restores every contact parameter.
-  void close();
   // Clears the memory of earlier steps, after the user has set the state.
   void reset();
   // Replaces the covered pairs. The memory of pairs that remain is kept.
@@ -93,13 +90,14 @@ class Stepper {
   // Writes or reads the memory of earlier steps.
   template <class Archive>
   void archive(Archive& a) {
-    verdict_.archive(a), mocap_.archive(a), budget_.archive(a), stiffening_.archive(a);
+    verdict_.archive(a), mocap_.archive(a), budget_.archive(a);
     a(guarded_), a(guarded_count_), a(watched_), a(since_), a(contacts_), a(stops_);
   }
-  std::vector<int> stiffened() const;
+  // A model for callbacks (model_copy.hpp).
+  void bind(void* model) { rows_.bind(model); }
 
  private:
-  bool accept_step();
+  void accept_step();
   std::vector<PairHit> judge(Depth depth = Depth::all);
   bool finite() const;
   void number_pairs();
@@ -119,7 +117,7 @@ class Stepper {
   void carry();
   const double* turns();
   std::vector<char> listed() const;
-  std::vector<int> release();
+  void release();
   std::vector<Held> held(double length) const;
 
   Engine e_;
@@ -129,7 +127,6 @@ class Stepper {
   Verdict verdict_;
   Mocap mocap_;
   EnergyBudget budget_;
-  Stiffening stiffening_;
   Rows rows_;
   TunnellingEvents tunnelling_;
   std::unordered_map<std::uint64_t, int> number_;  // the number of a pair, by its partners
@@ -142,8 +139,9 @@ class Stepper {
 
   // State of a step while it is repeated in sub-steps.
   Report report_;
-  double whole_ = 0, rest_ = 0, push_ = 0;  // whole and remaining time [s]; push-out rate [1/s]
-  double least_ = 0;                        // smallest sub-step, as a fraction of the step
+  double whole_ = 0, rest_ = 0;   // whole and remaining time [s]
+  double length_ = 0;             // duration of the present attempt [s]
+  double least_ = 0;              // smallest sub-step, as a fraction of the step
   int stops_ = 0;                 // number of impact zones in the last step that was rolled back
   std::map<int, double> speeds_;  // held pairs; bound on the speed of their approach [m/s]
   std::vector<char> passed_, in_zone_;

@@ -77,7 +77,7 @@ Tally play(Guarded& g, bool hard, int steps) {
     ++tally.steps;
     tally.rolled_back += report.rolled_back;
     lost = lost || !report.passed.empty() || !report.impact_zones.empty();
-    if (!report.rolled_back && g.stepper->stiffened().empty() && report.restored.empty()) {
+    if (!report.rolled_back) {
       mj_setState(m, twin, first.data(), mjSTATE_INTEGRATION);
       mj_step(m, twin);
       check(same(state_of(m, twin), state_of(m, d)), "a step that stands is not mj_step's");
@@ -88,8 +88,7 @@ Tally play(Guarded& g, bool hard, int steps) {
         check(m->body_geomnum[b] == 0 || m->body_mocapid[b] >= 0 || d->xpos[3 * b + 2] > -0.1,
               "a body below the floor");
   }
-  g.stepper->close();
-  check(same(parameters(m), before), "contact parameters are not put back");
+  check(same(parameters(m), before), "the guard wrote to the model");
   mj_deleteData(twin);
   return tally;
 }

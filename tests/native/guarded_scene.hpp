@@ -68,6 +68,8 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.get_state = reinterpret_cast<decltype(e.get_state)::Function>(&mj_getState);
   e.set_state = reinterpret_cast<decltype(e.set_state)::Function>(&mj_setState);
   e.copy_state = reinterpret_cast<decltype(e.copy_state)::Function>(&mj_copyState);
+  e.copy_model = reinterpret_cast<decltype(e.copy_model)::Function>(&mj_copyModel);
+  e.mul_jac_t = reinterpret_cast<decltype(e.mul_jac_t)::Function>(&mj_mulJacTVec);
   e.mul_m = reinterpret_cast<decltype(e.mul_m)::Function>(&mj_mulM);
   e.jac_com = reinterpret_cast<decltype(e.jac_com)::Function>(&mj_jacBodyCom);
   e.mul_jac = reinterpret_cast<decltype(e.mul_jac)::Function>(&mj_mulJacVec);
@@ -83,17 +85,24 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.state_size = mj_stateSize(m, mjSTATE_INTEGRATION);
   e.timestep = &m->opt.timestep, e.disableflags = &m->opt.disableflags;
   e.enableflags = &m->opt.enableflags, e.o_margin = &m->opt.o_margin;
-  e.o_solref = m->opt.o_solref, e.override_flag = mjENBL_OVERRIDE;
+  e.o_solref = m->opt.o_solref, e.o_solimp = m->opt.o_solimp, e.override_flag = mjENBL_OVERRIDE;
   e.integrator = &m->opt.integrator, e.cone = &m->opt.cone, e.solver = &m->opt.solver;
   e.iterations = &m->opt.iterations;
-  double* margins[] = {m->pair_margin, m->geom_margin, m->flex_margin};
-  double* solrefs[] = {m->pair_solref, m->geom_solref, m->flex_solref};
-  double* solimps[] = {m->pair_solimp, m->geom_solimp, m->flex_solimp};
-  double* frictions[] = {m->pair_friction, m->geom_friction, m->flex_friction};
-  int* priorities[] = {nullptr, m->geom_priority, m->flex_priority};
+  e.surfaces_move = &m->flg_surfacevel, e.model_size = sizeof(mjModel);
+  const std::size_t at[5][3] = {
+      {offsetof(mjModel, pair_margin), offsetof(mjModel, geom_margin),
+       offsetof(mjModel, flex_margin)},
+      {offsetof(mjModel, pair_solref), offsetof(mjModel, geom_solref),
+       offsetof(mjModel, flex_solref)},
+      {offsetof(mjModel, pair_solimp), offsetof(mjModel, geom_solimp),
+       offsetof(mjModel, flex_solimp)},
+      {offsetof(mjModel, pair_friction), offsetof(mjModel, geom_friction),
+       offsetof(mjModel, flex_friction)},
+      {0, offsetof(mjModel, geom_priority), offsetof(mjModel, flex_priority)}};
   for (int k = 0; k < 3; ++k)
-    e.margin[k] = margins[k], e.solref[k] = solrefs[k], e.solimp[k] = solimps[k],
-    e.friction[k] = frictions[k], e.priority[k] = priorities[k];
+    e.at_margin[k] = at[0][k], e.at_solref[k] = at[1][k], e.at_solimp[k] = at[2][k],
+    e.at_friction[k] = at[3][k], e.at_priority[k] = at[4][k];
+  e.npair = m->npair;
   e.pair_geom1 = m->pair_geom1, e.pair_geom2 = m->pair_geom2;
   e.flex_vertbodyid = m->flex_vertbodyid, e.flex_vert = m->flex_vert;
   e.time = &d->time, e.qpos = d->qpos, e.qvel = d->qvel, e.energy = d->energy;
@@ -108,6 +117,9 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.efc_aref = &d->efc_aref, e.efc_margin = &d->efc_margin;
   e.at_pos = offsetof(mjContact, pos), e.at_frame = offsetof(mjContact, frame);
   e.efc_vel = &d->efc_vel, e.efc_pos = &d->efc_pos, e.efc_force = &d->efc_force;
+  e.at_friction_of = offsetof(mjContact, friction);
+  e.at_surfacevel = offsetof(mjContact, surfacevel);
+  e.efc_diagA = &d->efc_diagA;
   e.efc_type = &d->efc_type, e.efc_id = &d->efc_id;
   e.end_qvel = end->qvel, e.end_energy = end->energy, e.end_xpos = end->xpos;
   e.end_xmat = end->xmat, e.end_flexvert_xpos = end->flexvert_xpos, e.end_cvel = end->cvel;
@@ -175,7 +187,7 @@ struct Guarded {
     for (int j = 0; j < m->njnt; ++j)
       if (m->jnt_type[j] == mjJNT_FREE)
         for (int k = 3; k < 6; ++k) spins.push_back(m->jnt_dofadr[j] + k);
-    const Settings settings{true, 40, 1e-5, 1.25, 1.0 / 64, 0.2, 10, 16, 1.0 / 8, 0.5, 1.0, 0.01};
+    const Settings settings{40, 1e-5, 1.25, 1.0 / 64, 10, 16, 1.0 / 8, 0.5, 1.0, 0.01};
     Coverage covered{
         std::move(verdict), std::move(pairs), std::move(last), {}, std::move(spins), {}};
     stepper.reset(new Stepper(engine_of(scene, end, other), std::move(covered), settings));

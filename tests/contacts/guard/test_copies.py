@@ -52,17 +52,11 @@ def test_a_copy_at_any_step_continues_with_the_same_bits(name, way):
         for one in copies:
             assert one.step() == report
             assert bits(one) == bits(guard)
-            assert one.stiffened == guard.stiffened
     assert cuts > 0
-    for one in (guard, *copies):
-        one.close()
-    for one in copies:
-        for field in ("flex_solref", "geom_solref", "geom_priority"):
-            assert getattr(one.model, field).tobytes() == getattr(guard.model, field).tobytes()
 
 
 def test_a_plain_copy_steps_the_same_data():
-    guard = GuardedStepper(*SCENES["plate"](), ["rigid"], stiff=False, most=30)
+    guard = GuardedStepper(*SCENES["plate"](), ["rigid"], most=30)
     other = copy.copy(guard)
     assert other.model is guard.model
     assert other.data is guard.data

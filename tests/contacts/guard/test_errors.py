@@ -106,7 +106,7 @@ def test_a_step_within_a_step_is_refused():
             with pytest.raises(RuntimeError, match="this guard is in a step") as found:
                 call()
             messages.append(found.value)
-        assert isinstance(guard.stiffened, tuple)
+        assert isinstance(guard.sunk, tuple)
 
     while not messages:
         guard.step(each)

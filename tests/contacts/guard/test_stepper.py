@@ -111,58 +111,23 @@ def test_the_same_bits_where_nothing_is_missed(name):
 
 
 def test_the_report_tells_what_was_done():
-    """A ball of 20 g at 20 m/s: 4 J and 0.4 N s before; soft contacts are stiffened, then not."""
-    scene = ball_cloth(20.0, 0.01, stiff=False)
-    model, data = scene.start(5e-3)
-    before = model.flex_solref.copy(), model.flex_priority.copy(), model.flex_solimp.copy()
-    margins = model.geom_margin.copy(), model.flex_margin.copy(), int(model.opt.disableflags)
+    """A ball of 20 g at 20 m/s: 4 J and 0.4 N s before."""
+    model, data = ball_cloth(20.0, 0.01, stiff=False).start(5e-3)
     guard = GuardedStepper(model, data, ["cloth"])
-    cut, restored, clock = None, (), 0.0
+    cut, clock = None, 0.0
     for _ in range(30):
         report = guard.step()
         clock += model.opt.timestep
         assert data.time == pytest.approx(clock, rel=1e-12)
-        assert model.opt.timestep == 5e-3
         assert not report.impact_zones
-        restored += report.restored
         if report.cuts and cut is None:
             cut = report
-            assert guard.stiffened == ((("flex", 0), ("geom", 0)),)
-            assert model.flex_solref[0, 0] == 1e-4
-        after = model.geom_margin, model.flex_margin, int(model.opt.disableflags)
-        for a, b in zip(margins, after, strict=True):
-            np.testing.assert_array_equal(a, b)
-    assert cut.cuts[0].stiffened
     assert cut.cuts[0].pair == (("flex", 0), ("geom", 0))
     assert cut.steps > 1
     assert cut.balance.energy[0].tolist() == pytest.approx([0, 4.0, 0])
     assert cut.balance.momentum[0].tolist() == pytest.approx([0, 0, -0.4])
     assert cut.balance.energy[1].sum() <= 4.04
     assert cut.balance.energy[1, 2] > 0
-    assert restored == ((("flex", 0), ("geom", 0)),)
-    after = model.flex_solref, model.flex_priority, model.flex_solimp
-    for a, b in zip(before, after, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-def test_leaving_the_block_puts_the_parameters_back():
-    scene = ball_cloth(50.0, stiff=False)
-    model, data = scene.start(5e-3)
-    with GuardedStepper(model, data, ["cloth"]) as guard:
-        guard.step()
-        assert guard.stiffened
-    assert not guard.stiffened
-    assert model.flex_solref[0].tolist() == [0.003, 1.0]
-
-
-def test_without_stiffening_parameters_stay():
-    scene = ball_cloth(50.0, stiff=False)
-    model, data = scene.start(5e-3)
-    guard = GuardedStepper(model, data, ["cloth"], stiff=False)
-    report = guard.step()
-    assert report.cuts
-    assert not any(cut.stiffened for cut in report.cuts)
-    assert model.flex_solref[0].tolist() == [0.003, 1.0]
 
 
 @pytest.mark.parametrize("build", [ball_cloth, sphere_plate])
@@ -289,33 +254,6 @@ def test_only_what_is_asked_for_is_covered():
     for _ in range(6):
         assert guard.step().steps == 1
     assert data.qvel[-4] == -50.0
-
-
-@pytest.mark.parametrize("explicit", [False, True])
-def test_a_contact_pair_or_a_geom_is_stiffened_and_put_back(explicit):
-    """The lower geom gets a priority above its partner's; an explicit pair has its own numbers."""
-    pair = '<contact><pair geom1="ball" geom2="plate"/></contact>' if explicit else ""
-    model = mujoco.MjModel.from_xml_string(f"""<mujoco><option gravity="0 0 0" timestep="5e-3"/>
-      <worldbody><geom name="plate" type="box" size=".1 .1 .001"/><body pos="0 0 .1"><freejoint/>
-      <geom name="ball" size=".01" mass=".02" priority="3"/></body></worldbody>{pair}</mujoco>""")
-    data = mujoco.MjData(model)
-    data.qvel[2] = -40
-    names = ("geom_solref", "geom_solimp", "geom_priority", "pair_solref", "pair_solimp")
-    before = {name: getattr(model, name).copy() for name in names}
-    guard = GuardedStepper(model, data)
-    while not guard.stiffened:
-        guard.step()
-    assert guard.stiffened == ((("geom", 0), ("geom", 1)),)
-    if explicit:
-        assert model.pair_solref[0, 0] == 1e-4
-        np.testing.assert_array_equal(model.geom_solref, before["geom_solref"])
-    else:
-        assert model.geom_priority.tolist() == [4, 3]
-        assert model.geom_solref[0, 0] == 1e-4
-    guard.close()
-    assert not guard.stiffened
-    for name in names:
-        np.testing.assert_array_equal(getattr(model, name), before[name])
 
 
 def test_what_may_touch_and_is_not_covered_is_named():
