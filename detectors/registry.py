@@ -35,27 +35,29 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
 
 #: Modules of the classes that are allowed in model files, by class name.
 FILE_TYPES: dict[str, str] = {
-    name: f"tauguard.detectors.{module}"
+    name: f"tauguard.{module}"
     for module, names in {
-        "alarms.alarm": "CollisionAlarm",
-        "alarms.beside_free_motion": "BesideFreeMotion",
-        "calibration.recording": "LoadDeviation",
-        "dynamics.friction": "FrictionModel",
-        "dynamics.robot": "RobotNumbers",
-        "estimation.estimator": "ArmModel",
-        "estimation.noise_model": "NoiseModel",
-        "estimation.velocity": "SensorNoise",
-        "faults.inputs": "UsualInput",
-        "features.free_bound": "Bound",
-        "features.front_end": "FrontEnd Scaling",
-        "features.windows": "WindowShape",
-        "scores.baselines": "FittedThresholds",
-        "scores.currents": "FittedCurrentNetwork Inputs",
-        "scores.free_motion": "FittedFreeMotion",
-        "scores.kernel": "KernelMachine",
-        "scores.network": "Network",
-        "scores.windowed": "FittedWindowed",
-        "thresholds.free_scores": "SpeedNormalisation",
+        "detectors.alarms.alarm": "CollisionAlarm",
+        "detectors.alarms.beside_free_motion": "BesideFreeMotion",
+        "detectors.calibration.recording": "LoadDeviation",
+        "detectors.dynamics.friction": "FrictionModel",
+        "detectors.dynamics.robot": "RobotNumbers",
+        "detectors.estimation.estimator": "ArmModel",
+        "detectors.estimation.noise_model": "NoiseModel",
+        "detectors.estimation.velocity": "SensorNoise",
+        "detectors.faults.inputs": "UsualInput",
+        "detectors.features.free_bound": "Bound",
+        "detectors.features.front_end": "FrontEnd Scaling",
+        "detectors.features.windows": "WindowShape",
+        "detectors.scores.baselines": "FittedThresholds",
+        "detectors.scores.currents": "FittedCurrentNetwork Inputs",
+        "detectors.scores.free_motion": "FittedFreeMotion",
+        "detectors.scores.kernel": "KernelMachine",
+        "detectors.scores.network": "Network",
+        "detectors.scores.windowed": "FittedWindowed",
+        "detectors.thresholds.free_scores": "SpeedNormalisation",
+        "models.link_surface": "LinkSurface",
+        "models.stored_robot": "StoredRobot",
     }.items()
     for name in names.split()
 }

@@ -19,7 +19,6 @@ REFUSED = re.compile(r"\bA?GPL", re.IGNORECASE)
 STATED = {
     "cmeel-boost": "Boost Software License",
     "cmeel-qhull": "Qhull's own, of the kind of MIT's",
-    "skops": "MIT",
 }
 
 

@@ -94,14 +94,14 @@ def test_bombs_of_nesting_in_robot_and_model_files(tmp_path):
 
     from tauguard.detectors import load_model
 
-    robot, model = tmp_path / "arm.urdf", tmp_path / "model.skops"
+    robot, model = tmp_path / "arm.urdf", tmp_path / "model.tauguard"
     for text in ("<link>" * 60_000, "<link>" * 20_000 + "</link>" * 20_000 + "</robot>"):
         robot.write_text('<robot name="a">' + text)
         with pytest.raises(ValueError, match=r"^[^\n]*(not well-formed|nested more than)[^\n]*$"):
             compiled(str(robot))
     for text in ("[" * 100_000, '{"a":' * 50_000 + "1" + "}" * 50_000):
         with zipfile.ZipFile(model, "w") as archive:
-            archive.writestr("schema.json", text)
+            archive.writestr("model.json", text)
         with pytest.raises(ValueError, match=r"^[^\n]*not a model file, or a damaged one[^\n]*$"):
             load_model(model)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ from tauguard.detectors.thresholds.free_scores import (
 from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Detection, Trace
 
+if TYPE_CHECKING:
+    from tauguard.models.stored_robot import StoredRobot
+
 #: Message when an extreme sample has made the detector's state infinite or NaN.
 LOST = "the score is not a number, because a sample was beyond any arm's range; leave it out"
 
@@ -52,6 +56,7 @@ class CollisionAlarm(Frozen):
     """Normalisation of the floor's score. The floor, ``detector.floor``, sets thresholds on the
     residual beside a learned score. The larger of the two normalised scores is used. None: only the
     detector's own score is used."""
+    robot: StoredRobot | None = None  #: robot file and surface of the arm, for diagnoses
 
     def __post_init__(self) -> None:
         """Check the fields: ``ArgumentError``."""

@@ -25,6 +25,7 @@ from tauguard.detectors.calibration.recording import (
     moves,
     pieces,
 )
+from tauguard.detectors.codec import check_storable
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
@@ -35,6 +36,7 @@ from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.findings import ArgumentError
+from tauguard.models.stored_robot import StoredRobot
 from tauguard.traces.trace import Trace
 
 #: Fraction of the collision-free traces that is held out for the threshold without folds.
@@ -88,7 +90,8 @@ def train(
 
     Raises:
         ArgumentError: traces of different arms or rates, or without data that the method needs;
-            ``per_hour`` not above 0, or ``folds`` below 1.
+            ``per_hour`` not above 0, or ``folds`` below 1; a method with a field that no model file
+            can hold.
     """
     believed = nominal_arm(traces) if arm is None else arm
     return train_and_score(detector, traces, believed, per_hour, folds)[0]
@@ -115,6 +118,7 @@ def train_and_score(
     """As :func:`train`, with the normalised scores that the threshold comes from."""
     if not (per_hour > 0 and folds >= 1):
         raise ArgumentError(f"per_hour {per_hour}, folds {folds}: expected above 0, and 1 or more")
+    check_storable(detector)
     free = sum(not _collisions(trace) for trace in traces)
     if min(folds, free) < 2:
         own, rest = held_out(traces)
@@ -124,7 +128,10 @@ def train_and_score(
         found = _cross_fitted(detector, traces, arm, left_out(traces, min(folds, free)))
         fitted = detector.fit(traces, arm)
     alarm, scores = _with_rate(fitted, found, per_hour)
-    return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
+    text = traces[0].attachments.get("arm.xml")
+    robot = None if text is None else StoredRobot.of_text("arm.xml", text)
+    usual = UsualInput.of(traces, alarm.detector.arm)
+    return replace(alarm, inputs=usual, robot=robot), scores
 
 
 def train_beside(
@@ -154,6 +161,7 @@ def train_beside(
     Raises:
         ArgumentError: traces that do not fit, or too little motion.
     """
+    check_storable(detector)
     parts = pieces([Recording(log) for log in logs.values()], 2)
     halved = len(parts) > len(logs)
     names = [f"half {k} of {name}" for name in logs for k in (1, 2)] if halved else list(logs)

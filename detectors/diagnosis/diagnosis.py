@@ -98,7 +98,7 @@ def diagnose(
         trace: of the detector's arm.
         detection: the alarms of the trace (default: computed).
         robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
-            the ``arm.xml`` that is attached to simulated traces).
+            that of the detector, else the ``arm.xml`` that is attached to simulated traces).
 
     Returns:
         A diagnosis for each alarm, in order.
@@ -107,6 +107,8 @@ def diagnose(
         ArgumentError: no collision shapes, or another arm.
     """
     found = detection or alarm.detect(trace)
+    if robot is None and alarm.robot is not None:
+        robot = alarm.robot.surface
     if robot is None:
         if "arm.xml" not in trace.attachments:
             raise ArgumentError("the trace has no arm.xml: give a robot file with collision shapes")

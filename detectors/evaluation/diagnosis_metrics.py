@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.diagnosis.diagnosis import Diagnosis, diagnose
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.dynamics.same_arm import arm_difference
 from tauguard.detectors.evaluation.matching import Matching, match_detection
 from tauguard.detectors.events import detection_window
 from tauguard.detectors.samples import check_interval
 from tauguard.findings import ArgumentError
-from tauguard.models import link_surface
+from tauguard.models import link_surface, pin_model
 from tauguard.report import rate as wilson
 from tauguard.traces.trace import Collision, Detection, Trace, Truth
 
@@ -207,12 +209,19 @@ def judge_recording(alarm: CollisionAlarm, name: str, trace: Trace) -> JudgedRec
     """Detect in a recording and match with its truth.
 
     Raises:
-        ArgumentError: no truth, another sample rate, or other joints; the last two give ``name``.
+        ArgumentError: no truth, another arm, or another sample rate; the last two give ``name``.
     """
-    check_interval(name, trace, alarm.detector.dt)
-    if trace.joint_names != (own := alarm.detector.arm.robot.joint_names):
+    arm = alarm.detector.arm.robot
+    if trace.joint_names != arm.joint_names:
         raise ArgumentError(
-            f"{name} has joints {', '.join(trace.joint_names)}, the model {', '.join(own)}"
+            f"{name} has joints {', '.join(trace.joint_names)}, the model "
+            f"{', '.join(arm.joint_names)}"
         )
+    text = trace.attachments.get("arm.xml")
+    if text is not None and (alarm.robot is None or text != alarm.robot.text):
+        difference = arm_difference(RobotNumbers.from_pin(pin_model(text)), arm)
+        if difference:
+            raise ArgumentError(f"{name} is of another arm than the model: {difference}")
+    check_interval(name, trace, alarm.detector.dt)
     found = alarm.detect(trace)
     return JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))

@@ -38,8 +38,8 @@ class Detector(Protocol):
 class FittedDetector(Protocol):
     """A trained method, immutable.
 
-    A frozen dataclass can be written into a model file if its fields are numbers, text, arrays,
-    tuples and other such dataclasses.
+    A frozen dataclass can be written into a model file if its fields are finite numbers, text,
+    arrays, tuples, lists, dictionaries and other such dataclasses.
     """
 
     @property

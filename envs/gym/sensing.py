@@ -18,6 +18,7 @@ from tauguard.detectors import (
     Unknowns,
 )
 from tauguard.detectors.alarms.monitor import Monitor
+from tauguard.detectors.dynamics.same_arm import arm_difference
 from tauguard.detectors.estimation.estimator import MOTION
 from tauguard.detectors.estimation.observer import ENVIRONMENT_GAIN, PLAIN_GAIN
 from tauguard.detectors.samples import same_rate
@@ -262,6 +263,11 @@ def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
         raise ArgumentError(
             f"detector: trained on {joints} joints, the scene has {own}; train one on this arm"
         )
+    if compiled.arms == 1:
+        numbers = RobotNumbers.from_pin(pin_model(compiled.scene.arm_model))
+        if difference := arm_difference(numbers, alarm.detector.arm.robot):
+            file = "another arm" if alarm.robot is None else f"the arm of {alarm.robot.name}"
+            raise ArgumentError(f"detector: trained on {file}: {difference}; train one on this arm")
     if not same_rate(compiled.settings.timestep, alarm.detector.dt):
         raise ArgumentError(
             f"detector: needs a sample every {1e3 * alarm.detector.dt:g} ms, but the scene's time "

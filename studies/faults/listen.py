@@ -77,12 +77,12 @@ def write_inputs(folder: Path, quick: bool, seed: int) -> None:
     log = simulate(struck)
     for rate in RATES:
         write_mcap(folder / f"{rate:g}.mcap", thinned(log, rate))
-        save_model(trained(training, rate, PER_HOUR), folder / f"{rate:g}.skops")
+        save_model(trained(training, rate, PER_HOUR), folder / f"{rate:g}.tauguard")
 
 
 def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
     """The detector and the log of a rate."""
-    return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
+    return load_model(folder / f"{rate:g}.tauguard"), read_log(folder / f"{rate:g}.mcap").trace
 
 
 def serve(folder: Path, rate: float, pipe: Connection) -> None:

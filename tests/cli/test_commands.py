@@ -71,9 +71,9 @@ def test_bad_input_is_one_line(capsys, tmp_path):
     assert "no .mcap files" in fails(capsys, "train", "--traces", str(tmp_path))
     (tmp_path / "a.mcap").write_bytes(b"not a recording")
     assert "a.mcap" in fails(capsys, "train", "--traces", str(tmp_path))
-    missing = str(tmp_path / "m.skops")
+    missing = str(tmp_path / "m.tauguard")
     line = fails(capsys, "evaluate", "--traces", str(tmp_path), "--model", missing)
-    assert "m.skops" in line
+    assert "m.tauguard" in line
     line = fails(capsys, "simulate", "--out", str(tmp_path / "o"), "--episodes", "0")
     assert "expected 1 or more" in line
     (tmp_path / "file").touch()
@@ -114,7 +114,7 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     flags = ("--episodes", "2", "--collisions", "5", "--free", "2", "--seconds", "40")
     run("simulate", "--out", str(struck), *flags, *common)
     assert len(list(struck.glob("free-*.mcap"))) == 2
-    model, figures = tmp_path / "model.skops", tmp_path / "figures.json"
+    model, figures = tmp_path / "model.tauguard", tmp_path / "figures.json"
     run("train", "--traces", str(struck), "--model", str(model))
     flags = ("--json", str(figures), "--figure", str(tmp_path / "f.png"))
     run("evaluate", "--traces", str(struck), "--model", str(model), *flags)
@@ -171,9 +171,9 @@ def quiet(t):
 
 def test_a_model_file_that_was_not_named_is_not_replaced(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "model.skops").write_text("older")
+    (tmp_path / "model.tauguard").write_text("older")
     assert "--model" in fails(capsys, "train", "--traces", str(tmp_path))
-    assert (tmp_path / "model.skops").read_text() == "older"
+    assert (tmp_path / "model.tauguard").read_text() == "older"
 
 
 def test_train_any_detector_with_a_guarantee(tmp_path, capsys):
@@ -185,7 +185,7 @@ def test_train_any_detector_with_a_guarantee(tmp_path, capsys):
     run("simulate", "--out", str(free), *more)
     for path in sorted(free.glob("*.mcap"))[:3]:
         path.rename(struck / f"free-{path.name}")
-    model = str(tmp_path / "model.skops")
+    model = str(tmp_path / "model.tauguard")
     train = ("train", "--traces", str(struck), "--model", model)
     assert "did you mean 'srq-svr'" in fails(capsys, *train, "--detector", "srq-svm")
     flags = ("--detector", "moving-thresholds", "--calibration", str(free))
@@ -211,7 +211,7 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
         *free_episodes(6, 2, 12.0, (30.0,)),
     ]
     paths = write_dataset(episodes, tmp_path, workers=1)
-    model, robot = tmp_path / "model.skops", tmp_path / "arm.xml"
+    model, robot = tmp_path / "model.tauguard", tmp_path / "arm.xml"
     robot.write_text(cura6.arm_xml())
     run("train", "--traces", str(tmp_path), "--model", str(model), "--folds", "1")
     found = tmp_path / "found.json"

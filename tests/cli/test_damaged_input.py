@@ -93,8 +93,8 @@ def intact(tmp_path_factory):
         table = np.column_stack([trace.t, trace.q, trace.qd, trace.current])
         np.savetxt(folder / f"log{seed}.csv", table, delimiter=",", fmt="%.9g")
     generate_dataset(load(folder / "tiny.toml"), folder / "dataset", workers=1)
-    free = ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "free.skops")
-    traces = ("--traces", "mcap", "--model", "model.skops", "--detector", "residual-thresholds")
+    free = ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "free.model")
+    traces = ("--traces", "mcap", "--model", "a.model", "--detector", "residual-thresholds")
     struck = ("--out", "mcap", "--episodes", "3", "--collisions", "1", "--workers", "1")
     for command, flags in (("train", free), ("simulate", struck), ("train", traces)):
         assert run(command, folder, *flags) == 0
@@ -109,7 +109,7 @@ def intact(tmp_path_factory):
 
 
 #: Files and folders that commands make.
-MADE = {"new", "new.skops", "new.xml", "mcap", "free.skops", "model.skops"}
+MADE = {"new", "new.model", "new.xml", "mcap", "free.model", "a.model"}
 #: Without these a folder is another one, or not complete yet: no error.
 OPTIONAL = ("mcap/1.mcap", "dataset/SHA256SUMS", "dataset/manifest/train-000000.jsonl")
 
@@ -129,21 +129,21 @@ FREE = ("--robot", "arm.xml", "--columns", "columns.json")
 GAINS = ("--gains", *(str(g) for g in GAIN))
 #: Command, its flags, and the files of it that are damaged in turn.
 COMMANDS = [
-    ("detect", ("log1.csv", *FREE, "--model", "free.skops"), ("log1.csv", "arm.xml", "free.skops")),
+    ("detect", ("log1.csv", *FREE, "--model", "free.model"), ("log1.csv", "arm.xml", "free.model")),
     ("detect", ("log1.csv", *FREE, *GAINS), ("log1.csv", "arm.xml", "columns.json")),
     ("calibrate", ("log0.csv", "log1.csv", *FREE, *GAINS, "--out", "new.xml"),
      ("log1.csv", "arm.xml", "columns.json")),
-    ("train", ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "new.skops"),
+    ("train", ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "new.model"),
      ("log0.csv", "arm.xml", "columns.json")),
-    ("train", ("--traces", "mcap", "--detector", "residual-thresholds", "--model", "new.skops"),
+    ("train", ("--traces", "mcap", "--detector", "residual-thresholds", "--model", "new.model"),
      ("mcap/1.mcap",)),
-    ("train", ("--traces", "dataset", "--detector", "residual-thresholds", "--model", "new.skops"),
+    ("train", ("--traces", "dataset", "--detector", "residual-thresholds", "--model", "new.model"),
      ("dataset/dataset.json", "dataset/data/train-000001.parquet",
       "dataset/manifest/train-000001.jsonl", "dataset/arms/cura6.xml")),
-    ("evaluate", ("--traces", "mcap", "--model", "model.skops"),
-     ("mcap/1.mcap", "model.skops")),
-    ("evaluate", ("--data", "dataset", "--model", "model.skops"),
-     ("dataset/dataset.json", "dataset/data/test-000000.parquet", "model.skops")),
+    ("evaluate", ("--traces", "mcap", "--model", "a.model"),
+     ("mcap/1.mcap", "a.model")),
+    ("evaluate", ("--data", "dataset", "--model", "a.model"),
+     ("dataset/dataset.json", "dataset/data/test-000000.parquet", "a.model")),
     ("generate", ("tiny.toml", "--out", "new", "--quick", "--workers", "1"), ("tiny.toml",)),
     ("inspect", ("dataset", "--verify"), ("dataset/dataset.json", "dataset/README.md",
      "dataset/SHA256SUMS", "dataset/data/test-000000.parquet",
@@ -159,8 +159,8 @@ COMMANDS = [
     ("replay", ("short.mcap", "--out", "new", "--robot", "arm.xml"), ("arm.xml",)),
     ("play-ur", ("log1.csv", "--columns", "columns.json", "--port", "0"),
      ("log1.csv", "columns.json")),
-    ("listen", ("--play", "log1.csv", *FREE, "--model", "free.skops", "--seconds", "0.1"),
-     ("log1.csv", "arm.xml", "free.skops", "columns.json")),
+    ("listen", ("--play", "log1.csv", *FREE, "--model", "free.model", "--seconds", "0.1"),
+     ("log1.csv", "arm.xml", "free.model", "columns.json")),
 ]  # fmt: skip
 CASES = [(c, flags, name) for c, flags, names in COMMANDS for name in names]
 
@@ -184,7 +184,7 @@ def test_damaged_input_is_exit_code_2(intact, tmp_path, capsys, command, flags, 
         *((False, damage(data, rng)) for _ in range(1)),
     ):
         path.write_bytes(damaged)
-        for made in ("new", "new.skops", "new.xml"):
+        for made in ("new", "new.model", "new.xml"):
             place = folder / made
             shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
         capsys.readouterr()

@@ -23,7 +23,7 @@ def asked(folder, log, longer):  # noqa: F811
     seconds = str(np.loadtxt(log, delimiter=",")[[0, -1], 0] @ [-1, 1])
     return {
         "calibrate": ["calibrate", log, *given, "--out", f"{out}.xml"],
-        "train": ["train", "--free", log, *given, "--model", f"{out}.skops"],
+        "train": ["train", "--free", log, *given, "--model", f"{out}.tauguard"],
         "detect": ["detect", longer, *given, "--quiet", seconds],
     }
 

@@ -261,19 +261,19 @@ def test_flags_that_do_not_fit_are_named_before_anything_is_read(given, said):
 
     paths = {key: Path(value) for key, value in given.items() if key == "json"}
     with pytest.raises(ValueError, match=said):
-        command(Path("none.skops"), Path("none.urdf"), **(given | paths))
+        command(Path("none.tauguard"), Path("none.urdf"), **(given | paths))
 
 
 @pytest.fixture(scope="module")
 def files(alarm, tmp_path_factory):
     folder = tmp_path_factory.mktemp("listen")
-    save_model(alarm, folder / "model.skops")
+    save_model(alarm, folder / "model.tauguard")
     (folder / "arm.xml").write_text(cura6.arm_xml())
     return folder
 
 
 def given(files):
-    return ["listen", "--model", str(files / "model.skops"), "--robot", str(files / "arm.xml")]
+    return ["listen", "--model", str(files / "model.tauguard"), "--robot", str(files / "arm.xml")]
 
 
 def test_a_robot_that_leaves_is_a_fault_on_the_screen_in_json_and_in_the_exit_code(

@@ -110,7 +110,7 @@ def test_from_logs_to_detection(folder, made, capsys):
 
 
 def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, capsys):
-    model = tmp_path / "model.skops"
+    model = tmp_path / "model.tauguard"
     for name, count in (("STRUCK", 4), ("CONTACTS", 2)):
         monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
     run(folder, "train", "--twin", made, "--free", folder / "free", "--model", model)

@@ -37,7 +37,7 @@ def test_it_streams_and_gets_a_threshold(mypackage, training, unseen, arm):
 def test_the_command_line_trains_and_evaluates_it(mypackage, tmp_path, capsys):
     episodes = struck_episodes(5, 1, 3, (30.0,)) + free_episodes(5, 2, 8.0, (30.0,))
     write_dataset(episodes, tmp_path / "traces", workers=1)
-    folder, model = str(tmp_path / "traces"), str(tmp_path / "own.skops")
+    folder, model = str(tmp_path / "traces"), str(tmp_path / "own.tauguard")
     own = ("--detector", "mypackage:CurrentSize", "--model", model)
     main(["train", "--traces", folder, *own])
     main(["evaluate", "--traces", folder, *own])
@@ -48,7 +48,7 @@ def test_the_command_line_trains_and_evaluates_it(mypackage, tmp_path, capsys):
 def test_the_environment_names_its_module_for_every_command(
     mypackage, training, arm, tmp_path, monkeypatch
 ):
-    path = tmp_path / "own.skops"
+    path = tmp_path / "own.tauguard"
     save_model(
         with_rate(make_detector("mypackage:CurrentSize").fit(training, arm), training, 10.0), path
     )

@@ -188,7 +188,7 @@ def test_free_motion_learns_nothing_from_traces_with_collisions(some, arm):
 def test_a_file_gives_equal_scores(detector, unseen, tmp_path, monkeypatch):
     # The levels are any numbers here, so that an alarm may be up all the time.
     monkeypatch.setattr(model_file, "check_alarms", lambda alarm: None)
-    path = tmp_path / "model.skops"
+    path = tmp_path / "model.tauguard"
     trace = first(unseen[0], 4_000)
     levels = SpeedNormalisation(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2))
     own = CollisionAlarm(detector, 0.25, 0.005, levels)

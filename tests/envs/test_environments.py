@@ -381,12 +381,12 @@ assert len(numpy.unique(a.reshape(-1, 3), axis=0)) > 100
 
 @pytest.mark.parametrize("kind", [str, Path])
 def test_a_model_file_that_cannot_be_read_is_named(kind, tmp_path):
-    path = tmp_path / "model.skops"
+    path = tmp_path / "model.tauguard"
     path.write_text('{"format": "tauguard free-motion detector 1"}')
-    with pytest.raises(ValueError, match=r"detector .*model\.skops: of the earlier format"):
+    with pytest.raises(ValueError, match=r"detector .*model\.tauguard: of the earlier format"):
         gym.make(REACH, detector=kind(path))
-    with pytest.raises(ValueError, match=r"none\.skops.*no such model file; expected observer, "):
-        gym.make(REACH, detector=kind(tmp_path / "none.skops"))
+    with pytest.raises(ValueError, match=r"no\.tauguard.*no such model file; expected observer, "):
+        gym.make(REACH, detector=kind(tmp_path / "no.tauguard"))
 
 
 def test_an_object_that_cannot_detect_is_named_by_its_type():

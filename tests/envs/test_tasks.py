@@ -89,6 +89,8 @@ def test_a_detector_of_another_arm_or_rate_is_refused():
     slow.dt = 4e-3
     with pytest.raises(ValueError, match="a sample every 4 ms, but the scene's time step is 1 ms"):
         gym.make("tauguard/Reach-v0", detector=CollisionAlarm(slow, 0.5))
+    with pytest.raises(ValueError, match=r"trained on another arm: the axis of .* mm from that"):
+        gym.make("tauguard/Reach-v0", robot="cura6-long", detector=CollisionAlarm(Slow(), 0.5))
     with pytest.raises(ValueError, match="trained on 6 joints, the scene has 12"):
         gym.make("tauguard/TwoArms-v1", detector=CollisionAlarm(Slow(), 0.5))
 

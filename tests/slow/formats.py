@@ -32,7 +32,7 @@ FORMATS: dict[str, Format] = {
     "urdf": Format("urdf", readers.robot, judges.as_xml, "joints and masses of the XML"),
     "robot": Format("toml", readers.arm, judges.as_arm, "the TOML values"),
     "configuration": Format("toml", readers.configuration, judges.as_toml, "the TOML values"),
-    "model": Format("skops", readers.model, judges.unchanged, "the intact file"),
+    "model": Format("tauguard", readers.model, judges.unchanged, "the intact file"),
     "shard": Format("parquet", readers.dataset, judges.unchanged, "the intact dataset"),
     "manifest": Format("jsonl", readers.dataset, judges.unchanged, "the intact dataset"),
     "head": Format("json", readers.dataset, judges.unchanged, "the intact dataset"),

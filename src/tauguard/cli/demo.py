@@ -29,7 +29,7 @@ def command(
     """Simulate a moving arm with collisions, train a detector on it, and record its alarms.
 
     The folder --out then contains demo.mcap (a run with collisions, truth and detection), demo.rrd
-    (the same for rerun), model.skops (the trained detector), summary.json and summary.png
+    (the same for rerun), model.tauguard (the trained detector), summary.json and summary.png
     (metrics of the detector on motions and collisions that it was not trained on).
 
     Args:
@@ -143,7 +143,7 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
 
     print(text(summary))
     print(false_alarm_text(summary))
-    print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
+    print(f"\n{out}/: demo.mcap  demo.rrd  model.tauguard  summary.json  summary.png")
     recording = out / "demo.rrd"
     run = ".uv/bin/uv run --no-dev " if Path(".uv/bin/uv").is_file() else ""  # of a checkout
     print(f"to see it in a browser: {run}tauguard replay --web {recording}")
@@ -160,7 +160,7 @@ def write_results(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
     said = diagnose(detector, showcase, shown)
     write_mcap(out / "demo.mcap", showcase, shown)
     write_rrd(out / "demo.rrd", showcase, shown, explained=said)
-    save_model(detector, out / "model.skops")
+    save_model(detector, out / "model.tauguard")
 
 
 def count(traces: list[Trace], key: Any) -> dict[str, int]:

@@ -22,7 +22,7 @@ def command(
     traces: Path | None = None,
     data: Path | None = None,
     splits: tuple[str, ...] = (),
-    model: Path = Path("model.skops"),
+    model: Path = Path("model.tauguard"),
     alarms: Path | None = None,
     detector: str | None = None,
     json: Path | None = None,

@@ -53,7 +53,7 @@ def command(
     Args:
         traces: folder of MCAP recordings with truth, as from `tauguard simulate`, or a dataset
             (`tauguard generate`), of which the first split is used.
-        model: the model file (default: model.skops). A file that you name is overwritten.
+        model: the model file (default: model.tauguard). A file that you name is overwritten.
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Recordings with
             labelled collisions are refused; collisions without a label raise the threshold.
@@ -138,7 +138,7 @@ def _check_flags(given: Collection[str]) -> None:
 
 def _target(model: Path | None) -> Path:
     """The file to write; an existing file is replaced only if --model names it."""
-    target = model or Path("model.skops")
+    target = model or Path("model.tauguard")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
     if target.is_dir():
@@ -232,7 +232,7 @@ def free_motion(
     held = [log for log in validation.kept if log not in validation.accepted]
     run_check("error", accept, lambda: check_own_error(held))
     run_check("alarms", accept, lambda: check_own_alarms(held, per_hour))
-    save_model(free_alarm(detector, list(traces.values())), model)
+    save_model(free_alarm(detector, list(traces.values())), model, robot)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), validation, card)

@@ -79,7 +79,7 @@ def twin_contacts(
     quiet = FreeMotion().fit(logs, arm)
     both = BesideFreeMotion(quiet, learned)
     usual = UsualInput.of(logs, quiet.arm)
-    save_model(CollisionAlarm(both, 1.0, CONFIRMATION, inputs=usual), model)
+    save_model(CollisionAlarm(both, 1.0, CONFIRMATION, inputs=usual), model, twin)
     count = sum(len(trace.truth.collisions) for trace in struck if trace.truth)
     print(
         f"{model}: {both.name}, trained on {len(logs)} logs and {count} contacts of the twin; the "

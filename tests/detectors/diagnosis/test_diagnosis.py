@@ -174,8 +174,11 @@ def test_alarms_of_any_detector_are_explained(trace, alarm):
     np.testing.assert_array_equal(used.weights[:, 1:], learned[:, 1:])
     np.testing.assert_array_equal(used.weights[:, 0], np.maximum(learned[:, 0], arm.noise))
     assert Diagnoser.of(ARM, surface).noise_model is None
+    bare = replace(trace, attachments={})  # the detector knows its robot
+    for one, two in zip(explained, diagnose(alarm, bare), strict=True):
+        assert (one.summary, one.force.tobytes()) == (two.summary, two.force.tobytes())
     with pytest.raises(ValueError, match=r"no arm\.xml"):
-        diagnose(alarm, replace(trace, attachments={}))
+        diagnose(replace(alarm, robot=None), bare)
     with pytest.raises(ValueError, match="start 99"):
         PostAlarmWindows(arm, used, trace).at(99.0)
 

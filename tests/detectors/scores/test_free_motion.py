@@ -379,9 +379,9 @@ def test_a_faster_log_than_training_s_is_quiet_and_its_push_is_found(alarm):
 
 
 def test_the_file_gives_the_same_alarms(alarm, tmp_path):
-    save_model(alarm, tmp_path / "model.skops")
+    save_model(alarm, tmp_path / "model.tauguard")
     trace = record(7, seconds=10.0)
-    again = load_model(tmp_path / "model.skops")
+    again = load_model(tmp_path / "model.tauguard")
     assert np.array_equal(again.scores(trace), alarm.scores(trace))
 
 
