@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,10 +13,14 @@ from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid
+from tauguard.rigid.closed import check_closed, first_of_parts, merged_corners
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
+from tauguard.rigid.rays import PointDistances, RayHits, unit_vectors
 from tauguard.rigid.results import MeshImpacts
 
 Volume = Literal["obb", "aabb"]
+#: Winding number that the native module gives for points on the surface.
+ON_SURFACE = 1 << 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,18 +134,6 @@ class MeshTree:
         counts = f"{len(self.vertices)} vertices, {len(self)} faces"
         return f"{type(self).__name__}({counts}, volume={self.volume!r})"
 
-    def _check(self, other: MeshTree) -> None:
-        if not isinstance(other, MeshTree):
-            raise ArgumentError(
-                f"other: {type(other).__name__}, expected a MeshTree; for convex bodies use "
-                "tauguard.rigid.overlap or distance"
-            )
-        if other.volume != self.volume:
-            raise ArgumentError(
-                f"other: its volume is {other.volume!r}, this tree's {self.volume!r}; "
-                "build both with the same volume"
-            )
-
     def overlap(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshOverlap:
         """Whether the surfaces intersect, with the other mesh at ``pose`` in this mesh's frame.
 
@@ -154,7 +147,7 @@ class MeshTree:
         Raises:
             ArgumentError: another volume, or a bad pose (named with its row).
         """
-        self._check(other)
+        checked_pair(self, other)
         batch = poses("pose", pose)
         faces = np.empty((len(batch), 2), dtype=np.int32)
         self._mesh.overlap(other._mesh, batch, faces, thread_count(threads))
@@ -177,19 +170,162 @@ class MeshTree:
         Raises:
             ArgumentError: as for :meth:`overlap`, a bad limit, or more pairs than ``limit``.
         """
-        self._check(other)
-        if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
-            raise ArgumentError(f"limit: {limit!r:.40}, expected a positive integer")
-        rows, values = self._mesh.contacts(
-            other._mesh, poses("pose", pose), limit, thread_count(threads)
-        )
-        return MeshContacts(
-            np.ascontiguousarray(rows[:, 0]),
-            np.ascontiguousarray(rows[:, 1:]),
-            np.ascontiguousarray(values[:, :3]),
-            np.ascontiguousarray(values[:, 3:6]),
-            np.ascontiguousarray(values[:, 6]),
-        )
+        checked_pair(self, other)
+        most, batch = _checked_limit(limit), poses("pose", pose)
+        return _contacts_of(*self._mesh.contacts(other._mesh, batch, most, thread_count(threads)))
+
+    @cached_property
+    def _corners(self) -> NDArray[np.int32]:
+        """Corners of the faces; those at the same position have the same number. Shape (F, 3)."""
+        return merged_corners(self._vertices, self._faces)
+
+    @cached_property
+    def _open_because(self) -> str:
+        """Why the mesh is not closed; empty if it is."""
+        try:
+            check_closed(self._vertices[self._faces], self._corners)
+        except ArgumentError as error:
+            return str(error)
+        return ""
+
+    @cached_property
+    def used_corners(self) -> NDArray[np.float64]:
+        """The corners of faces, each position once. Shape (C, 3)."""
+        rows = np.unique(self._corners, return_index=True)[1]
+        return np.ascontiguousarray(self._vertices[self._faces.ravel()[rows]])
+
+    @cached_property
+    def part_corners(self) -> NDArray[np.float64]:
+        """A corner of each part: of faces that are connected by corners. Shape (P, 3)."""
+        return np.asarray(self._vertices[self._faces[first_of_parts(self._corners), 0]])
+
+    @cached_property
+    def low(self) -> NDArray[np.float64]:
+        """The smallest coordinates of corners of faces. Shape (3,)."""
+        return np.asarray(self.used_corners.min(axis=0))
+
+    @cached_property
+    def high(self) -> NDArray[np.float64]:
+        """The largest coordinates of corners of faces. Shape (3,)."""
+        return np.asarray(self.used_corners.max(axis=0))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the faces are a closed surface whose normals point outward.
+
+        Each edge must belong to as many faces in one direction as in the other. Corners at the same
+        position count as one, so a mesh of separate triangles (STL) can be closed.
+        """
+        return not self._open_because
+
+    def contains(self, points: ArrayLike, threads: int = 1) -> NDArray[np.bool_]:
+        """Whether points are inside of this closed mesh; points on the surface are. Shape (N,).
+
+        The answer is exact for the given numbers. It is the sign of the winding number, which
+        counts the faces above a point (Jacobson, Kavan and Sorkine-Hornung 2013 review such
+        numbers). Parts may lie in each other or intersect: a point is inside if it is in some part.
+
+        Args:
+            points: In this mesh's frame. Shape (N, 3).
+            threads: 0 means all processors; the answer does not depend on it.
+
+        Raises:
+            ArgumentError: the mesh is open or has inverted faces; the message names them.
+        """
+        if self._open_because:
+            raise ArgumentError(self._open_because)
+        inside = self._windings(finite("points", points, (None, 3)), threads) > 0
+        return np.asarray(inside)
+
+    def _windings(self, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:
+        out = np.empty(len(points), dtype=np.int32)
+        self._mesh.windings(points, out, thread_count(threads))
+        return out
+
+    def signed_distance(self, points: ArrayLike, threads: int = 1) -> PointDistances:
+        """Distances of points from the surface of this closed mesh, negative inside.
+
+        The sign is exact for the given numbers, as in :meth:`contains`. The error of the distance
+        is at most 1e-12 times the largest coordinate of the nearest face relative to the point.
+
+        Args:
+            points: In this mesh's frame. Shape (N, 3).
+            threads: 0 means all processors; the answer does not depend on it.
+
+        Raises:
+            ArgumentError: as :meth:`contains`. For an open mesh use
+                ``tauguard.rigid.distance(tree, Spheres(points, 0))``.
+        """
+        if self._open_because:
+            raise ArgumentError(self._open_because)
+        batch = finite("points", points, (None, 3))
+        out, face = np.empty((len(batch), 4)), np.empty(len(batch), dtype=np.int32)
+        self._mesh.nearest(batch, out, face, thread_count(threads))
+        turns = self._windings(batch, threads)
+        on_surface = turns == ON_SURFACE
+        length = np.maximum(out[:, 0], np.where(on_surface, 0, np.finfo(float).smallest_subnormal))
+        distance = np.where(on_surface, 0.0, np.where(turns > 0, -length, length))
+        return PointDistances(distance, out[:, 1:], face)
+
+    def cast(self, origins: ArrayLike, directions: ArrayLike, threads: int = 1) -> RayHits:
+        """The first face that each ray meets.
+
+        Which faces a ray meets is decided exactly. Edges and corners belong to the faces, so that
+        no ray passes between two faces. A ray within the plane of a face passes this face. A ray
+        that starts on a face hits it at distance 0.
+
+        Args:
+            origins: In this mesh's frame. Shape (N, 3), or (3,) for all rays.
+            directions: Of any length but 0. Shape (N, 3), or (3,) for all rays.
+            threads: 0 means all processors; the answer does not depend on it.
+
+        Raises:
+            ArgumentError: wrong shapes or lengths, an entry that is not finite, a direction of
+                length 0, or an origin beyond 1e100 (named with its row).
+        """
+        rays = [
+            finite(name, np.atleast_2d(np.asarray(value)), (None, 3))
+            for name, value in (("origins", origins), ("directions", directions))
+        ]
+        count = common_length({"origins": len(rays[0]), "directions": len(rays[1])})
+        for name, bad, wanted in (
+            ("origins", np.abs(rays[0]).max(axis=1, initial=0) > 1e100, "coordinates up to 1e100"),
+            ("directions", ~rays[1].any(axis=1), "a direction of any length but 0"),
+        ):
+            if bad.any():
+                row = int(np.argmax(bad))
+                value = rays[name == "directions"][row]
+                raise ArgumentError(f"{name}: {value} in row {row}, expected {wanted}")
+        distance, face = np.empty(count), np.empty(count, dtype=np.int32)
+        self._mesh.cast(rays[0], rays[1], distance, face, thread_count(threads))
+        hit = face >= 0
+        normal = np.where(hit[:, None], self.normals[face], np.nan)
+        return RayHits(hit, distance, face, normal)
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals of the faces; 0 for a face without area. Shape (F, 3)."""
+        a, b, c = np.moveaxis(self._vertices[self._faces], 1, 0)
+        normal = np.cross(unit_vectors(b - a), unit_vectors(c - a))
+        return unit_vectors(normal)
+
+    def self_contacts(self, limit: int = 10_000_000) -> MeshContacts:
+        """Pairs of faces of this mesh that intersect: self-intersection at rest.
+
+        Faces that share a corner or an edge count only if they meet elsewhere too. This is decided
+        exactly. Corners at the same position count as one.
+
+        Args:
+            limit: Largest number of pairs.
+
+        Returns:
+            Contacts as of :meth:`contacts`; the face of smaller number is first, ``pose`` is 0.
+
+        Raises:
+            ArgumentError: a bad limit.
+            ValueError: more pairs than ``limit``.
+        """
+        return _contacts_of(*self._mesh.self_contacts(self._corners, _checked_limit(limit)))
 
     def time_of_impact(self, other: MeshTree, motion: Motion, threads: int = 1) -> MeshImpacts:
         """The first contact with the other mesh, which has ``motion`` in this mesh's frame.
@@ -224,6 +360,36 @@ class MeshTree:
             )
         finite("displacement", np.atleast_2d(move), (None, 3))
         return self.time_of_impact(other, Motion(start, move, np.zeros(3)), threads)
+
+
+def checked_pair(tree: MeshTree, other: MeshTree) -> None:
+    """Raise an ``ArgumentError`` if ``other`` is no mesh, or has another kind of volume."""
+    if not isinstance(other, MeshTree):
+        raise ArgumentError(
+            f"other: {type(other).__name__}, expected a MeshTree; for convex bodies use "
+            "tauguard.rigid.overlap or distance"
+        )
+    if other.volume != tree.volume:
+        raise ArgumentError(
+            f"other: its volume is {other.volume!r}, this tree's {tree.volume!r}; "
+            "build both with the same volume"
+        )
+
+
+def _checked_limit(limit: int) -> int:
+    if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
+        raise ArgumentError(f"limit: {limit!r:.40}, expected a positive integer")
+    return limit
+
+
+def _contacts_of(rows: NDArray[np.int32], values: NDArray[np.float64]) -> MeshContacts:
+    return MeshContacts(
+        np.ascontiguousarray(rows[:, 0]),
+        np.ascontiguousarray(rows[:, 1:]),
+        np.ascontiguousarray(values[:, :3]),
+        np.ascontiguousarray(values[:, 3:6]),
+        np.ascontiguousarray(values[:, 6]),
+    )
 
 
 def first_touch(

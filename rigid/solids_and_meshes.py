@@ -12,6 +12,7 @@ from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
+from tauguard.rigid.mesh_distance import MeshPairDistances, mesh_distance
 from tauguard.rigid.motion import Motion, bounded, common_length, optional_poses
 from tauguard.rigid.queries import Poses, check_method, row_count, sharp_overlap
 from tauguard.rigid.results import (
@@ -136,6 +137,15 @@ def distance(
 ) -> Distances: ...
 @overload
 def distance(
+    a: MeshTree,
+    b: MeshTree,
+    threads: int = 1,
+    *,
+    pose_a: ArrayLike | None = None,
+    pose_b: ArrayLike | None = None,
+) -> MeshPairDistances: ...
+@overload
+def distance(
     a: MeshTree, b: Solid, threads: int = 1, *, pose_b: ArrayLike | None = None
 ) -> MeshDistances: ...
 @overload
@@ -150,7 +160,7 @@ def distance(
     pose_a: ArrayLike | None = None,
     pose_b: ArrayLike | None = None,
 ) -> Distances:
-    """Signed distance, nearest points and normal of the convex bodies ``a[i]`` and ``b[i]``.
+    """Signed distance, nearest points and normal of the bodies ``a[i]`` and ``b[i]``.
 
     The bound of the error is relative to the diagonal of the box around both bodies:
 
@@ -159,6 +169,9 @@ def distance(
       :func:`overlap`, and the distance is 0 if and only if the bodies touch.
     * A cylinder, cone or ellipsoid on either side: 1e-9. Beyond this bound the sign is certain.
     * A half-space and a cylinder, cone or ellipsoid: 3e-14.
+    * Two meshes: 1e-12. The distance of the surfaces is 0 if and only if they share a point,
+      exactly for the pose of ``b`` relative to ``a``, rounded. If both are closed it is signed; see
+      :class:`MeshPairDistances`.
 
     The method is the descent of Gilbert, Johnson and Keerthi (1988) with the expanding polytope
     (van den Bergen 2001). Both run in floating point, and a certificate checks each result of
@@ -168,7 +181,7 @@ def distance(
     Args:
         a: N bodies of one kind, with or without radii, or one body. Or a mesh: its surface is
             tested, not its inside, and the bodies' coordinates are in its frame.
-        b: As ``a``. The two kinds may differ, and at most one side may be a mesh.
+        b: As ``a``. The two kinds may differ. For two meshes the rows are poses.
         threads: 0 means all processors; the answer does not depend on it.
         pose_a: Homogeneous matrices that move the bodies ``a`` into the common frame, one for all
             or one per row. Shape (4, 4) or (N, 4, 4). One body at N poses is not copied. A pose
@@ -177,11 +190,13 @@ def distance(
         pose_b: As ``pose_a``, for ``b``.
 
     Raises:
-        ArgumentError: lengths that do not match, polygons, two meshes, two half-spaces, a pose that
-            is no rigid motion (named with its row), or a coordinate beyond 1e100 (with a mesh: a
-            coordinate of the bodies beyond 1e30).
+        ArgumentError: lengths that do not match, polygons, two half-spaces, two meshes whose trees
+            have different volumes, a pose that is no rigid motion (named with its row), or a
+            coordinate beyond 1e100 (with a mesh: a coordinate of the bodies beyond 1e30).
     """
     _check_place("threads", threads)
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        return mesh_distance(a, b, pose_a, pose_b, threads)
     at_a, at_b = optional_poses("pose_a", pose_a), optional_poses("pose_b", pose_b)
     if beside := _mesh_beside(a, b, at_a, at_b):
         mesh, bodies, count, swapped = beside
@@ -297,8 +312,8 @@ def _mesh_beside(
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         raise ArgumentError(
-            "a, b: both are meshes; MeshTree.overlap, contacts and sweep work on two meshes, and "
-            "distance on a mesh and convex bodies, such as Hulls of the vertices"
+            "a, b: both are meshes; expected at most one. MeshTree.overlap(other, pose) tests two "
+            "meshes, distance(a, b, pose_b=...) measures them"
         )
     swapped = isinstance(b, MeshTree)
     mesh, solid = (b, a) if swapped else (a, b)

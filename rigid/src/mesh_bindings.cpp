@@ -2,6 +2,7 @@
 #include <nanobind/stl/string.h>
 
 #include "bodies_binding.hpp"
+#include "contact_arrays.hpp"
 #include "mesh_impact.hpp"
 #include "mesh_query.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
@@ -18,40 +19,19 @@ using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::devi
 
 namespace {
 
-template <class T, std::size_t N>
-auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
-  auto* held = new std::vector<T>(std::move(values));
-  nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return nb::ndarray<nb::numpy, T>(held->data(), N, shape.data(), owner);
-}
-
-// All contacts of every pose. A contact is a row (pose, face of a, face of b) of the first array
-// and a row (point, normal, depth) of the second.
-using Rows = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
-                       nb::ndarray<nb::numpy, double, nb::shape<-1, 7>>>;
-Rows contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
-  std::vector<std::int32_t> rows;
-  std::vector<double> values;
+ContactRows contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
+  const std::size_t n = poses.shape(0);
+  std::vector<std::vector<Contact>> found(n);
   {
     const LongCall call;
-    const std::size_t n = poses.shape(0);
-    std::vector<std::vector<Contact>> found(n);
     ContactBudget budget(limit);
     interruptible_for(n, threads, 4, [&](auto begin, auto end, auto) {
       Scratch scratch;
       for (auto i = begin; i < end; ++i)
         all_contacts(a, b, Pose(poses.data() + 16 * i), scratch, budget, found[i]);
     });
-    for (std::size_t i = 0; i < n; ++i)
-      for (const Contact& c : found[i]) {
-        rows.insert(rows.end(), {static_cast<std::int32_t>(i), c.a, c.b});
-        values.insert(values.end(), {c.point[0], c.point[1], c.point[2], c.normal[0], c.normal[1],
-                                     c.normal[2], c.depth});
-      }
   }
-  const std::size_t count = rows.size() / 3;
-  return nb::make_tuple(owned(std::move(rows), std::array<std::size_t, 2>{count, 3}),
-                        owned(std::move(values), std::array<std::size_t, 2>{count, 7}));
+  return contact_arrays(found);
 }
 
 void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a,
@@ -73,6 +53,7 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 void bind_convex(nb::module_& m);
 void bind_distances(nb::module_& m);
 void bind_bodies(nb::class_<Mesh>& mesh);
+void bind_rays(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid, m) {
@@ -83,6 +64,7 @@ NB_MODULE(_rigid, m) {
   bind_volumes(m);
   nb::class_<Mesh> mesh(m, "Mesh");
   bind_bodies(mesh);
+  bind_rays(mesh);
   mesh.def(
           "__init__",
           [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {

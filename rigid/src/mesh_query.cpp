@@ -137,7 +137,76 @@ Contact describe(const Triangle& a, const Triangle& b) {
   return c;
 }
 
+// Whether triangles of one mesh share a point other than their common corners and edge. `p` and `q`
+// number the corners; a face may have several equal corners.
+bool meet_beyond(const Triangle& a, const std::int32_t* p, const Triangle& b,
+                 const std::int32_t* q) {
+  int shared = 0, at_a[3], at_b[3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      if (p[i] == q[j] && shared < 3) at_a[shared] = i, at_b[shared++] = j;
+  if (shared == 0) return triangles_overlap(a, b);
+  const auto proper = [](const std::int32_t* f) {
+    return f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
+  };
+  if (!proper(p) || !proper(q)) return false;  // edges and points belong to their neighbours
+  if (shared == 3) return true;
+  if (shared == 1) {
+    // They meet elsewhere if the side opposite to the corner meets the other triangle.
+    const auto side_meets = [](const Triangle& s, int corner, const Triangle& t) {
+      return exact::segment_meets(s.v[(corner + 1) % 3], s.v[(corner + 2) % 3], t);
+    };
+    return side_meets(a, at_a[0], b) || side_meets(b, at_b[0], a);
+  }
+  // With a common edge they must be in one plane, on the same side of the edge.
+  const int apex_a = 3 - at_a[0] - at_a[1], apex_b = 3 - at_b[0] - at_b[1];
+  const double *x = a.v[at_a[0]], *y = a.v[at_a[1]];
+  if (orient3d(x, y, a.v[apex_a], b.v[apex_b]) != 0) return false;
+  const int k = exact::dropped_axis(x, y, a.v[apex_a]);
+  const int other = exact::dropped_axis(x, y, b.v[apex_b]);
+  if (k < 0 || other < 0) return false;  // one of them has no area
+  return exact::turn(x, y, a.v[apex_a], k) == exact::turn(x, y, b.v[apex_b], k);
+}
+
 }  // namespace
+
+bool first_contact(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Contact* out) {
+  return each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle& moved) {
+    *out = describe(a.tree.triangles[i], moved);
+    out->a = a.tree.id[i], out->b = b.tree.id[j];
+    return true;
+  });
+}
+
+void self_contacts(const Mesh& mesh, const std::int32_t* ids, Scratch& scratch,
+                   ContactBudget& budget, std::vector<Contact>& out) {
+  const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const Pose pose(identity);
+  const Placement at(mesh.tree, mesh.tree, pose);
+  const Tree& tree = mesh.tree;
+  const auto pair = [&](int i, int j) {
+    const std::int32_t a = std::min(tree.id[i], tree.id[j]), b = std::max(tree.id[i], tree.id[j]);
+    if (a == b || !meet_beyond(tree.triangles[i], ids + 3 * tree.id[i], tree.triangles[j],
+                               ids + 3 * tree.id[j]))
+      return;
+    budget.take();
+    const bool ordered = tree.id[i] == a;
+    Contact c = describe(tree.triangles[ordered ? i : j], tree.triangles[ordered ? j : i]);
+    c.a = a, c.b = b;
+    out.push_back(c);
+  };
+  const auto leaf = [&](Child ca, Child cb) {
+    for (int j = leaf_first(cb); j < leaf_first(cb) + leaf_count(cb); ++j)
+      for (int i = leaf_first(ca); i < leaf_first(ca) + leaf_count(ca) && i < j; ++i) pair(i, j);
+    return false;
+  };
+  if (mesh.kind == VolumeKind::obb)
+    traverse(tree, tree, ObbBounds{mesh.obbs, mesh.obbs, at}, scratch, leaf);
+  else
+    traverse(tree, tree, BoxBounds{tree, tree, at}, scratch, leaf);
+  std::sort(out.begin(), out.end(),
+            [](const Contact& x, const Contact& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+}
 
 void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
                   ContactBudget& budget, std::vector<Contact>& out) {

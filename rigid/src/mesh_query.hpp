@@ -93,6 +93,12 @@ class ContactBudget {
   const std::size_t most_;
   std::atomic<std::size_t> taken_{0};
 };
+// Writes the contact of the first pair found; false if the meshes are apart.
+bool first_contact(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Contact* out);
+// Pairs of faces of one mesh, a < b, that share a point other than a common corner or edge. `ids`:
+// three corners per face; corners at the same position have the same number.
+void self_contacts(const Mesh& mesh, const std::int32_t* ids, Scratch& scratch,
+                   ContactBudget& budget, std::vector<Contact>& out);
 void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
                   ContactBudget& budget, std::vector<Contact>& out);
 

@@ -1,4 +1,4 @@
-"""``safe_step``: no contact in the scaled step, close to the first contact, at a cost in proportion."""
+"""``safe_step``: no contact in the scaled step, near the first contact, cost in proportion."""
 
 import numpy as np
 import pytest
@@ -77,7 +77,7 @@ def test_features_closer_than_the_minimum_distance():
 
 def test_boxes_that_touch_and_meet_a_third_one():
     ccd = MeshCCD(np.concatenate([SIDES, SIDES + 8, SIDES + 16]))
-    x = np.concatenate([BOX, BOX + [0, 0, 1], BOX + [0, 0, 4]])
+    x = np.concatenate([BOX + np.array([0, 0, z]) for z in (0, 1, 4)])
     assert ccd.safe_step(x, moved(x, [0, 0, 0.5])) == 1
     end = x.copy()
     end[8:16] += [0, 0, 4]
@@ -91,7 +91,7 @@ def crumpled(size, scale, seed=0):
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     u, v = np.meshgrid(np.linspace(0, 1, size + 1), np.linspace(0, 1, size + 1), indexing="ij")
     sheet = np.stack([u.ravel(), v.ravel(), 0 * u.ravel()], axis=1)
-    x = np.concatenate([sheet, sheet + [0, 0, 0.5]])
+    x = np.concatenate([sheet, sheet + np.array([0, 0, 0.5])])
     end = x + scale * np.random.default_rng(seed).normal(size=x.shape)
     return MeshCCD(np.concatenate([faces, faces + len(sheet)])), x, end
 

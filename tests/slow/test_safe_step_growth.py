@@ -16,7 +16,7 @@ def test_time_grows_with_the_faces(scale, slow_seed, counts):
     bar = trimesh.creation.box(extents=(1, 0.2, 0.2)).subdivide().subdivide()
     rng, faces, seconds = np.random.default_rng(slow_seed), [], []
     for _ in range(5):
-        x = np.concatenate([bar.vertices, bar.vertices + [0, 0, 0.5]])
+        x = np.concatenate([bar.vertices, bar.vertices + np.array([0, 0, 0.5])])
         rows = np.concatenate([bar.faces, bar.faces + len(bar.vertices)])
         end = x + scale * rng.normal(size=x.shape)
         runs = []

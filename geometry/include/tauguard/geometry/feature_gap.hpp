@@ -51,6 +51,20 @@ struct Gap {
     return in_domain({a.u + s * (b.u - a.u), a.v + s * (b.v - a.v)});
   }
 
+  static constexpr int sides = vf ? 3 : 4;
+  static constexpr At corner(int i) {
+    return i == 0 ? At{0, 0} : i == 1 ? At{1, 0} : i == 2 && !vf ? At{1, 1} : At{0, 1};
+  }
+  // The shortest gap on the border of the domain.
+  At on_border() const {
+    At best = on_side(corner(0), corner(1));
+    for (int i = 1; i < sides; ++i) {
+      const At at = on_side(corner(i), corner((i + 1) % sides));
+      if (size(at) < size(best)) best = at;
+    }
+    return best;
+  }
+
   // A place whose gap is the shortest of the domain, or at most `enough`. Parallel edges that meet
   // have many: this is the middle of their overlap.
   //
@@ -59,8 +73,6 @@ struct Gap {
   // the error across that direction by 8 u / e. Where e is too small for this, the gap to a side of
   // the domain is at most e times the length of q and r.
   At shortest(double enough) const {
-    constexpr At corner[4] = {{0, 0}, {1, 0}, {vf ? 0.0 : 1.0, 1}, {0, 1}};
-    constexpr int sides = vf ? 3 : 4;
     At best = in_domain(perpendicular(p));
     for (int i = 0; i < 3; ++i) {
       const At step = perpendicular((*this)(best)),
@@ -69,7 +81,7 @@ struct Gap {
     }
     At low{2, 0}, high{-1, 0};
     for (int i = 0; i < sides; ++i) {
-      const At at = on_side(corner[i], corner[(i + 1) % sides]);
+      const At at = on_side(corner(i), corner((i + 1) % sides));
       const double gap = size(at);
       if (gap < size(best) || !std::isfinite(size(best))) best = at;
       if (gap <= enough && at.u < low.u) low = at;
