@@ -13,6 +13,7 @@
 #include "comparators.hpp"
 #include "frame.hpp"
 #include "mesh_ccd.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/call_lock.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/geometry/rounding.hpp"
@@ -274,7 +275,8 @@ NB_MODULE(_mesh, m) {
       "Continuous collision detection of a mesh, one call per frame. Arguments are checked in "
       "Python.";
   tauguard::geometry::bind_interrupts();
-  nb::exception<TooMany>(m, "TooManyError", PyExc_ValueError);
+  tauguard::geometry::bind_argument_errors();
+  nb::exception<TooMany>(m, "TooManyError", tauguard::geometry::argument_error().ptr());
   nb::class_<Mesh>(m, "Mesh")
       .def(nb::init<Faces, Ids, Table, int, std::optional<bool>, int>(), "faces"_a, "ids"_a,
            "meets"_a, "k"_a, "moving"_a.none(), "threads"_a)

@@ -2,6 +2,7 @@
 #include <mutex>
 
 #include "arrays.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/rounding.hpp"
 
 using namespace tauguard::contacts;
@@ -136,6 +137,7 @@ Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, do
 
 NB_MODULE(_contacts, m) {
   nb::set_leak_warnings(false);  // a callback of MuJoCo may keep a guard alive until the end
+  tauguard::geometry::bind_argument_errors();
   m.doc() = "Contacts of a moving scene, and the guarded stepper. Arguments are checked in Python.";
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())

@@ -3,6 +3,7 @@
 
 #include "bindings.hpp"
 #include "kernel.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
 namespace tauguard::detectors {
@@ -84,6 +85,7 @@ void gram(In2 a, In2 b, double sigma, Out2 out, int threads) {
 }  // namespace tauguard::detectors
 
 NB_MODULE(_kernel, m) {
+  tauguard::geometry::bind_argument_errors();
   m.doc() = "Kernel machines, scalings and windows on arrays.";
   using namespace tauguard::detectors;
   nb::class_<KernelSum>(m, "KernelSum")

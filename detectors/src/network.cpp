@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/lanes.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
@@ -70,6 +71,7 @@ void network(In2 x, Ids widths, In1 weights, In1 biases, In1 centre, In1 scale, 
 }  // namespace tauguard::detectors
 
 NB_MODULE(_network, m) {
+  tauguard::geometry::bind_argument_errors();
   using namespace tauguard::detectors;
   m.doc() = "Feed-forward networks.";
   m.def("network", &network, "x"_a, "widths"_a, "weights"_a, "biases"_a, "centre"_a, "scale"_a,

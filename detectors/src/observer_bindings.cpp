@@ -12,6 +12,7 @@
 #include "bindings.hpp"
 #include "chain.hpp"
 #include "observer.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
 namespace nb = nanobind;
@@ -272,6 +273,7 @@ void bind_observer(nb::module_& m) {
 }  // namespace
 
 NB_MODULE(_observer, m) {
+  tauguard::geometry::bind_argument_errors();
   m.doc() = "Rigid-body terms, momentum observer, estimator, fault checks, monitor.";
   bind_chain(m);
   bind_observer(m);

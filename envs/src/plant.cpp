@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
@@ -49,14 +50,14 @@ Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
 void check(const double* action, std::size_t n, std::size_t env) {
   for (std::size_t i = 0; i < n; ++i)
     if (!std::isfinite(action[i]))
-      throw nb::value_error(("action: not finite at entry " + std::to_string(i) +
-                             " of environment " + std::to_string(env) +
-                             "; expected numbers from -1 to 1")
-                                .c_str());
+      throw std::invalid_argument("action: not finite at entry " + std::to_string(i) +
+                                  " of environment " + std::to_string(env) +
+                                  "; expected numbers from -1 to 1");
 }
 
 void check_action(const Plant& p, Vector action) {
-  if (action.shape(0) != p.controls.scale.size()) throw nb::value_error("action: wrong length");
+  if (action.shape(0) != p.controls.scale.size())
+    throw std::invalid_argument("action: wrong length");
   check(action.data(), action.shape(0), 0);
 }
 
@@ -98,9 +99,10 @@ void step_all(const std::vector<Plant*>& plants, Matrix actions,
               int threads) {
   const std::size_t n = plants.size(), width = actions.shape(1);
   if (actions.shape(0) != n || mask.shape(0) != n)
-    throw nb::value_error("actions, mask: expected one row per plant");
+    throw std::invalid_argument("actions, mask: expected one row per plant");
   for (std::size_t i = 0; i < n; ++i) {
-    if (plants[i]->controls.scale.size() != width) throw nb::value_error("actions: wrong width");
+    if (plants[i]->controls.scale.size() != width)
+      throw std::invalid_argument("actions: wrong width");
     if (mask.data()[i]) check(actions.data() + i * width, width, i);
   }
   nb::gil_scoped_release release;
@@ -118,10 +120,10 @@ std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix 
   const std::size_t rows = q_des.shape(0);
   for (const Matrix& m : {q_des, qd_des, tau_ff})
     if (m.shape(0) != rows || m.shape(1) != p.joints())
-      throw nb::value_error("q_des, qd_des, tau_ff: expected one shape (rows, joints)");
+      throw std::invalid_argument("q_des, qd_des, tau_ff: expected one shape (rows, joints)");
   if (wrench_body > 0 && (wrench.shape(0) != rows || wrench.shape(1) != 6))
-    throw nb::value_error("wrench: expected (rows, 6)");
-  if (track.q.size() < rows * p.joints()) throw nb::value_error("track: too short");
+    throw std::invalid_argument("wrench: expected (rows, 6)");
+  if (track.q.size() < rows * p.joints()) throw std::invalid_argument("track: too short");
   track.wrench = wrench.data();
   track.wrench_body = wrench_body;
   nb::gil_scoped_release release;
@@ -136,10 +138,10 @@ void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
            const std::vector<int>& bodies, const std::vector<int>& joints, Array position,
            Array rotation, Array anchor, Array axis) {
   const std::size_t rows = q.shape(0), n = qpos.size();
-  if (q.shape(1) != n) throw nb::value_error("q: expected one column per address");
+  if (q.shape(1) != n) throw std::invalid_argument("q: expected one column per address");
   if (position.size() != 3 * rows * bodies.size() || rotation.size() != 3 * position.size() ||
       anchor.size() != 3 * rows * joints.size() || axis.size() != anchor.size())
-    throw nb::value_error("poses: a table has the wrong size");
+    throw std::invalid_argument("poses: a table has the wrong size");
   double *p = position.data(), *r = rotation.data(), *o = anchor.data(), *a = axis.data();
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;
@@ -175,7 +177,7 @@ void bind_plant(nb::module_& m) {
              int substeps) {
             if (!around.people.empty() && !around.barriers.all.empty() &&
                 around.people_geoms.size() != around.people.size() * person_segments)
-              throw nb::value_error("people_geoms: expected one geom per capsule");
+              throw std::invalid_argument("people_geoms: expected one geom per capsule");
             p.controls = controls;
             p.controls.override_speed.assign(p.joints(), 0.0);
             p.substeps = substeps;
@@ -186,7 +188,7 @@ void bind_plant(nb::module_& m) {
           "carry",
           [](Plant& p, int mocap, Matrix path) {
             if (path.shape(1) != 4 || path.shape(0) < 2)
-              throw nb::value_error("path: expected two or more rows of time and position");
+              throw std::invalid_argument("path: expected two or more rows of time and position");
             Carried c{mocap, {}};
             for (std::size_t k = 0; k < path.shape(0); ++k) {
               const double* row = path.data() + 4 * k;
@@ -215,7 +217,7 @@ void bind_plant(nb::module_& m) {
       .def(
           "aim",
           [](Plant& p, Vector place, double hold) {
-            if (place.shape(0) != 3) throw nb::value_error("place: expected three numbers");
+            if (place.shape(0) != 3) throw std::invalid_argument("place: expected three numbers");
             p.aim(load(place.data()), hold);
           },
           "place"_a, "hold"_a)
@@ -223,7 +225,7 @@ void bind_plant(nb::module_& m) {
           "override",
           [](Plant& p, int kind, Vector speed) {
             if (speed.shape(0) != p.joints())
-              throw nb::value_error("speed: expected one number per joint");
+              throw std::invalid_argument("speed: expected one number per joint");
             p.controls.override = static_cast<Override>(kind);
             p.controls.override_speed.assign(speed.data(), speed.data() + speed.shape(0));
           },
@@ -234,7 +236,7 @@ void bind_plant(nb::module_& m) {
       .def(
           "restore",
           [](Plant& p, const Numbers& saved) {
-            if (!p.restore(saved)) throw nb::value_error("state: of another scene");
+            if (!p.restore(saved)) throw std::invalid_argument("state: of another scene");
           },
           "state"_a);
 }
@@ -242,6 +244,7 @@ void bind_plant(nb::module_& m) {
 }  // namespace
 
 NB_MODULE(_plant, m) {
+  tauguard::geometry::bind_argument_errors();
   m.doc() = "The plant: an arm, its drives and surroundings, stepped natively.";
   bind_values(m);
   bind_plant(m);

@@ -1,5 +1,6 @@
 // Python bindings of the structs that a plant is built from. Python gives each listed member by
 // keyword; the headers describe the members.
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -21,7 +22,7 @@ void take(nb::handle value, T& out) {
 void take(nb::handle value, Held& out) { out = held(nb::cast<Array>(value)); }
 void take(nb::handle value, Vec3& out) {
   const auto given = nb::cast<Numbers>(value);
-  if (given.size() != 3) throw nb::value_error("expected three numbers");
+  if (given.size() != 3) throw std::invalid_argument("expected three numbers");
   out = load(given.data());
 }
 void take(nb::handle value, std::vector<Person>& out) {

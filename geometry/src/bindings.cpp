@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "tauguard/geometry/aabb.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/signs.hpp"
@@ -22,6 +23,7 @@ using Signs = nb::ndarray<std::int8_t, nb::shape<-1>, nb::c_contig, nb::device::
 NB_MODULE(_geometry, m) {
   m.doc() = "Exact predicates on arrays, rounding mode, threads. Arguments are checked in Python.";
   bind_interrupts();
+  bind_argument_errors();
   m.def(
       "orient3d",
       [](Points3 points, Signs out, int threads) {

@@ -5,6 +5,7 @@
 #include "contact_arrays.hpp"
 #include "mesh_impact.hpp"
 #include "mesh_query.hpp"
+#include "tauguard/geometry/argument_errors.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
@@ -59,6 +60,7 @@ void bind_volumes(nb::module_& m);
 NB_MODULE(_rigid, m) {
   m.doc() = "Queries of convex bodies and meshes on arrays. Arguments are checked in Python.";
   tauguard::geometry::bind_interrupts();
+  tauguard::geometry::bind_argument_errors();
   bind_convex(m);
   bind_distances(m);
   bind_volumes(m);
