@@ -35,7 +35,7 @@ def on_cluster(
     try:
         import ray
     except ImportError:
-        raise ArgumentError(f"--ray needs {extra('distributed')}") from None
+        raise ArgumentError(f"`ray=` needs {extra('distributed')}") from None
     own = not ray.is_initialized()
     if own:
         _connect(ray, address)
@@ -67,7 +67,7 @@ def _connect(ray: Any, address: str) -> None:
             logging_level=logging.ERROR,
         )
     except (ConnectionError, ValueError, RuntimeError) as error:
-        raise OSError(f"--ray {address}: {' '.join(str(error).split())[:200]}") from None
+        raise OSError(f'`ray="{address}"`: {" ".join(str(error).split())[:200]}') from None
 
 
 def _result(ray: Any, reference: Any) -> Any:

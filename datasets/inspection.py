@@ -266,7 +266,7 @@ def same_again(
     configuration = configuration_in(folder)
     if robot is not None:
         if line["arm"] not in {one.name for one in configuration.robots}:
-            raise FileError(f"arm {line['arm']} comes with the package: leave --robot out")
+            raise FileError(f"arm {line['arm']} comes with the package: leave `robot=` out")
         configuration = configuration.with_source(line["arm"], str(robot))
     check_unchanged(line["arm"], configuration.robots)
     source = configuration.source_of(line["arm"])

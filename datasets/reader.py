@@ -135,7 +135,7 @@ def training_episodes(folder: Path, arm: str | None) -> list[Trace]:
     if arm is None and len(arms) > 1:
         raise FileError(
             f"{folder}: its split {first[0]!r} has {len(arms)} arms, and a detector is trained for "
-            f"one: choose with --arm {{{','.join(arms)}}}"
+            f"one: choose with `arm=`: {', '.join(arms)}"
         )
     return list(read(folder, first, arm))
 

@@ -127,14 +127,16 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         FileNotFoundError: no such folder.
     """
     if not folder.is_dir():
-        raise FileNotFoundError(f"{folder}: no such folder; `tauguard simulate --out` makes one")
+        raise FileNotFoundError(
+            f"{folder}: no such folder; `out=` of `tauguard simulate` makes one"
+        )
     if is_dataset(folder):
         return training_episodes(folder, arm)
     if arm is not None:
-        raise FileError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
+        raise FileError(f'`arm="{arm}"`: {folder} is no dataset, so its recordings are of one arm')
     paths = sorted(folder.rglob("*.mcap"))
     if not paths:
-        raise FileError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
+        raise FileError(f"{folder}: no .mcap files; `out=` of `tauguard simulate` writes some")
     traces = []
     for path in tqdm(paths, desc="read", unit="file", disable=None, leave=False):
         trace = read_mcap(path)

@@ -78,7 +78,7 @@ def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
         except FileNotFoundError:
             raise FileError(
                 f"arm {name}: its file {robot.source} is not here; give the file that the dataset "
-                "was begun with to `tauguard inspect --episode` by --robot"
+                "was begun with by `robot=` (`tauguard inspect`)"
             ) from None
         if not same:
             raise FileError(

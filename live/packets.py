@@ -62,14 +62,13 @@ class Fault:
         name, _, times = text.partition("@")
         start, plus, duration = times.partition("+")
         try:
-            return cls(name, float(start), float(duration) if plus else 1.0)
-        except ValueError as error:
-            if "could not convert" not in str(error):
-                raise
+            numbers = float(start), float(duration) if plus else 1.0
+        except ValueError:
             raise ArgumentError(
-                f"--fault {text}: expected NAME@SECONDS or NAME@SECONDS+DURATION, such as "
+                f'`fault="{text}"`: expected NAME@SECONDS or NAME@SECONDS+DURATION, such as '
                 "frozen@5 or bias@5+2"
             ) from None
+        return cls(name, *numbers)
 
     def apply(self, packets: Packets) -> Packets:
         """A copy of the packets with this fault."""

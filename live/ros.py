@@ -58,8 +58,8 @@ class RosStream(Closing):
             kind: Any = import_module("sensor_msgs.msg").JointState
         except ImportError as error:
             raise ArgumentError(
-                f"--ros {topic}: {error}; source a ROS 2 installation first, or pipe the topic "
-                "into --stdin"
+                f'`ros="{topic}"`: {error}; source a ROS 2 installation first, or pipe the topic '
+                "into `stdin=True`"
             ) from None
         self.joint_names, self.rate = tuple(joint_names), rate
         self.events: list[str] = []

@@ -283,7 +283,7 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
         parts.append(f"{body.name} ({len(names)} joints: {shown})")
     return (
         f"it branches into {'; '.join(parts)}; expected one serial chain of joints. Name those of "
-        f"the arm, --arm-joints {_ends(moving)} or Robot(file, joints=({_ends(moving)!r},)) or "
+        f'the arm, `arm_joints="{_ends(moving)}"` or Robot(file, joints=({_ends(moving)!r},)) or '
         f"joints in a TOML file, and the others are welded"
     )
 

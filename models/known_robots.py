@@ -81,7 +81,7 @@ def find_file(name: str) -> Path:
     if menagerie is not None:
         installs.append(
             f"install mujoco-menagerie: {extra('arms')} and run "
-            f"`tauguard robot {name} --download` once"
+            f"`tauguard robot {name}` with `download=True` once"
         )
     raise FileNotFoundError(
         f"arm {name!r}: its model is in no installed package; "

@@ -5,6 +5,7 @@ below the first top-level body. Here MuJoCo compiles the file, and the Pinocchio
 from the compiled numbers, so that both describe the same arm, for MJCF and URDF alike.
 """
 
+import contextlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from pathlib import Path
@@ -56,10 +57,10 @@ def _compiled_urdf(text: str) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text)))
     except ValueError as error:
-        if "mjMINVAL" not in str(error):
-            raise
         light = {"boundmass": "1e-4", "boundinertia": "1e-8"}
-        return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text, light)))
+        with contextlib.suppress(ValueError):  # otherwise masses are not the cause
+            return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(text, light)))
+        raise error
 
 
 def _without_shapes(urdf: str, compiler: Mapping[str, str] = MappingProxyType({})) -> str:

@@ -54,7 +54,7 @@ def trial(what):
     try:
         exec(work, {"mujoco": mujoco, "what": what, "os": os, "signal": signal})
     except ValueError as error:
-        if "allocate" in str(error):  # refused because of the memory limit
+        if "allocate" in str(error):  # the memory limit, of which MuJoCo has no other sign
             raise
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 print("ready", flush=True)

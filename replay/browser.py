@@ -51,7 +51,7 @@ class BrowserReplay:
         try:
             self._files = _Server((HOST, port), handler)
         except OSError as error:
-            raise OSError(f"port {port}: {error.strerror}; --port 0 takes a free one") from error
+            raise OSError(f"port {port}: {error.strerror}; `port=0` takes a free one") from error
         self.address = f"http://{HOST}:{self._files.server_address[1]}"
         threading.Thread(target=self._files.serve_forever, daemon=True).start()
         viewer_port = _free_port()

@@ -99,7 +99,7 @@ class EventFolder:
             ArgumentError: the folder contains other files.
         """
         if folder.exists() and (not folder.is_dir() or not all(map(_own, folder.iterdir()))):
-            raise ArgumentError(f"{folder}: holds other files; give --events a new folder")
+            raise ArgumentError(f"{folder}: holds other files; give `events=` a new folder")
         folder.mkdir(parents=True, exist_ok=True)
         for old in filter(_own, folder.iterdir()):
             old.unlink()

@@ -22,7 +22,7 @@ from tauguard.replay.rrd import COLOURS, GREEN, RED, TIMELINE, entity, log_shape
 HOST = "127.0.0.1"  # the only address that the viewer listens on
 PATIENCE = 20.0  # longest wait for the viewer [s]
 #: Message if the viewer was closed, or began to listen and then found no display.
-GONE = "the rerun viewer ended; without a display use --save FILE.rrd"
+GONE = 'the rerun viewer ended; without a display use `save="FILE.rrd"`'
 #: Radius of a target's mark [m].
 MARK = 0.03
 #: Grey-blue of a cloth.
@@ -149,5 +149,6 @@ def open_viewer(port: int) -> subprocess.Popen[bytes]:
             return viewer
         time.sleep(0.1)
     raise OSError(
-        f"the rerun viewer did not come up on {HOST}:{port}; without a display use --save FILE.rrd"
+        f"the rerun viewer did not come up on {HOST}:{port}; without a display use "
+        '`save="FILE.rrd"`'
     )

@@ -51,7 +51,7 @@ def write_rrd(
     path: str | Path,
     trace: Trace,
     detection: Detection | None = None,
-    model: Any = None,
+    robot: Any = None,
     *,
     whole: bool = False,
     explained: Sequence[Diagnosis] = (),
@@ -66,7 +66,7 @@ def write_rrd(
         path: the ``.rrd`` file; written atomically.
         trace: the trace to show.
         detection: a detector's output for it.
-        model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
+        robot: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
         whole: keep the part before the first detection.
         explained: the diagnosis of each alarm; contacts are drawn as blue arrows.
@@ -79,12 +79,12 @@ def write_rrd(
     path = Path(path)
     if len(trace.t) == 0:
         raise ArgumentError("the trace is empty: nothing to show")
-    if model is None:
+    if robot is None:
         attached = [text for name, text in trace.attachments.items() if name.endswith(".xml")]
         if not attached:
-            raise ArgumentError("the trace has no attached MJCF: give the robot's model (--robot)")
-        model = attached[0]
-    scene = load_model(model)
+            raise ArgumentError("the trace has no attached MJCF: give the robot's model (`robot=`)")
+        robot = attached[0]
+    scene = load_model(robot)
     with written(path, "tauguard") as recording:
         text = page(trace, detection, explained, about)
         if not whole:

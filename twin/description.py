@@ -36,7 +36,7 @@ def write_twin(
         OSError: a file cannot be written.
     """
     if out.suffix != ".toml":
-        raise FileError(f"--out {out}: expected a name that ends in .toml")
+        raise FileError(f'`out="{out}"`: expected a name that ends in .toml')
     bodies = out.with_name(f"{out.stem}.bodies{robot.suffix}")
     save_arm(twin.arm, robot, bodies, scale=scale, logs=list(logs))
     _without_losses(bodies)

@@ -49,7 +49,7 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
             one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
             raise ArgumentError(
                 f"{one} and {two} do not predict each other: they are of two arms, or some carry a "
-                "load that was not given (--payload LOG=KG, or LOG=unknown, for each that does)"
+                'load that was not given (`payload={"LOG": KG}`, or None for an unknown load)'
             )
     return [told[k] for k in odd]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tauguard.envs.episodes.motions import check_load
 from tauguard.envs.gym.randomization import distributions
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, cause
 from tauguard.models import (
     BODY_REGIONS,
     BodyProxy,
@@ -149,7 +149,8 @@ class Settings:
             if name not in known:
                 near = difflib.get_close_matches(name, known, n=1)
                 hint = f"did you mean {near[0]}? " if near else ""
-                raise ArgumentError(f"keyword {name!r}: {hint}expected one of {', '.join(known)}")
+                text = f"keyword {name!r}: {hint}expected one of {', '.join(known)}"
+                raise ArgumentError(cause("keyword", text))
         return cls(**{**defaults, **given})
 
 

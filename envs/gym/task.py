@@ -10,7 +10,7 @@ from tauguard.envs.gym.batch import Batch, StepMetrics
 from tauguard.envs.gym.compiled import CompiledScene, compile_scene
 from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
 from tauguard.envs.gym.settings import Settings
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, cause
 
 #: Largest number of initial states that are drawn to find one without contact.
 BEGINNINGS = 100
@@ -103,9 +103,9 @@ def build(
     own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
     try:
         settings = Settings.from_keywords(task_type.defaults, keywords)
-    except ValueError as error:
-        if own and str(error).startswith("keyword "):
-            raise ArgumentError(f"{error}, {', '.join(own)}") from None
+    except ArgumentError as error:
+        if own and error.findings.of("keyword"):
+            raise ArgumentError(cause("keyword", f"{error}, {', '.join(own)}")) from None
         raise
     default, moved = frozenset(task_type.defaults) - keywords.keys(), dict[str, float]()
     for _ in range(MOVES + 1):

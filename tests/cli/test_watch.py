@@ -112,7 +112,7 @@ def test_the_viewer_is_bound_to_this_machine(monkeypatch):
     seen = []
 
     monkeypatch.setattr(live.subprocess, "Popen", lambda command: seen.append(command) or Ended())
-    with pytest.raises(OSError, match="--save"):
+    with pytest.raises(OSError, match="`save="):
         live.open_viewer(19876)
     command = [str(part) for part in seen[0]]
     assert command[command.index("--bind") + 1] == "127.0.0.1"
@@ -130,7 +130,7 @@ def test_a_viewer_that_ended_is_said(tmp_path):
         view._viewer = Ended()
         view.show(env.batch.datas[0], 0.0, np.zeros((1, 3)))  # another one listens there
     view._viewer = Ended()
-    with pytest.raises(OSError, match="ended; without a display use --save"):
+    with pytest.raises(OSError, match="ended; without a display use `save"):
         view.show(env.batch.datas[0], 0.0, np.zeros((1, 3)))
 
 

@@ -66,7 +66,7 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     own = described.parent / "robots" / "other.toml"
     _, same = inspection.same_again(tmp_path / "1", line, own)
     assert same
-    with pytest.raises(ValueError, match=r"its file other\.toml is not here; .* by --robot"):
+    with pytest.raises(ValueError, match=r"its file other\.toml is not here; .* by `robot=`"):
         inspection.same_again(tmp_path / "1", line)
     with pytest.raises(ValueError, match="arm cura6 comes with the package"):
         inspection.same_again(tmp_path / "1", line | {"arm": "cura6"}, own)

@@ -156,7 +156,7 @@ def pin_free(scene):
             "<body name='f'><joint name='f1'/><geom size='.1'/></body>"
             "<body name='g'><joint name='f2'/><geom size='.1'/></body></body></body></body>"
             "</worldbody></mujoco>",
-            r"--arm-joints lift\.\.a2 ",
+            r"`arm_joints=.lift\.\.a2.` ",
         ),
         ("<mujoco><worldbody><body>", "arm "),
     ],

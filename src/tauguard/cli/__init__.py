@@ -122,7 +122,7 @@ def said(error: Exception) -> str:
         return f"{error.filename}: there is a file of that name; expected a folder, or a new name"
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
-    return as_flags(str(error))
+    return str(error)
 
 
 def expect(flag: str, value: float, least: float, most: float = float("inf")) -> None:
@@ -134,6 +134,6 @@ def expect(flag: str, value: float, least: float, most: float = float("inf")) ->
 
 def fail(message: str, code: int = 2) -> None:
     """Print one line to standard error and exit with ``code`` (``SystemExit``)."""
-    line = " ".join(message.split())
+    line = " ".join(as_flags(message).split())
     print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
     raise SystemExit(code)
