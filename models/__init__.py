@@ -2,7 +2,7 @@
 
 from tauguard.models import cura6
 from tauguard.models.arm import Arm, Facts, load_arm
-from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
+from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region, read_regions
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.drive_text import drive_of, drive_text
@@ -25,5 +25,5 @@ __all__ = [
     "Robot", "RobotDrive", "Scene", "SceneObject", "SceneSpec", "Sensors", "Shape", "Striker",
     "Table", "arm_surface", "body_region", "compiled", "compose", "cura6", "cura6_drive",
     "drive_of", "drive_text", "impact_velocity", "link_surface", "load_arm", "load_objects",
-    "pin_model", "reflected_mass", "set_payload", "standard_mass", "without_losses",
+    "pin_model", "read_regions", "reflected_mass", "set_payload", "standard_mass", "without_losses",
 ]  # fmt: skip
