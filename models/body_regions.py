@@ -113,7 +113,7 @@ def read_regions(path: str | Path) -> dict[str, BodyRegion]:
     """
     with reading(path, "expected TOML with a table for each body region"):
         tables = tomllib.loads(read_text(path))
-    numbers = {f.name for f in fields(BodyRegion) if f.type == "float"}
+    numbers = {f.name for f in fields(BodyRegion) if f.type is float}
     regions = dict(BODY_REGIONS)
     for name, table in tables.items():
         region = body_region(name)

@@ -129,7 +129,9 @@ class ArmStates:
             frames = data.xmat[arm.body].reshape(-1, 3, 3)
             arms[row] = np.einsum("kij,kj->ki", frames, arm.local)
         turning = np.cross(angular[:, which], arms[..., None], axisa=2, axisb=2, axisc=2)
-        return cls(q, qd, np.asarray(np.linalg.inv(mass), np.float64), gravity, linear[:, which] + turning)
+        return cls(
+            q, qd, np.asarray(np.linalg.inv(mass), np.float64), gravity, linear[:, which] + turning
+        )
 
     @property
     def velocity(self) -> Array:

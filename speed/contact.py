@@ -33,6 +33,7 @@ class Contacts:
     spring: Spring  #: its arrays have shape (C,)
     person_mass: Array  #: [kg], infinite where the person is clamped, shape (C,)
     delay: Array  #: from the first touch to the reaction [s], infinite: none, shape (C,)
+    ends: Array  #: when the program itself stops the reference, after the first touch [s], (C,)
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Integration:
     transient_time: float = 0.5
     """The limits of a transient contact hold this long, those of a quasi-static contact after it
     [s] (ISO/TS 15066:2016, 5.5.5.3)."""
+    run_up: float = 0.25  #: motion before the first touch in MuJoCo, until the servo follows [s]
     brake_stiffness: float = 10.0  #: of the brakes, relative to the servo's
     brake_damping: float = 3.0  #: of the brakes, relative to the servo's
 
@@ -78,7 +80,7 @@ def follow(
     dt, steps = settings.step, round(settings.duration / settings.step)
     inverse = np.ascontiguousarray(np.moveaxis(contacts.inverse_mass, 0, -1))  # (n, n, C)
     lever, gravity = contacts.lever.T.copy(), contacts.gravity.T.copy()
-    servo = _Servo(arm, contacts.qd.T.copy(), reaction, settings)
+    servo = _Servo(arm, contacts, reaction, settings)
     friction = _Friction(arm, contacts.qd.T)
     x, v = np.zeros_like(lever), contacts.qd.T.copy()
     person, person_speed = np.zeros_like(contacts.person_mass), np.zeros_like(contacts.person_mass)
@@ -87,7 +89,7 @@ def follow(
     force = np.zeros_like(person)
     for k in range(steps):
         t = k * dt
-        torque = servo.torque(x, v, gravity, t - contacts.delay, dt)
+        torque = servo.torque(x, v, gravity, t, dt)
         torque -= friction.torque(v, dt) + lever * force
         push = inverse[:, 0] * torque[0]
         for j in range(1, len(torque)):
@@ -130,7 +132,10 @@ class _Friction:
 class _Servo:
     """Position control towards a reference that the reaction stops."""
 
-    def __init__(self, arm: ContactArm, qd: Array, reaction: Stop, settings: Integration) -> None:
+    def __init__(
+        self, arm: ContactArm, contacts: Contacts, reaction: Stop, settings: Integration
+    ) -> None:
+        qd, self._delay, self._ends = contacts.qd.T.copy(), contacts.delay, contacts.ends
         gains, facts = arm.gains, arm.scene.facts
         self._kp, self._kd = gains.kp[:, None], gains.kd[:, None]
         self._limit = arm.torque_limit[:, None]
@@ -139,19 +144,26 @@ class _Servo:
         known = 0.0 if friction is None else facts.compensation
         self._known_level = known * (friction.coulomb[:, None] if friction is not None else 0.0)
         self._known_viscous = known * (friction.viscous[:, None] if friction is not None else 0.0)
-        self._x, self._v = np.zeros_like(qd), qd.copy()
+        # In steady motion the servo's lead makes up for the friction that is not compensated.
+        steady = np.zeros_like(qd)
+        if friction is not None:
+            steady = friction.coulomb[:, None] * np.sign(qd) + friction.viscous[:, None] * qd
+        self._x, self._v = (steady - self._compensated(qd)) / self._kp, qd.copy()
         self._came = qd.copy()
         self._begun = np.zeros(qd.shape[1], dtype=bool)
         self._braked = np.zeros(qd.shape[1], dtype=bool)
 
-    def torque(self, x: Array, v: Array, gravity: Array, since: Array, dt: float) -> Array:
-        """Torque of drives less gravity [N m], (n, C), ``since`` [s] after the reaction began."""
-        reaction = self._reaction
+    def torque(self, x: Array, v: Array, gravity: Array, t: float, dt: float) -> Array:
+        """Torque of drives less gravity [N m], (n, C), ``t`` [s] after the first touch."""
+        reaction, since = self._reaction, t - self._delay
         begins = (since >= 0) & ~self._begun
         if begins.any():
             self._begun |= begins
             if reaction.category == 0 or reaction.start == "measured":
                 self._v[:, begins], self._x[:, begins] = v[:, begins], x[:, begins]
+        ended = (t >= self._ends) & ~self._begun
+        if ended.any():
+            self._v = np.where(ended, 0.0, self._v)
         if self._begun.any():
             self._slow_down(dt)
         self._x = self._x + dt * self._v
@@ -165,11 +177,15 @@ class _Servo:
             powered = ~stopped
             kp = np.where(self._braked, self._settings.brake_stiffness * kp, kp)
             kd = np.where(self._braked, self._settings.brake_damping * kd, kd)
-        known = self._known_level * np.tanh(self._v / SMOOTHING) + self._known_viscous * self._v
+        known = self._compensated(self._v)
         pull = kp * (self._x - x) + kd * (self._v - v)
         drive = np.clip(pull + known + gravity, -self._limit, self._limit)
         held = np.where(self._braked, pull + gravity, 0.0)  # brakes hold more than the drives
         return np.asarray(np.where(powered, drive, held) - gravity)
+
+    def _compensated(self, v: Array) -> Array:
+        """Friction torque that the controller adds at a reference speed [N m]."""
+        return np.asarray(self._known_level * np.tanh(v / SMOOTHING) + self._known_viscous * v)
 
     def _slow_down(self, dt: float) -> None:
         """Slow the references of the contacts whose reaction has begun, along their paths."""

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors import CollisionAlarm
 from tauguard.findings import ArgumentError, MismatchError
 from tauguard.traces import Trace
-from tauguard.traces.trace import Detection
-
-
-class AlarmDetector(Protocol):
-    """What this module needs of a detector: :class:`tauguard.detectors.CollisionAlarm` has it."""
-
-    def detect(self, trace: Trace) -> Detection:
-        """Alarms of a trace."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -33,16 +23,15 @@ class DelayModel:
     without the contact does not count.
     """
 
-    alarm: AlarmDetector
-    arm: ArmModel  #: the detector's
+    alarm: CollisionAlarm
     trace: Trace  #: the program, with currents, joints in the detector's order
-    before: float = 2.5  #: time of the stretch before the contact [s]
+    before: float = 1.5  #: time of the stretch before the contact [s]
     same_alarm: float = 0.1
     """Alarms with and without the contact that start within this time are the same one [s]."""
 
     def __post_init__(self) -> None:
         """Check that recording and detector belong together: ``MismatchError``."""
-        joints = self.arm.robot.joint_names
+        joints = self.alarm.detector.arm.robot.joint_names
         if self.trace.joint_names != joints:
             raise MismatchError(
                 f"the detector's joints are {', '.join(joints)}, the program's "
@@ -70,7 +59,7 @@ class DelayModel:
         rows = slice(int(first), int(last))
         since = trace.t[rows] - touch
         pushed = np.interp(since, times, force, left=0.0)[:, None] * lever
-        current = trace.current[rows] + pushed / self.arm.drive_gain
+        current = trace.current[rows] + pushed / self.alarm.detector.arm.drive_gain
         stretch = Trace(
             trace.joint_names,
             trace.t[rows],
@@ -79,10 +68,11 @@ class DelayModel:
             current,
             meta=trace.meta,
         )
-        for alarm in self.alarm.detect(stretch).alarms:
-            alone = np.abs(self._alone - alarm.start) < self.same_alarm
-            if alarm.start >= touch and not alone.any():
-                return alarm.start - touch
+        up = self.alarm.sustained(stretch) > self.alarm.threshold
+        rises = stretch.t[np.flatnonzero(up & ~np.concatenate([[False], up[:-1]]))]
+        for start in rises[rises >= touch]:
+            if not (np.abs(self._alone - start) < self.same_alarm).any():
+                return float(start) - touch
         return float("inf")
 
     @cached_property

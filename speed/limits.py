@@ -238,9 +238,10 @@ def _delay_model(detector: Any, program: Program) -> DelayModel:
     if set(names) == set(trace.joint_names):
         order = [trace.joint_names.index(name) for name in names]  # type: ignore[assignment]
     columns = list(order)
-    matched = Trace(
-        names if len(names) == len(columns) else trace.joint_names,
-        trace.t, trace.q[:, columns], trace.qd[:, columns], trace.current[:, columns],
-        meta=trace.meta,
-    )  # fmt: skip
-    return DelayModel(alarm, arm, matched)
+    q, qd, current = (
+        np.ascontiguousarray(signal[:, columns]) for signal in (trace.q, trace.qd, trace.current)
+    )
+    if len(names) != len(columns):
+        names = trace.joint_names  # refused by the model, which names both
+    matched = Trace(names, trace.t, q, qd, current, meta=trace.meta)
+    return DelayModel(alarm, matched)

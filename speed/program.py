@@ -104,6 +104,16 @@ class Program:
         return [s for s in stretches if self.t[s.stop - 1] - self.t[s.start] >= pause]
 
 
+def advance(program: Program, row: int, end: int) -> float:
+    """How far the program goes on in the direction of a sample's motion until row ``end`` [s].
+
+    The furthest advance along the joint velocity of ``row``, over this velocity.
+    """
+    speed = program.qd[row]
+    ahead = (program.q[row:end] - program.q[row]) @ speed / max(float(speed @ speed), 1e-12)
+    return max(float(ahead.max()), 0.0)
+
+
 def read_waypoints(path: str | Path) -> Program | None:
     """The program of a CSV whose columns are ``t, q1, q2, ...`` [s, rad]; None for another file.
 

@@ -15,11 +15,10 @@ from tauguard.speed.arm_states import ArmStates, ContactArm
 from tauguard.speed.contact import Contacts, Course, Integration, follow
 from tauguard.speed.detection_delay import DelayModel
 from tauguard.speed.impact import effective_mass, impact_energy
-from tauguard.speed.program import Program
+from tauguard.speed.program import Program, advance
 from tauguard.speed.reaction import Stop
 from tauguard.speed.simulated_contact import ContactBench, SimulatedContact
 from tauguard.speed.tool import Cover, Spring, Tool
-
 
 Rows = NDArray[np.intp]
 
@@ -132,6 +131,10 @@ class Search:
             return [], segments
         self._rows = rows
         self._states = ArmStates.of(self.arm, program.q[rows], program.qd[rows])
+        ends = [stretches[number].stop for number in numbers]
+        self._advance = np.array(
+            [advance(program, int(r), end) for r, end in zip(rows, ends, strict=True)]
+        )
         candidates = self._candidates(numbers)
         return self._limits(candidates), segments
 
@@ -204,7 +207,7 @@ class Search:
         stiffness = self._numbers(candidates, "stiffness")[cases]
         return Contacts(
             states.inverse_mass[s], states.gravity[s], lever, states.qd[s] * factor[:, None],
-            Spring(stiffness, self.cover), mass, delay,
+            Spring(stiffness, self.cover), mass, delay, self._advance[s] / factor,
         )  # fmt: skip
 
     def _excess(self, candidates: Candidates, cases: Rows, course: Course) -> Array:
@@ -251,46 +254,41 @@ class Search:
 
     def _scan(
         self, candidates: Candidates, mass: Array, detected: bool
-    ) -> tuple[Array, Array, Array, Array]:
+    ) -> tuple[Array, Rows, Array, Array]:
         """Permissible speed, what limits it, delay and peak force of each candidate, (C,) each.
 
-        The force is not monotone in the speed when a detector is in the loop, so that speeds are
-        scanned upwards, and the first excess counts.
+        With a detector in the loop a force can fall with the speed. So speeds are scanned upwards,
+        and the first excess counts.
         """
         options, count = self.options, len(mass)
-        low = np.zeros(count)
-        high = np.full(count, np.nan)
+        low, high = np.zeros(count), np.full(count, np.inf)
         limited = np.full(count, -1)
         delay, force = np.full(count, np.inf), np.zeros(count)
         grid = np.geomspace(options.slowest, options.fastest, options.coarse)
-        for speeds in (np.tile(grid[:, None], count), None):
-            if speeds is None:
-                share = np.linspace(0, 1, options.fine + 2)[1:-1, None]
-                speeds = low + share * (np.where(np.isnan(high), low, high) - low)
-            rows = len(speeds)
-            cases = np.tile(np.arange(count), rows)
-            flat = speeds.ravel()
-            waits = self._delays(candidates, cases, flat, mass[cases]) if detected else None
-            never = np.full(len(cases), np.inf)
-            contacts = self._contacts(
-                candidates, cases, flat, mass[cases], never if waits is None else waits
+        steps: list[Array] = [np.full(count, speed) for speed in grid]
+        for level in range(options.coarse + options.fine):
+            if level == options.coarse:  # between the last permitted speed and the first excess
+                steps += [
+                    low + share * (np.minimum(high, options.fastest) - low)
+                    for share in np.linspace(0, 1, options.fine + 2)[1:-1]
+                ]
+            cases = np.flatnonzero(steps[level] < high)
+            if not len(cases):
+                continue
+            speed = steps[level][cases]
+            waits = (
+                self._delays(candidates, cases, speed, mass[cases])
+                if detected
+                else np.full(len(cases), np.inf)
             )
+            contacts = self._contacts(candidates, cases, speed, mass[cases], waits)
             course = follow(self.arm, contacts, self.stop, options.integration)
-            excess = self._excess(candidates, cases, course).reshape(3, rows, count)
-            peak = course.peak.reshape(rows, count)
-            wait = (never if waits is None else waits).reshape(rows, count)
+            excess = self._excess(candidates, cases, course)
             over = (excess > 1).any(axis=0)
-            first = np.where(over.any(axis=0), over.argmax(axis=0), rows)
-            each = np.arange(count)
-            beyond = first < rows
-            high = np.where(beyond, speeds[np.minimum(first, rows - 1), each], high)
-            at = np.minimum(first, rows - 1)
-            limited = np.where(beyond, excess[:, at, each].argmax(axis=0), limited)
-            last = first - 1
-            fits = last >= 0
-            low = np.where(fits, speeds[np.maximum(last, 0), each], low)
-            delay = np.where(fits, wait[np.maximum(last, 0), each], delay)
-            force = np.where(fits, peak[np.maximum(last, 0), each], force)
+            high[cases[over]] = speed[over]
+            limited[cases[over]] = excess[:, over].argmax(axis=0)
+            fits = cases[~over]
+            low[fits], delay[fits], force[fits] = speed[~over], waits[~over], course.peak[~over]
         return low, limited, delay, force
 
     def _free_speed(self, candidates: Candidates) -> Array:
@@ -395,6 +393,7 @@ class Search:
             Spring(np.asarray(region.stiffness), self.cover),
             mass,
             limit.delay,
+            float(self._advance[s]) * limit.programmed / limit.permissible,
         )
         force = bench.force(case, self.stop)
         settings = self.options.integration

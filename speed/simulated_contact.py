@@ -27,6 +27,7 @@ class SimulatedContact:
     spring: Spring  #: of arrays of shape ()
     person_mass: float  #: [kg]
     delay: float  #: from the first touch to the reaction [s]
+    ends: float = float("inf")  #: when the program itself stops, after the first touch [s]
 
 
 class ContactBench:
@@ -50,7 +51,8 @@ class ContactBench:
         gravity and of the motion is compensated as at the first touch.
         """
         arm, loop = self._arm, self._loops["servo"]
-        dt, lead = float(arm.scene.model.opt.timestep), 20
+        dt = float(arm.scene.model.opt.timestep)
+        lead = round(self._settings.run_up / dt)
         start = case.q - lead * dt * case.qd
         loop.reset(start)
         loop.data.qvel[arm.scene.dof_adr] = case.qd
@@ -78,6 +80,8 @@ class ContactBench:
             person += dt * person_speed
             wrench[0, :3] = -force * case.normal
             wrench[0, 3:] = np.cross(place - centre, wrench[0, :3])
+            if k * dt >= case.ends:
+                reference.end()
             mode, q, qd = reference.next(k * dt - case.delay, dt)
             if self._loops[mode] is not loop:
                 saved, loop = loop.save(), self._loops[mode]
@@ -114,6 +118,11 @@ class _Reference:
     def moved_to(self, loop: SimulationLoop) -> None:
         """The arm goes on in another loop."""
         self._loop = loop
+
+    def end(self) -> None:
+        """The program stops, unless the reaction has begun."""
+        if not self._begun:
+            self._qd = np.zeros_like(self._qd)
 
     def next(self, since: float, dt: float) -> tuple[str, Array, Array]:
         """Mode, position [rad] and velocity [rad/s] of the next step."""

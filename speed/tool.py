@@ -33,7 +33,8 @@ class Tool:
         if not 0 <= self.length <= 2:
             raise ArgumentError(f"tool: length {self.length} m: expected 0 to 2")
         sphere = self.kind == "sphere"
-        if self.radius < self.SMALLEST_RADIUS if sphere else self.area_cm2 < self.SMALLEST_AREA_CM2:
+        least = self.SMALLEST_RADIUS if sphere else self.SMALLEST_AREA_CM2
+        if not least <= (self.radius if sphere else self.area_cm2) < np.inf:
             raise ArgumentError(
                 f"tool: {self}: sharp; force and pressure limits hold for blunt parts only: radius "
                 f"from {1e3 * self.SMALLEST_RADIUS:g} mm, area from {self.SMALLEST_AREA_CM2:g} cm2"

@@ -26,6 +26,7 @@ PRODUCT = {
     "live",
     "twin",
     "benchmark",
+    "speed",
 }
 ALLOWED = {
     "geometry": set(),
@@ -41,6 +42,7 @@ ALLOWED = {
     "live": {"detectors", "traces"},
     "twin": {"detectors", "models", "traces"},
     "benchmark": {"datasets", "detectors", "models", "traces", "report"},
+    "speed": {"envs", "detectors", "models", "traces"},
     "report": set(),
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "hard_cases"},

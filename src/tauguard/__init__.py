@@ -2,7 +2,7 @@
 
 Import the sub-package that you need: ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``, ``report``,
-``hard_cases``, ``twin``, ``benchmark``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
+``hard_cases``, ``twin``, ``benchmark``, ``speed``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
 
 After ``import tauguard``, ``gymnasium.make("tauguard/Reach-v0")`` makes an environment. The others
 are ``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
@@ -23,9 +23,20 @@ if TYPE_CHECKING:
     from tauguard.datasets.arm_logs import read_log, read_logs, simulated
     from tauguard.detectors.calibration.nominal import residual
     from tauguard.replay.plot import plot
+    from tauguard.speed.limits import speed_limits
     from tauguard.traces.logs import Load, Log, Logs
 
-__all__ = ["Load", "Log", "Logs", "plot", "read_log", "read_logs", "residual", "simulated"]
+__all__ = [
+    "Load",
+    "Log",
+    "Logs",
+    "plot",
+    "read_log",
+    "read_logs",
+    "residual",
+    "simulated",
+    "speed_limits",
+]
 __version__ = version("tauguard")
 
 register_environments()
@@ -33,13 +44,14 @@ register_environments()
 #: Packages that are loaded at their first use.
 _PACKAGES = (
     "benchmark", "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases",
-    "live", "models", "replay", "report", "rigid", "traces", "twin",
+    "live", "models", "replay", "report", "rigid", "speed", "traces", "twin",
 )  # fmt: skip
 _FUNCTIONS = {
     **dict.fromkeys(("read_log", "read_logs", "simulated"), "tauguard.datasets.arm_logs"),
     **dict.fromkeys(("Load", "Log", "Logs"), "tauguard.traces.logs"),
     "plot": "tauguard.replay.plot",
     "residual": "tauguard.detectors.calibration.nominal",
+    "speed_limits": "tauguard.speed.limits",
 }
 
 

@@ -23,6 +23,11 @@ STUDY = Study(
             "impacts on body regions: error against the two-mass model, computing time",
             alias="impact",
         ),
+        "permissible_speed": Part(
+            "simulation.permissible_speed",
+            "forces on a person beside MuJoCo's, at any speed and at the permissible one",
+            alias="speed",
+        ),
         "environments": Part(
             "simulation.environments",
             "time of environments beyond their physics, also in parallel; reactions to alarms",

@@ -21,6 +21,7 @@ COMMANDS = {
     "calibrate": "identify friction, inertia and drive gains of a real arm from free logs",
     "twin": "identify a simulated copy of a real arm from free logs",
     "detect": "find collisions in the log of a real arm",
+    "speed": "estimate how fast a robot may move beside a person, along a program",
     "generate": "make a labelled dataset from its description, on all cores or a Ray cluster",
     "inspect": "show the content of a generated dataset and check its files",
     "export": "write a generated dataset in the format of another library",

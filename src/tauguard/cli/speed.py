@@ -74,7 +74,7 @@ def command(
 
     motion = read_waypoints(program) if columns is None and program.suffix == ".csv" else None
     result = tauguard.speed_limits(
-        motion or tauguard.read_log(program, robot, columns),
+        motion or tauguard.read_log(program, columns, robot=robot),
         robot,
         tool=Tool.parse(tool, tool_mass, tool_length),
         stop=Stop(stop, deceleration, stop_from, retract),
