@@ -125,7 +125,9 @@ def figure(result: SpeedLimits) -> Figure:
     panel.set_ylabel("speed of the binding point [m/s]")
     panel.set_ylim(bottom=0)
     panel.legend(fontsize=8)
-    panel.set_title(f"{result.program.name}, {result.robot}: {result.detection}", fontsize=9)
+    panel.set_title(
+        f"{result.program.name}, {result.robot}; reaction: {result.detection}", fontsize=9
+    )
     return drawn
 
 
