@@ -2,7 +2,8 @@
 
 Import the sub-package that you need: ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``, ``report``,
-``hard_cases``, ``twin``, ``benchmark``, ``speed``. ``cloth`` and ``rigid`` load neither MuJoCo nor Pinocchio.
+``hard_cases``, ``twin``, ``benchmark``, ``speed``. ``cloth`` and ``rigid`` load neither MuJoCo nor
+Pinocchio.
 
 After ``import tauguard``, ``gymnasium.make("tauguard/Reach-v0")`` makes an environment. The others
 are ``React-v1``, ``ClothReach-v1`` and ``TwoArms-v1``. ``help(env.unwrapped)`` describes an
