@@ -161,4 +161,5 @@ class ToolContacts:
         data.qpos[scene.qpos_adr] = q
         data.qvel[scene.dof_adr] = qd
         mujoco.mj_forward(scene.model, data)
-        return data.qfrc_bias[scene.dof_adr].copy()
+        bias: np.ndarray = data.qfrc_bias[scene.dof_adr].copy()
+        return bias
