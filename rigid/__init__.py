@@ -4,6 +4,7 @@ from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.mesh_distance import MeshPairDistances
 from tauguard.rigid.motion import Motion
+from tauguard.rigid.near_pairs import near_pairs
 from tauguard.rigid.queries import PlaneCache, sweep
 from tauguard.rigid.rays import PointDistances, RayHits
 from tauguard.rigid.results import Distances, Impacts, MeshDistances, MeshImpacts, Overlap, Witness
@@ -16,5 +17,5 @@ __all__ = [
     "Impacts", "MeshContacts", "MeshDistances", "MeshImpacts", "MeshOverlap",
     "MeshPairDistances", "MeshTree", "Motion", "Overlap", "Parallelepipeds", "PlaneCache",
     "PointDistances", "Polygons", "RayHits", "Rounded", "Shape", "Spheres", "Tetrahedra",
-    "Witness", "distance", "overlap", "sweep", "time_of_impact",
+    "Witness", "distance", "near_pairs", "overlap", "sweep", "time_of_impact",
 ]  # fmt: skip

@@ -56,6 +56,7 @@ void bind_distances(nb::module_& m);
 void bind_bodies(nb::class_<Mesh>& mesh);
 void bind_rays(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
+void bind_broad_phase(nb::module_& m);
 
 NB_MODULE(_rigid, m) {
   m.doc() = "Queries of convex bodies and meshes on arrays. Arguments are checked in Python.";
@@ -64,6 +65,7 @@ NB_MODULE(_rigid, m) {
   bind_convex(m);
   bind_distances(m);
   bind_volumes(m);
+  bind_broad_phase(m);
   nb::class_<Mesh> mesh(m, "Mesh");
   bind_bodies(mesh);
   bind_rays(mesh);
