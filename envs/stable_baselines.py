@@ -15,9 +15,6 @@ import tauguard  # noqa: F401  (registers the environments)
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.findings import ArgumentError
 
-#: Keys in the ``info`` of each copy.
-KEYS = ("cost", "cost_sum", "success", "force", "limit_ratio")
-
 
 class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
     """``num_envs`` natively stepped copies of an environment for Stable-Baselines3.
@@ -27,13 +24,15 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
     episode was truncated.
     """
 
-    def __init__(self, name: str, num_envs: int, keys: Sequence[str] = KEYS, **keywords: Any):
+    def __init__(
+        self, name: str, num_envs: int, keys: Sequence[str] | None = None, **keywords: Any
+    ):
         """Make the copies.
 
         Args:
             name: name of the environment, such as "tauguard/Reach-v0".
             num_envs: number of copies.
-            keys: keys in the ``info`` of each copy.
+            keys: keys in the ``info`` of each copy; default: all. Few keys save time.
             **keywords: keywords of the environment, ``threads`` and ``max_episode_steps``.
 
         Raises:
@@ -49,12 +48,12 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         ).unwrapped
         if not isinstance(envs, VectorArmEnv):
             raise ArgumentError(f"{name}: expected an environment of tauguard")
-        self.envs, self._keys = envs, tuple(keys)
+        self.envs, self._keys = envs, None if keys is None else tuple(keys)
         self.render_mode = envs.render_mode
         super().__init__(num_envs, envs.single_observation_space, envs.single_action_space)
         self._actions: NDArray[Any] | None = None
 
-    def reset(self) -> NDArray[np.float64]:
+    def reset(self) -> Any:
         """Begin an episode of every copy, with the seeds given to :meth:`seed`, if any."""
         known = [seed for seed in self._seeds if seed is not None]
         seeds = [None if seed is None else int(seed) for seed in self._seeds]
@@ -81,7 +80,10 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         return observation, reward.astype(np.float32), over, each
 
     def _info(self, infos: dict[str, Any], i: int) -> dict[str, Any]:
-        return {key: infos[key][i] for key in self._keys}
+        keys = self._keys
+        if keys is None:
+            keys = self._keys = tuple(key for key in infos if not key.startswith(("_", "final_")))
+        return {key: infos[key][i] for key in keys}
 
     def close(self) -> None:
         """Close all copies."""

@@ -1,11 +1,13 @@
 """Obstacles that the arm may touch, and contacts of a stated stiffness."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tauguard.findings import ArgumentError
 from tauguard.models.body_regions import BodyRegion, body_region
@@ -14,6 +16,12 @@ from tauguard.models.scene_objects import GROUND_BIT
 
 Vector = tuple[float, float, float]
 
+#: Height of the floor if nothing is below it [m].
+FLOOR_HEIGHT = -0.001
+#: Pedestal of an arm above the floor: half extents [m] and colour.
+PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
+#: Half extents [m] and colour of the floor.
+FLOOR_SIZE, FLOOR_COLOUR = (8.0, 8.0), (0.80, 0.82, 0.85, 1.0)
 #: Position of an obstacle until it is used [m].
 PARKED = (0.0, 0.0, 50.0)
 
@@ -174,18 +182,53 @@ def add_floor(spec: mujoco.MjSpec) -> None:
     )
 
 
+def add_ground(
+    spec: mujoco.MjSpec, height: float, bases: Sequence[ArrayLike], touchable: bool = True
+) -> None:
+    """Add the plane ``ground`` at a height [m], which only free objects touch.
+
+    Arms at ``bases`` [m] get a pedestal where the floor is below them.
+    """
+    bit, half = GROUND_BIT * touchable, (FLOOR_HEIGHT - height) / 2
+    for base in bases if half > 0 else ():
+        x, y, _ = np.asarray(base, dtype=float).tolist()
+        spec.worldbody.add_geom(
+            name=f"pedestal_{x:g}_{y:g}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[*PEDESTAL, half],
+            pos=[x, y, FLOOR_HEIGHT - half],
+            rgba=PEDESTAL_COLOUR,
+            contype=bit,
+            conaffinity=0,
+        )
+    spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[*FLOOR_SIZE, 1.0],
+        pos=[0, 0, height],
+        contype=bit,
+        conaffinity=0,
+        rgba=FLOOR_COLOUR,
+    )
+
+
 def add_pairs(
-    spec: mujoco.MjSpec, shapes: list[mujoco.MjsGeom], obstacles: Mapping[str, Springy]
+    spec: mujoco.MjSpec,
+    shapes: list[mujoco.MjsGeom],
+    obstacles: Mapping[str, Springy],
+    apart: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Add a contact pair for each shape of the arm and each obstacle, of the stated stiffness.
 
     With a small dmin in ``solimp`` and ``solref`` = (-K, -B), MuJoCo's force in every pose is
     f = (K pen + B v) / A. A is the sum of both bodies' translational ``body_invweight0``, which
     MuJoCo computes when it compiles the model. Two shapes of one link that touch the same obstacle
-    are two springs.
+    are two springs. ``apart`` names, for a link, obstacles that do not touch it.
     """
     for geom in shapes:
         for name in obstacles:
+            if name in apart.get(geom.parent.name, ()):
+                continue
             spec.add_pair(
                 name=f"{geom.name}_{name}",
                 geomname1=geom.name,

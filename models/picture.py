@@ -14,19 +14,15 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-#: Colours of the sky above and at the horizon, and of the floor.
-SKY, FLOOR_COLOUR = ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90)), (0.80, 0.82, 0.85, 1.0)
-#: Half extents of the floor and its grid [m].
-FLOOR = (8.0, 8.0, 1.0)
+from tauguard.models.obstacles import add_ground
+
+#: Colours of the sky above and at the horizon.
+SKY = ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
 #: The lamp that throws the shadows: where it stands [m], its direction and how bright it is. From
 #: straight above, the floor would throw thin shadows on itself.
 LAMP, DOWN, LAMP_COLOUR = (0.0, 0.0, 3.0), (0.06, 0.04, -1.0), 0.35
 #: Ambient and diffuse light of the camera.
 AMBIENT, DIFFUSE = 0.35, 0.4
-#: Height of the floor if nothing is below it [m].
-FLOOR_HEIGHT = -0.001
-#: Pedestal of an arm above the floor: half extents [m] and colour.
-PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
 #: Radius [m] and colour of the ball that marks a target; width [m] and colour of an arrow.
 MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
 ARROW_WIDTH, ARROW_COLOUR = 0.012, (0.85, 0.1, 0.1, 1.0)
@@ -35,19 +31,11 @@ ARROW_WIDTH, ARROW_COLOUR = 0.012, (0.85, 0.1, 0.1, 1.0)
 def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -> mujoco.MjModel:
     """The model of ``spec`` with sky, lamp and a floor at a height [m], all visual only.
 
-    Arms at ``bases`` [m] get a pedestal where the floor is below them.
+    Arms at ``bases`` [m] get a pedestal where the floor is below them. A scene that has a floor
+    keeps it.
     """
-    height = (FLOOR_HEIGHT - floor) / 2
-    for base in bases if height > 0 else ():
-        x, y, _ = np.asarray(base, dtype=float).tolist()
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[*PEDESTAL, height],
-            pos=[x, y, FLOOR_HEIGHT - height],
-            rgba=PEDESTAL_COLOUR,
-            contype=0,
-            conaffinity=0,
-        )
+    if spec.geom("ground") is None:
+        add_ground(spec, floor, bases, touchable=False)
     bright, blue = SKY
     spec.add_texture(
         name="sky",
@@ -57,14 +45,6 @@ def staged(spec: mujoco.MjSpec, floor: float, bases: Sequence[ArrayLike] = ()) -
         rgb2=bright,
         width=256,
         height=256,
-    )
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=FLOOR,
-        pos=[0, 0, floor],
-        rgba=FLOOR_COLOUR,
-        contype=0,
-        conaffinity=0,
     )
     spec.worldbody.add_light(
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,

@@ -25,6 +25,7 @@ from tauguard.models.obstacles import (
     Striker,
     Table,
     add_floor,
+    add_ground,
     add_obstacle,
     add_pairs,
     add_table,
@@ -32,7 +33,7 @@ from tauguard.models.obstacles import (
 from tauguard.models.payload import add_payload_body
 from tauguard.models.person import Person, PersonPart, add_person
 from tauguard.models.robot import Robot
-from tauguard.models.scene_objects import SceneObject, add_object, check_apart, hold
+from tauguard.models.scene_objects import SceneObject, add_grasp, add_object, check_apart, hold
 
 #: Integrators by MuJoCo's names.
 INTEGRATORS = {
@@ -56,6 +57,7 @@ class SceneSpec:
     clamp: Clamp | None = None
     labels: bool = True  #: a contact sensor on every link
     floor: bool = False  #: a plane at height 0
+    ground: float | None = None  #: height of a floor that only free objects touch [m]
     arm: str | Robot = "cura6"  #: a name, a file or a robot, see :func:`load_arm`
     base_pose: tuple[tuple[float, ...], ...] | None = (
         None  #: pose of the file's world frame, (4, 4)
@@ -254,10 +256,14 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
             parts |= {geom.name: obj for geom in add_object(whole, obj)}
         else:
             hold(whole, whole.body(arm.links[-1]), arm.flange(), obj)
+        if obj.graspable:
+            add_grasp(whole, arm.links[-1], obj)
     if spec.table is not None:
         add_table(whole, spec.table)
     if spec.floor:
         add_floor(whole)
+    if spec.ground is not None:
+        add_ground(whole, spec.ground, [_root(whole, arm.links[0]).pos])
     if spec.cloth is not None:
         add_cloth(whole, spec.cloth)
     if spec.labels:
@@ -269,9 +275,18 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
         for name in region_names(spec):
             label_region(whole, spec, name, arm.links[0])
     if parts:
-        add_pairs(whole, arm.shapes(), parts)
+        held = [geom for geom, part in parts.items() if getattr(part, "graspable", False)]
+        add_pairs(whole, arm.shapes(), parts, {arm.links[-1]: held})
     moving = (obj.name for obj in spec.objects if obj.moves)
     return (*obstacles, *moving)
+
+
+def _root(spec: mujoco.MjSpec, body: str) -> mujoco.MjsBody:
+    """The body below the world that carries ``body``."""
+    root = spec.body(body)
+    while root.parent.name != "world":
+        root = root.parent
+    return root
 
 
 def people_parts(spec: SceneSpec) -> Iterator[PersonPart]:

@@ -29,6 +29,8 @@ MOTIONS = ("fixed", "held", "free")
 #: Collision bits: of objects among themselves, and of free objects with table and floor. The arm
 #: collides with objects through contact pairs.
 OBJECT_BIT, GROUND_BIT = 4, 8
+#: The constraint that holds a graspable object has the object's name with this ending.
+GRASP = "_grasp"
 _COLOUR = (0.55, 0.6, 0.65, 1.0)
 #: Mass of a conveyor's belt [kg], large enough that parts on it do not slow it down.
 BELT_MASS = 1e4
@@ -95,6 +97,9 @@ class SceneObject:
     damping: float = 100.0  #: of its contact with the arm [N s/m]
     quasi_static_limit: float | None = None  #: largest lasting force without a cost [N]
     transient_limit: float | None = None  #: largest force of an impact without a cost [N]
+    graspable: bool = False
+    """Whether an environment's task can fix this free object to the tool. It does not collide with
+    the last link."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ArgumentError`` names the one that is wrong."""
@@ -113,6 +118,8 @@ class SceneObject:
             raise ArgumentError(
                 f"object {self.name}: motion {self.motion!r}; expected one of {', '.join(MOTIONS)}"
             )
+        if self.graspable and self.motion != "free":
+            raise ArgumentError(f"object {self.name}: graspable: expected motion 'free'")
         above_zero(self, "mass", "stiffness")
         for name in ("quasi_static_limit", "transient_limit"):
             if getattr(self, name) is not None:
@@ -259,6 +266,18 @@ def add_object(spec: mujoco.MjSpec, obj: SceneObject) -> list[mujoco.MjsGeom]:
         if obj.motion == "free" or obj.belt is not None:
             geom.mass = (obj.mass if obj.belt is None else BELT_MASS) / len(geoms)
     return geoms
+
+
+def add_grasp(spec: mujoco.MjSpec, link: str, obj: SceneObject) -> None:
+    """Add the constraint that holds a graspable object on a link; it is switched off."""
+    spec.add_equality(
+        name=obj.name + GRASP,
+        type=mujoco.mjtEq.mjEQ_WELD,
+        objtype=mujoco.mjtObj.mjOBJ_BODY,
+        name1=link,
+        name2=obj.name,
+        active=False,
+    )
 
 
 def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: SceneObject) -> list[mujoco.MjsGeom]:

@@ -87,7 +87,8 @@ def _stage(trace: Trace, row: int) -> Any:
     """The recording's scene on a floor below everything that it shows."""
     import mujoco
 
-    from tauguard.models.picture import FLOOR_HEIGHT, staged
+    from tauguard.models.obstacles import FLOOR_HEIGHT
+    from tauguard.models.picture import staged
     from tauguard.replay.robot import load_model
 
     text = trace.attachments["scene.xml"]

@@ -83,6 +83,8 @@ def test_environments_are_named_so_that_gymnasium_finds_them(page):
     from tauguard.environments import ENVIRONMENTS
 
     for name in re.findall(r"""make(?:_vec)?\(\s*["'](\S*?-v\d)["']""", page.read_text()):
+        if name.startswith("mine/"):  # the page registers it
+            continue
         assert name.removeprefix("tauguard:") in ENVIRONMENTS, name
         assert name.startswith("tauguard:"), f"{name}: found only where tauguard was imported"
 

@@ -61,13 +61,16 @@ class Monitor:
 
     A step is one native call that allocates only the answer, unless the detector's stream is
     written in Python.
+
+    Attributes:
+        native: the C++ monitor.
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
         """Set up the state before the first sample."""
         torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
         self._usual = usual
-        self._native = _observer.Monitor(
+        self.native = _observer.Monitor(
             FaultCheck(usual).native,
             alarm.stream().native,
             torques.observer.native,
@@ -82,7 +85,7 @@ class Monitor:
     @property
     def settled(self) -> bool:
         """Whether the detector can raise an alarm yet."""
-        return self._native.settled
+        return self.native.settled
 
     def step(self, t: float, q: Array, qd: Array, current: Array) -> Answer:
         """Judge this sample.
@@ -96,7 +99,7 @@ class Monitor:
         Raises:
             ValueError: another number of joints.
         """
-        state, up, score, number, joint, value, settling = self._native.step(t, q, qd, current)
+        state, up, score, number, joint, value, settling = self.native.step(t, q, qd, current)
         reason = self._reason(number, joint, value, settling) if number else ""
         return Answer(STATES[state], up, score, reason)
 
@@ -125,7 +128,7 @@ class Monitor:
         Raises:
             ValueError: wrong shapes.
         """
-        number, joint, value, settling = self._native.steps(
+        number, joint, value, settling = self.native.steps(
             t, *signals, estimator.native, estimator.dt, last, residuals, alarms
         )
         return self._reason(number, joint, value, settling) if number else ""

@@ -100,6 +100,12 @@ class Alarm {
   double dt() const { return set_.dt; }
   const Estimator* estimator() const { return scores_->estimator(); }
   double score() const { return score_; }
+  // An alarm in the same state that steps by itself.
+  Alarm copy() const {
+    Alarm out(*this);
+    out.scores_ = scores_->clone();
+    return out;
+  }
 
   void reset() {
     scores_->reset();

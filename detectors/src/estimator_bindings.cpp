@@ -116,6 +116,7 @@ void bind_estimator(nb::module_& m) {
           "started"_a, "weighted"_a, "fusion"_a, "plain_gain"_a, "sampled"_a)
       .def_prop_ro("started", &Estimator::started)
       .def("reset", &Estimator::reset)
+      .def("copy", [](const Estimator& estimator) { return Estimator(estimator); })
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "residual"_a.noconvert(),
            "unexplained"_a.noconvert(), "motion"_a.noconvert(), "plain"_a.noconvert(),
            "theta"_a.noconvert())

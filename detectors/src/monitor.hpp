@@ -52,6 +52,12 @@ class Monitor {
   // The estimator of the detector; null if the detector has none.
   const Estimator* estimator() const { return alarm_.estimator(); }
   bool settled() const { return time_ >= ready_; }
+  // A monitor in the same state that steps by itself.
+  Monitor copy() const {
+    Monitor out(*this);
+    out.alarm_ = alarm_.copy();
+    return out;
+  }
   // The detector's estimator; null if the last sample had a fault and was therefore not used.
   const Estimator* fed() const { return bad_ ? nullptr : estimator(); }
 

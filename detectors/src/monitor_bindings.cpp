@@ -23,6 +23,11 @@ class PythonScores final : public Scores {
   }
   std::size_t joints() const override { return n_; }
   void reset() override { step_ = make_().attr("step"); }
+  Source clone() const override {
+    auto out = std::make_shared<PythonScores>(*this);
+    out->step_ = nb::module_::import_("copy").attr("deepcopy")(step_);  // and its object
+    return out;
+  }
   double step(const double* q, const double* qd, const double* current, double dt) override {
     return nb::cast<double>(step_(array(q), array(qd), array(current), dt));
   }
@@ -170,6 +175,7 @@ void bind_monitor(nb::module_& m) {
       .def(nb::new_(&make_alarm), "scores"_a, "dt"_a, "settle"_a, "threshold"_a, "samples"_a,
            "memory"_a, "levels"_a, "floor"_a)
       .def_prop_ro("score", &Alarm::score)
+      .def("copy", &Alarm::copy)
       .def(
           "step",
           [](Alarm& alarm, In1 q, In1 qd, In1 current, double dt) {
@@ -182,6 +188,7 @@ void bind_monitor(nb::module_& m) {
       .def(nb::new_(&make_monitor), "check"_a, "alarm"_a, "observer"_a, "torques"_a, "dt"_a,
            "settle"_a, "span"_a, "window"_a, "bridged"_a)
       .def_prop_ro("settled", &Monitor::settled)
+      .def("copy", &Monitor::copy)
       .def("step", &step, "t"_a, "q"_a, "qd"_a, "current"_a)
       .def("steps", &steps, "t"_a, "q"_a, "qd"_a, "current"_a, "estimator"_a, "dt"_a,
            "last"_a.noconvert(), "residuals"_a.noconvert(), "alarms"_a.noconvert());

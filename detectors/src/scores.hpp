@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "estimator.hpp"
@@ -16,6 +17,8 @@ namespace tauguard::detectors {
 class Scores {
  public:
   virtual ~Scores() = default;
+  // A stream in the same state that steps by itself.
+  virtual std::shared_ptr<Scores> clone() const = 0;
   virtual std::size_t joints() const = 0;
   virtual void reset() = 0;  // the next sample is the first
   // The score of a sample, `dt` s after the last one; n numbers each.
@@ -38,6 +41,7 @@ inline double largest(const double* x, std::size_t n) {
 class FreeScores final : public Scores {
  public:
   explicit FreeScores(FreeMotion stream) : stream_(std::move(stream)) {}
+  std::shared_ptr<Scores> clone() const override { return std::make_shared<FreeScores>(*this); }
   std::size_t joints() const override { return stream_.joints(); }
   void reset() override { stream_.reset(); }
   double step(const double* q, const double* qd, const double* current, double dt) override {
@@ -93,6 +97,7 @@ class LimitScores final : public Scores {
   LimitScores(ScaledResidual residual, std::vector<double> limits)
       : residual_(std::move(residual)), limits_(std::move(limits)), ratio_(limits_.size()) {}
 
+  std::shared_ptr<Scores> clone() const override { return std::make_shared<LimitScores>(*this); }
   std::size_t joints() const override { return residual_.joints(); }
   const Estimator* estimator() const override { return &residual_.estimator(); }
   void reset() override { residual_.reset(); }
@@ -133,6 +138,7 @@ class KernelScores final : public Scores {
         x_(window_.size()),
         ratio_(floor_.limits.size()) {}
 
+  std::shared_ptr<Scores> clone() const override { return std::make_shared<KernelScores>(*this); }
   std::size_t joints() const override { return residual_.joints(); }
   const Estimator* estimator() const override { return &residual_.estimator(); }
   void reset() override {

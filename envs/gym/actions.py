@@ -27,6 +27,7 @@ class Entry:
     low: float
     high: float
     unit: str
+    goal: bool = False  #: depends on the target, so that ``goal=True`` leaves it out
 
 
 def action_table(compiled: CompiledScene) -> list[Entry]:
@@ -96,15 +97,15 @@ def observation_table(compiled: CompiledScene) -> list[Entry]:
         for name, m in zip(joints, most, strict=True)
     ]
     tools = [f"tool {i + 1}" for i in range(len(compiled.tools))]
-    parts = [(f"position of {tool}", "m", DISTANCE_BOUND) for tool in tools]
-    parts += [(f"target less {tool}", "m", DISTANCE_BOUND) for tool in tools]
+    parts = [(f"position of {tool}", "m", DISTANCE_BOUND, False) for tool in tools]
+    parts += [(f"target less {tool}", "m", DISTANCE_BOUND, True) for tool in tools]
     for region in compiled.regions:
         parts += [
-            (f"position of the {region.name}", "m", DISTANCE_BOUND),
-            (f"velocity of the {region.name}", "m/s", SPEED_BOUND),
+            (f"position of the {region.name}", "m", DISTANCE_BOUND, False),
+            (f"velocity of the {region.name}", "m/s", SPEED_BOUND, False),
         ]
     return rows + [
-        Entry(f"{name}, {axis}", -bound, bound, unit)
-        for name, unit, bound in parts
+        Entry(f"{name}, {axis}", -bound, bound, unit, goal)
+        for name, unit, bound, goal in parts
         for axis in "xyz"
     ]

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import Array
 from tauguard.envs.gym.batch import TOUCHES, Batch, StepMetrics
 from tauguard.envs.gym.compiled import CompiledScene
+from tauguard.envs.gym.goals import Goals, goal_reward
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
-from tauguard.envs.gym.task import Task, build
+from tauguard.envs.gym.task import Task, build, task_of
 from tauguard.findings import ArgumentError
 from tauguard.models import Scene
 
@@ -26,9 +27,10 @@ DIVERGED_REASON = (
 RENDER_MODES = ("rgb_array", "human")
 #: Value of :attr:`StepMetrics.diverged` for an impossible force.
 IMPOSSIBLE = 2
+DIVERGED = StepMetrics._fields.index("diverged")
 
 
-class ArmEnv(gymnasium.Env[Array, Array]):
+class ArmEnv(gymnasium.Env[Any, Array]):
     """One arm scene as a Gymnasium environment; each subclass sets ``task_type``.
 
     The keywords are those of :class:`tauguard.envs.gym.settings.Settings` and of the task.
@@ -39,8 +41,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     |---|---|
     | time, distance, success | time [s], distance to the target [m], goal reached |
     | force, link | peak contact force on a link [N], and which link |
-    | cost | impulse beyond the limits of body regions, plus that between two arms [N s] |
+    | excess | impulse beyond the limits of body regions, plus that between two arms [N s] |
+    | cost | the part of the excess that the arm causes [N s] |
     | cost_sum | sum of the costs of the episode [N s] |
+    | excess_cause | "arm": cost above 0; "region": a region ran into the arm; "": no excess |
     | limit_ratio, region | peak of force over limit, and of which region |
     | pressure | peak mean pressure [N/cm^2]; 0 without the keyword ``contact_area`` |
     | tau_ext, tau_ext_peak | external torque by joint, last and peak [N m] |
@@ -55,7 +59,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     The limit of a region's force is the transient limit. After 0.5 s of contact, or if the region
     cannot move, it is the quasi-static limit. In the cost, a force counts at most as much as the
-    arm would exert on a person who stands still. Without ``contact_area`` the regions' pressures
+    arm would exert on a person who stands still: the stiffness of the region times the distance
+    that the arm has advanced in this contact. If ``limit_ratio`` is above 1 at a cost of 0,
+    ``excess_cause`` is "region". Without ``contact_area`` the regions' pressures
     are estimates, see :attr:`tauguard.envs.gym.regions.RegionInfo.least_pressure`.
 
     The limits follow ISO 10218-2:2025. Some values could not be confirmed from an open source;
@@ -65,11 +71,22 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
     task_type: ClassVar[type[Task]] = Task
 
-    def __init__(self, render_mode: str | None = None, **keywords: Any) -> None:
+    def __init__(
+        self,
+        render_mode: str | None = None,
+        task: type[Task] | str | None = None,
+        goal: bool = False,
+        **keywords: Any,
+    ) -> None:
         """Compile the scene.
 
         Args:
             render_mode: "rgb_array", "human" or None.
+            task: a subclass of :class:`tauguard.envs.tasks.Task`, or "module:Name", in place of the
+                environment's own task.
+            goal: whether observations are dictionaries of ``observation``, ``achieved_goal`` and
+                ``desired_goal``. The reward is then :meth:`compute_reward`, and a goal stays for
+                the whole episode.
             **keywords: see :class:`tauguard.envs.gym.settings.Settings`.
 
         Raises:
@@ -79,17 +96,21 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """
         if render_mode is not None:
             one_of("render_mode", render_mode, RENDER_MODES)
-        self.render_mode, self._keywords = render_mode, dict(keywords)
-        self.compiled, self.batch, self.task = build(self.task_type, keywords, 1)
+        self.render_mode, self._keywords = render_mode, keywords | {"task": task, "goal": goal}
+        self.compiled, self.batch, self.task = build(task_of(task, self.task_type), keywords, 1)
         self.metadata = frame_rate(self.compiled)
-        self.action_space, self.observation_space = make_spaces(self.batch)
+        self.goals = Goals(self.batch, self.task) if goal else None
+        self.action_space, self.observation_space = make_spaces(self.batch, self.goals)
         self._shape, self._area = self.action_space.shape, self.compiled.settings.contact_area
         #: Views of the rows of the only copy.
         self._seen, self._row = self.batch.observation[0], self.batch.numbers[0]
         self._arrays = {name: rows[0] for name, rows in shown_arrays(self.batch).items()}
-        self._reward_keys = {name: f"reward_{name}" for name in self.task.terms}
+        terms = ("goal",) if goal else self.task.terms
+        self._reward_keys = {name: f"reward_{name}" for name in terms}
+        self._looks = bool(self.task.measures or self.batch.own_entries)
+        self._leaving = self.batch.objects.leaving
         self._picture: Any = None
-        self._no_reward = dict.fromkeys(self.task.terms, 0.0)
+        self._no_reward = dict.fromkeys(terms, 0.0)
         self._was_reset = False
 
     def __repr__(self) -> str:
@@ -123,26 +144,36 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode.
 
         Args:
             seed: seed of all random draws.
-            options: values by name that replace this episode's draws of ``randomize``.
+            options: values by name that replace this episode's draws: ``target`` [m], shape
+                (3 arms,), and the names of ``randomize``.
 
         Raises:
-            ArgumentError: ``options`` has a name that ``randomize`` lacks, or a value out of range.
+            ArgumentError: ``options`` has an unknown name, or a value out of range.
         """
-        check_options(options or {}, self.compiled.settings.randomize or {})
+        stated = dict(options or {})
+        target = targets(stated.pop("target", None), 1, self.compiled.arms)[0]
+        check_options(stated, self.compiled.settings.randomize or {}, ("target",))
         super().reset(seed=seed)
-        self.batch.draw(0, self.np_random, options or {})
-        self.task.begin(0, self.np_random)
+        self.batch.draw(0, self.np_random, stated)
+        self.task.begin(0, self.np_random, target)
         self._was_reset = True
         if self.render_mode == "human":
             self.render()
-        return self._seen.copy(), self._info(self._metrics(), self._no_reward, False, "")
+        return self._observed(), self._info(self._metrics(), self._no_reward, False, "")
 
-    def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any) -> Any:
+        """Reward of reached and desired goals, shapes (g,) or (N, g); :meth:`Task.goal_reward`."""
+        return goal_reward(self.task, achieved_goal, desired_goal, info)
+
+    def _observed(self) -> Any:
+        return self._seen.copy() if self.goals is None else self.goals.one(0)
+
+    def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Apply an action for one control step; entries beyond [-1, 1] count as -1 and 1.
 
         Raises:
@@ -158,18 +189,28 @@ class ArmEnv(gymnasium.Env[Array, Array]):
                 f"{', '.join(entry.name for entry in batch.actions)}"
             )
         batch.step(0, values, self.np_random)
+        diverged = bool(self._row[DIVERGED])
+        if self._looks and not diverged:
+            task.look(0)
         step = self._metrics()
         rewards, success, task.memory[0], over = task.score(step, task.memory.item(0))
         why = (task.ended if success else task.failed) if over else ""
-        diverged = step.diverged != 0
+        if self._leaving and not over:
+            why = batch.objects.reason(0)
+            over = bool(why)
         reason = divergence(self.compiled, step.diverged) if diverged else why
+        if self.goals is not None:
+            reached, wanted = task.achieved(0), task.desired(0)
+            rewards = {"goal": float(task.goal_reward(reached, wanted, {}))}
         info = self._info(step, rewards, success, reason)
-        if success and not diverged:
+        if success and not diverged and self.goals is None:
             task.after(0, self.np_random)
+            if self._looks:
+                task.look(0)
         if self.render_mode == "human":
             self.render()
         reward = float(sum(rewards.values()))
-        return self._seen.copy(), reward, over and not diverged, diverged, info
+        return self._observed(), reward, over and not diverged, diverged, info
 
     def get_state(self) -> dict[str, Any]:
         """Everything that the next steps depend on, as plain arrays, for :meth:`set_state`."""
@@ -209,8 +250,8 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.spec = saved["spec"]
         self.set_state(saved["state"])
 
-    def _metrics(self) -> StepMetrics:
-        return StepMetrics._make(self._row.tolist())
+    def _metrics(self) -> Any:
+        return self.task.step_type._make(self._row.tolist())
 
     def _info(
         self, step: StepMetrics, rewards: dict[str, Any], success: bool, reason: str
@@ -223,6 +264,8 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "force": step.force,
             "cost": step.cost,
             "cost_sum": step.cost_sum,
+            "excess": step.excess,
+            "excess_cause": "arm" if step.cost > 0 else "region" if step.excess > 0 else "",
             "pressure": step.region_force / area if area else 0.0,
             "limit_ratio": step.limit_ratio,
             "region": int(step.region),
@@ -238,6 +281,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             info[name] = row.copy()
         for key, term in rewards.items():
             info[self._reward_keys[key]] = term
+        for key in self.task.measures:
+            info[key] = getattr(step, key)
+        if self.goals is not None:
+            info["is_success"] = success
         return info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -298,9 +345,33 @@ def frame_rate(compiled: CompiledScene) -> dict[str, Any]:
     return {"render_modes": list(RENDER_MODES), "render_fps": rate}
 
 
-def make_spaces(batch: Batch) -> tuple[Any, Any]:
+def targets(given: Any, rows: int, arms: int) -> list[Array | None]:
+    """The target of each copy from ``options["target"]``; None: it is drawn.
+
+    Raises:
+        ArgumentError: not finite, or of another shape than (3 arms,), (arms, 3), and these with
+            ``rows`` in front.
+    """
+    if given is None:
+        return [None] * rows
+    shapes: list[tuple[int, ...]] = [(3 * arms,), (arms, 3)]
+    shapes += [(rows, *shape) for shape in shapes if rows > 1]
+    try:
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape not in shapes or not np.isfinite(values).all():
+        raise ArgumentError(
+            f"options: target {given!r}: expected finite numbers [m] of shape "
+            f"{' or '.join(map(str, shapes))}"
+        )
+    each = values.reshape(-1, arms, 3)
+    return list(np.broadcast_to(each, (rows, arms, 3)))
+
+
+def make_spaces(batch: Batch, goals: Goals | None = None) -> tuple[Any, Any]:
     """Spaces of the actions and observations of one environment."""
     low = np.array([entry.low for entry in batch.observations])
     high = np.array([entry.high for entry in batch.observations])
     action = spaces.Box(-1.0, 1.0, (len(batch.actions),), np.float32)
-    return action, spaces.Box(low, high, dtype=np.float64)
+    return action, spaces.Box(low, high, dtype=np.float64) if goals is None else goals.space

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.gym.actions import Entry, action_table, observation_table
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.native import controls, surroundings
+from tauguard.envs.gym.objects import FreeObjects
 from tauguard.envs.gym.people import REACHES, WALKS, draw_script
 from tauguard.envs.gym.placing import check_clear
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
@@ -36,7 +37,7 @@ class StepMetrics(NamedTuple):
     time: Any  #: since the episode began [s]
     distance: Any  #: of the tool from its target [m]; with two tools the larger distance
     force: Any  #: largest force on a link [N]
-    cost: Any  #: impulse of the arm beyond the limits of the body regions [N s]
+    cost: Any  #: the part of ``excess`` that the arm causes [N s]
     limit_ratio: Any  #: largest force on a body region divided by its limit
     region_force: Any  #: largest force on a body region [N]
     onset: Any  #: 1: a collision began
@@ -46,16 +47,15 @@ class StepMetrics(NamedTuple):
     diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
     speed_ratio: Any  #: largest ratio of a joint's speed to its largest speed, after the action
     cost_sum: Any  #: sum of ``cost`` over the episode's actions so far [N s]
+    excess: Any  #: impulse beyond the limits of the body regions, whoever causes it [N s]
 
 
-#: Fields of :class:`StepMetrics` as columns of :attr:`Batch.metrics`.
-METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
 #: Contact of the arm at a physics step: net force on the arm [N]; the link with the largest force
 #: (1-based, 0: none); point [m] and force [N] of this link's contact.
 CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
 #: Position of a body [m], and its orientation as w, x, y, z.
 POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
-assert METRICS.itemsize == 8 * _plant.METRICS
+assert len(StepMetrics._fields) == _plant.METRICS
 assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
 
 
@@ -73,7 +73,7 @@ TOUCHES = ("region_force", "region_pressure", "region_point", "region_direction"
 #: A snapshot consists of MuJoCo's integration state, the derived fields that are read before the
 #: next physics step, and the rows of one copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-KEYS = {"scene", "physics", "derived", "plant", "rows", "detector", "drawn"}
+KEYS = {"scene", "physics", "derived", "objects", "plant", "rows", "detector", "drawn"}
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
     "observation", "numbers", "tau_ext", "residual", "alarm", "target", "contacts",
@@ -94,9 +94,10 @@ class Batch:
     """``rows`` copies of one simulation, independent of one another.
 
     Attributes:
-        observation: shape (rows, size).
-        numbers: results of the last action, one column per field of :class:`StepMetrics`.
-        metrics: ``numbers`` by field name, shape (rows,).
+        observation: shape (rows, size); the task's own entries are its last columns.
+        numbers: results of the last action, one column per field of :class:`StepMetrics` and per
+            quantity that the task measures.
+        metrics: ``numbers`` by name, shape (rows,).
         tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
         tau_peak: largest external torque of each joint in the last action [N m], (rows, n).
         target: positions of the tools' targets [m], shape (rows, arms, 3).
@@ -117,15 +118,30 @@ class Batch:
         drawn: values that ``randomize`` drew for each copy, by name.
     """
 
-    def __init__(self, compiled: CompiledScene, rows: int) -> None:
-        """Allocate the data of every copy and bind the plants."""
+    def __init__(
+        self,
+        compiled: CompiledScene,
+        rows: int,
+        measures: Sequence[str] = (),
+        entries: Sequence[Entry] = (),
+    ) -> None:
+        """Allocate the data of every copy and bind the plants.
+
+        Args:
+            compiled: the scene.
+            rows: number of copies.
+            measures: names of the quantities that the task measures.
+            entries: the task's own entries of the observation.
+        """
         self.compiled, self.rows = compiled, rows
-        self.observations: list[Entry] = observation_table(compiled)
+        self.observations: list[Entry] = [*observation_table(compiled), *entries]
+        self.own_entries = len(entries)
         self.actions: list[Entry] = action_table(compiled)
         n, steps = len(compiled.scene.joint_names), compiled.settings.substeps
         self.observation = np.zeros((rows, len(self.observations)))
-        self.numbers = np.zeros((rows, len(StepMetrics._fields)))
-        self.metrics = self.numbers.view(METRICS)[:, 0]
+        names = (*StepMetrics._fields, *measures)
+        self.numbers = np.zeros((rows, len(names)))
+        self.metrics = self.numbers.view([(name, np.float64) for name in names])[:, 0]
         self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
         self.alarm = np.zeros(rows, dtype=np.bool_)
         self.target = np.zeros((rows, compiled.arms, 3))
@@ -145,12 +161,15 @@ class Batch:
         self._variants: list[Variant | None] = [None] * rows
         self._scratch = mujoco.MjData(compiled.scene.model)
         self.datas = [mujoco.MjData(compiled.scene.model) for _ in range(rows)]
+        self.objects = FreeObjects(compiled, rows)
+        if self.objects.grasps:  # the pose of a grasp is stored in the model
+            self._variants = [vary(compiled, own_model(compiled), {}) for _ in range(rows)]
         self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
         self.attach(compiled.settings.detector)
-        names = compiled.settings.checkers
-        self.checks = [StepChecks(compiled, names) for _ in range(rows)] if names else []
-        self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
+        checkers = compiled.settings.checkers
+        self.checks = [StepChecks(compiled, checkers) for _ in range(rows)] if checkers else []
+        self.contacts = np.zeros((rows, len(checkers)), dtype=np.int64)
         self._scene = _identity(compiled.scene.model)
 
     def __repr__(self) -> str:
@@ -202,6 +221,42 @@ class Batch:
         mujoco.mj_resetData(self.model(i), data)
         data.qpos[self.compiled.scene.qpos_adr] = q
 
+    def put(
+        self,
+        i: int,
+        name: str,
+        position: ArrayLike,
+        quat_wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Place a free object of copy ``i`` [m, m/s]; a grasp of it ends.
+
+        Raises:
+            ArgumentError: the scene has no free object of this name.
+        """
+        self.objects.put(self.datas[i], name, (position, quat_wxyz, velocity))
+        mujoco.mj_kinematics(self.model(i), self.datas[i])
+
+    def where(self, i: int, name: str) -> Array:
+        """Position of a free object of copy ``i`` [m], shape (3,)."""
+        return np.array(self.datas[i].xpos[self.objects.body(name)])
+
+    def grasp(self, i: int, name: str) -> None:
+        """Fix a graspable object of copy ``i`` to the first arm's tool, in its present pose.
+
+        Raises:
+            ArgumentError: the scene has no object of this name with ``graspable=True``.
+        """
+        self.objects.grasp(self.model(i), self.datas[i], name)
+
+    def release(self, i: int, name: str) -> None:
+        """Let go of an object; see :meth:`grasp`."""
+        self.datas[i].eq_active[self.objects.weld(name)] = 0
+
+    def grasped(self, i: int, name: str) -> bool:
+        """Whether the tool of copy ``i`` holds this object."""
+        return bool(self.datas[i].eq_active[self.objects.weld(name)])
+
     def send_people(self, i: int, rng: np.random.Generator) -> None:
         """Draw the motions of the people of copy ``i`` for the next episode."""
         for p, person in enumerate(self.people(i)):
@@ -220,6 +275,7 @@ class Batch:
         check_clear(self.compiled.scene, self.model(i), self._scratch, self.datas[i])
         self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
         self.alarm_delay[i], self.alarm_last[i] = -1.0, False
+        self.objects.begin(i, self.datas[i])
         if self.sensing is not None:
             self.sensing[i].reset()
 
@@ -235,6 +291,7 @@ class Batch:
             "scene": self._scene,
             "physics": physics,
             "derived": derived,
+            "objects": self.objects.get_state(i, model),
             "plant": np.array(self.plants[i].state()),
             "rows": {name: getattr(self, name)[i : i + 1].copy() for name in ROWS},
             "detector": listener.get_state() if listener else None,
@@ -261,6 +318,7 @@ class Batch:
         if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):
             raise ArgumentError("state: of another scene")
         self.plants[i].restore(state["plant"].tolist())
+        self.objects.set_state(i, model, state["objects"])
         mujoco.mj_setState(model, data, state["physics"], STATE)
         for name, values in state["derived"].items():
             getattr(data, name)[:] = values
@@ -278,8 +336,7 @@ class Batch:
             self._checked_step(i, action)
         else:
             self.plants[i].step(action)
-        if self.sensing is not None:
-            self._sense(i, rng)
+        self._finish(i, rng)
 
     def step_all(
         self, actions: Array, mask: NDArray[np.bool_], rngs: list[np.random.Generator], threads: int
@@ -290,14 +347,21 @@ class Batch:
                 self._checked_step(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
-        if self.sensing is not None:
+        if self.sensing is not None or self.objects.leaving:
             for i in np.flatnonzero(mask):
-                self._sense(int(i), rngs[i])
+                self._finish(int(i), rngs[i])
+
+    def _finish(self, i: int, rng: np.random.Generator) -> None:
+        """After the physics of an action: the sensors, and what left the workspace."""
+        if (self.sensing is None and not self.objects.leaving) or self.metrics["diverged"][i]:
+            return
+        if self.sensing is not None:
+            self._sense(i, rng)
+        if self.objects.leaving and self.objects.find_left(i, self.model(i), self.datas[i]):
+            self.plants[i].refresh()
 
     def _sense(self, i: int, rng: np.random.Generator) -> None:
         assert self.sensing is not None
-        if self.metrics["diverged"][i]:
-            return
         sensing = self.sensing[i]
         if self.metrics["onset"][i]:
             self.alarm_delay[i] = -1.0
@@ -364,7 +428,8 @@ class Batch:
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
-        around = surroundings(compiled, self.observations, self.people(i))
+        native = self.observations[: len(self.observations) - self.own_entries]
+        around = surroundings(compiled, native, self.people(i))
         plant.surround(around, controls(compiled), rows, substeps=compiled.settings.substeps)
         return plant
 

@@ -31,6 +31,7 @@ from tauguard.models import (
     set_payload,
     without_losses,
 )
+from tauguard.models.obstacles import FLOOR_HEIGHT
 
 #: Least height of a target and its least distance from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
@@ -147,6 +148,8 @@ def compile_scene(
         spec = replace(spec, table=layout.table(settings.table))
     if settings.cloth is not None and "cloth" in default:
         spec = replace(spec, cloth=layout.cloth(settings.cloth))
+    if settings.floor is not False and any(obj.motion == "free" for obj in settings.objects):
+        spec = replace(spec, ground=_ground(settings.floor, spec))
     scene = compose(spec, visuals=False)
     if arms == 2:
         scene = add_second_arm(scene, layout.second_arm(APART))
@@ -179,6 +182,23 @@ def _people(
             own = item if isinstance(item, BodyProxy) else places.proxy(item, bare, layout)
             proxies.append(own)
     return tuple(proxies), tuple(people)
+
+
+def _ground(floor: bool | float, spec: SceneSpec) -> float:
+    """Height of the floor [m], see :attr:`tauguard.envs.gym.settings.Settings.floor`."""
+    if floor is not True:
+        return float(floor)
+    if spec.people:
+        return spec.people[0].floor
+    model = compose(spec, visuals=False).model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    bodies = [model.body(obj.name).id for obj in spec.objects]
+    parts = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] in bodies]
+    turned = data.geom_xmat[parts].reshape(-1, 3, 3)[:, 2]
+    middle = data.geom_xpos[parts, 2] + (turned * model.geom_aabb[parts, :3]).sum(axis=1)
+    low = middle - (np.abs(turned) * model.geom_aabb[parts, 3:]).sum(axis=1)
+    return FLOOR_HEIGHT if low.min() > 2 * FLOOR_HEIGHT else min(Person.floor, float(low.min()))
 
 
 def _with_nominal_numbers(
@@ -222,6 +242,7 @@ def _force_bound(
     moving, driven = arms * moving, arms * driven
     grams = (settings.randomize or {}).get("payload_g")
     load = max(settings.payload_g, 0.0 if grams is None else grams.ends()[1]) / 1000
+    load += max((obj.mass for obj in settings.objects if obj.graspable), default=0.0)
     reach = arm_reach(bare) + 0.2
     moving += 0.5 * load * float((np.abs(speed) * reach).sum()) ** 2
     regions = regions_of(scene, 1.0)

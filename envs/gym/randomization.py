@@ -170,15 +170,17 @@ def check_names(
             )
 
 
-def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -> None:
-    """Check the names and values of ``reset(options=...)``.
+def check_options(
+    given: Mapping[str, Any], known: Mapping[str, Distribution], others: Iterable[str]
+) -> None:
+    """Check the names and values of ``reset(options=...)``; the caller checks ``others``.
 
     Raises:
         ArgumentError: a name that ``randomize`` lacks, or a value out of range.
     """
     for name, value in given.items():
         if name not in known:
-            hint = f"expected some of {', '.join(known)}" if known else "there are none"
+            hint = f"expected some of {', '.join([*others, *known])}"
             if name in PARAMETERS:
                 hint += f"; name it in randomize= first, such as randomize={{{name!r}: (1, 1)}}"
             raise ArgumentError(f"options: unknown {name!r}; {hint}")

@@ -11,7 +11,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.batch import Batch, StepMetrics
-from tauguard.envs.gym.compiled import find_tools, tool_position
+from tauguard.envs.gym.compiled import find_tools
 from tauguard.envs.gym.placing import Layout
 from tauguard.envs.gym.task import Outcome, Task
 from tauguard.envs.gym.vector import VectorArmEnv
@@ -30,8 +30,6 @@ DONE = 0.03  #: distance from the end at which the path is done [m]
 DONE_PRIZE, LIMIT_PRICE, IMPULSE_PRICE, TIME_PRICE = 1.0, 1.0, 1.0, 0.1
 #: Largest random shift of a body region along the path, as a fraction of ``RUN_UP``.
 WHERE = 0.5
-#: Number of steps of the inverse kinematics from home to the start of the path.
-ROUNDS = 30
 
 
 class React(Task):
@@ -52,7 +50,6 @@ class React(Task):
         if not batch.compiled.regions:
             raise ArgumentError("obstacles (): expected a body region to strike, such as 'chest'")
         scene, layout = batch.compiled.scene, batch.compiled.layout
-        self._scratch = mujoco.MjData(scene.model)
         self._meeting, self.along = home_swing(scene, layout.own)
         self._across = np.array([np.cross(self.along, UP), UP])
         scale = min(1.0, layout.scale)
@@ -81,7 +78,7 @@ class React(Task):
         batch, region = self.batch, self.batch.compiled.regions[0]
         begin = self._meeting + rng.uniform(-ASIDE, ASIDE, 2) @ self._across
         begin -= self._run_up * self.along
-        batch.place(i, self._joints(begin))
+        batch.place(i, self.joints_at(begin))
         if region.joint >= 0:
             address = int(batch.compiled.scene.model.jnt_qposadr[region.joint])
             batch.datas[i].qpos[address] = rng.uniform(-WHERE, WHERE) * self._run_up
@@ -89,22 +86,6 @@ class React(Task):
         batch.send_people(i, rng)
         batch.start(i)
         self.memory[i] = batch.metrics["distance"][i]
-
-    def _joints(self, place: Array) -> Array:
-        """Joint positions near home with the tool at ``place`` [rad], shape (n,)."""
-        compiled, model, data = self.batch.compiled, self.batch.compiled.scene.model, self._scratch
-        adr, dofs = compiled.scene.qpos_adr, compiled.scene.dof_adr
-        data.qpos[adr] = compiled.scene.home
-        jac = np.zeros((3, model.nv))
-        for _ in range(ROUNDS):
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            tool = tool_position(compiled, data)
-            mujoco.mj_jac(model, data, jac, None, tool, compiled.tools[0][1])
-            part = jac[:, dofs]
-            weight = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
-            data.qpos[adr] += np.clip(part.T @ weight, -0.2, 0.2)
-        return np.array(data.qpos[adr])
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """The reward's terms; ``memory`` is the last distance [m]."""

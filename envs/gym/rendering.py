@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.second_arm import APART
-from tauguard.models.picture import FLOOR_HEIGHT, mark, opengl, staged
+from tauguard.models.obstacles import FLOOR_HEIGHT
+from tauguard.models.picture import mark, opengl, staged
 
 #: Size of a picture [px].
 HEIGHT, WIDTH = 480, 640

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -152,10 +152,13 @@ class AlarmListener:
         self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
         self._last = np.zeros(arm.robot.joints)
         self.fault = ""
+        #: The samples so far: a snapshot that was stored on disk is restored from them.
+        self._samples: list[tuple[Array, Array, Array]] = []
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """See :class:`Listener`; if a sample is not finite, the residual keeps its last value."""
         residuals, alarms = np.empty(q.shape), np.zeros(len(q), dtype=np.bool_)
+        self._samples.append((q.copy(), qd.copy(), current.copy()))
         if self._monitor is not None:
             t = self._dt * np.arange(self._count, self._count + len(q), dtype=np.float64)
             self._count += len(q)
@@ -173,19 +176,42 @@ class AlarmListener:
         return residuals, alarms
 
     def get_state(self) -> Any:
-        """See :class:`Listener`.
-
-        Raises:
-            ArgumentError: always; a trained detector's stream cannot be stored.
-        """
-        raise ArgumentError(
-            f"detector {self.name}: a trained detector cannot go into a snapshot; expected "
-            f"{', '.join(DETECTORS)} or None"
-        )
+        """See :class:`Listener`."""
+        return Remembered(tuple(self._samples), self._copies(), self._last.copy(), self.fault)
 
     def set_state(self, state: Any) -> None:
-        """See :meth:`get_state`."""
-        self.get_state()
+        """See :class:`Listener`; a state from a file takes the time of its samples."""
+        if state.native is None:
+            for sample in state.samples:
+                self.steps(*sample)
+            return
+        stream, self._observer.native = (part.copy() for part in state.native)
+        if self._monitor is not None:
+            self._monitor.native = stream
+        else:
+            assert self._alarm is not None
+            self._alarm.native = stream
+        self._samples, self._last, self.fault = list(state.samples), state.last.copy(), state.fault
+        self._count = sum(len(sample[0]) for sample in self._samples)
+
+    def _copies(self) -> tuple[Any, Any]:
+        stream = self._alarm if self._monitor is None else self._monitor
+        assert stream is not None
+        return stream.native.copy(), self._observer.native.copy()
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """The state of a trained detector. A pickle has the samples only, which lead to this state."""
+
+    samples: tuple[tuple[Array, Array, Array], ...]
+    native: tuple[Any, Any] | None
+    last: Array
+    fault: str
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without native objects."""
+        return vars(self) | {"native": None}
 
 
 class PerArm:
@@ -257,7 +283,7 @@ def listener_factory(compiled: CompiledScene, wanted: object) -> Callable[[], Li
 
 
 def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
-    """Check that the alarm has the scene's number of joints and sample rate; returns it."""
+    """Check that the alarm is of the scene's arm and sample rate; returns it."""
     joints, own = alarm.detector.arm.robot.joints, len(compiled.scene.joint_names)
     if joints != own:
         raise ArgumentError(
@@ -303,7 +329,7 @@ class Sensing:
         self._player: Player | None = None
         self._make = make
         self.detector = make() if make else None
-        table = observation_table(compiled)
+        table = observation_table(compiled)[: 3 * len(compiled.scene.joint_names)]
         self._low = np.array([entry.low for entry in table])
         self._high = np.array([entry.high for entry in table])
         self._none = np.zeros(len(compiled.scene.joint_names))
@@ -349,5 +375,5 @@ class Sensing:
         n = q.shape[1]
         observation[:n], observation[n : 2 * n] = q[-1], qd[-1]
         observation[2 * n : 3 * n] = self._gain * current[-1]
-        np.maximum(observation, self._low, out=observation)
-        np.minimum(observation, self._high, out=observation)
+        measured = observation[: 3 * n]
+        np.clip(measured, self._low, self._high, out=measured)

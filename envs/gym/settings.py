@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.envs.episodes.motions import check_load
 from tauguard.envs.gym.randomization import distributions
 from tauguard.findings import ArgumentError, cause
@@ -32,6 +33,7 @@ CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian"
 #: Types of the keywords that are not strings, and the text of their errors.
 _SEVERAL = "one, or a tuple of them"
 _KINDS: dict[str, tuple[Any, str]] = {
+    "floor": (bool | Real, "True, False or a height [m]"),
     **dict.fromkeys(("timestep", "control_rate", "payload_g"), (Real, "a number")),
     **dict.fromkeys(("max_speed", "contact_area"), (Real | None, "a number or None")),
     "robot": (str | os.PathLike | Robot, "a name, a file or a Robot, also for two arms"),
@@ -43,6 +45,8 @@ _KINDS: dict[str, tuple[Any, str]] = {
 }
 #: Detectors that need no file.
 DETECTORS = ("observer",)
+#: Objects that leave the workspace go on, end the episode, or begin again where they started.
+LEAVING = (None, "end", "reset")
 #: Name of the obstacle that is a whole person.
 PERSON = "person"
 
@@ -71,6 +75,11 @@ class Settings:
         max_speed: largest speed of every joint [rad/s]; default: the arm's own, else 2.
         randomize: quantities drawn in each episode, see :mod:`tauguard.envs.gym.randomization`.
         contact_area: area of the robot's contact surface [cm^2], if known.
+        floor: whether free objects fall onto a floor, or its height [m]. True: people's floor;
+            without people the base's height, or :attr:`Person.floor` if an object is below that.
+        leaving: what an object does that leaves the workspace: one of :data:`LEAVING`.
+        workspace: its corners ((x, y, z), (x, y, z)) [m]; default: 1.5 times the arm's reach about
+            the base, and down to 0.3 m below it.
     """
 
     control: str = "joint_velocity"
@@ -92,6 +101,9 @@ class Settings:
     max_speed: float | None = None
     randomize: Mapping[str, Any] | None = None
     contact_area: float | None = None
+    floor: bool | float = True
+    leaving: str | None = None
+    workspace: Any = None
 
     def __post_init__(self) -> None:
         """Check the values; an ``ArgumentError`` names the wrong one and what would work."""
@@ -122,6 +134,9 @@ class Settings:
             object.__setattr__(self, name, (value,) if one else tuple(value))
         _check_obstacles(self.obstacles)
         object.__setattr__(self, "objects", _objects(self.objects))
+        one_of("leaving", self.leaving, LEAVING)
+        if self.workspace is not None:
+            object.__setattr__(self, "workspace", _corners(self.workspace))
         object.__setattr__(self, "randomize", distributions(self.randomize or {}))
         if isinstance(self.detector, os.PathLike):
             object.__setattr__(self, "detector", os.fspath(self.detector))
@@ -138,13 +153,15 @@ class Settings:
         return round(1 / (self.control_rate * self.timestep))
 
     @classmethod
-    def from_keywords(cls, defaults: Mapping[str, Any], given: Mapping[str, Any]) -> Settings:
+    def from_keywords(
+        cls, defaults: Mapping[str, Any], given: Mapping[str, Any], others: Iterable[str] = ()
+    ) -> Settings:
         """The settings of an environment: its defaults, replaced by the user's keywords.
 
         Raises:
-            ArgumentError: an unknown keyword; the message lists the known ones.
+            ArgumentError: an unknown keyword; the message lists the known ones and ``others``.
         """
-        known = [field.name for field in fields(cls)]
+        known = [*(field.name for field in fields(cls)), *others]
         for name in given:
             if name not in known:
                 near = difflib.get_close_matches(name, known, n=1)
@@ -176,10 +193,21 @@ def _objects(value: Any) -> tuple[SceneObject, ...]:
     return found
 
 
-def one_of(name: str, value: object, known: tuple[str, ...]) -> None:
+def _corners(value: Any) -> Array:
+    """The lower and the upper corner of a box [m], shape (2, 3)."""
+    try:
+        corners = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        corners = np.zeros(0)
+    if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
+        raise ArgumentError(f"workspace {value!r}: expected a lower and an upper corner [m]")
+    return corners
+
+
+def one_of(name: str, value: object, known: tuple[str | None, ...]) -> None:
     """Raise an ``ArgumentError`` that lists ``known`` if ``value`` is not among them."""
     if value not in known:
-        raise ArgumentError(f"{name} {value!r}: expected one of {', '.join(known)}")
+        raise ArgumentError(f"{name} {value!r}: expected one of {', '.join(map(str, known))}")
 
 
 def positive(name: str, value: float) -> None:

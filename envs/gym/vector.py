@@ -20,16 +20,18 @@ from tauguard.envs.gym.base import (
     frame_rate,
     make_spaces,
     shown_arrays,
+    targets,
 )
-from tauguard.envs.gym.batch import StepMetrics
+from tauguard.envs.gym.goals import Goals, goal_reward
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import open_view
 from tauguard.envs.gym.settings import one_of
-from tauguard.envs.gym.task import Task, build
+from tauguard.envs.gym.task import Task, build, task_of
+from tauguard.envs.gym.vectorised import check_vectorised
 from tauguard.findings import ArgumentError
 
 
-class VectorArmEnv(VectorEnv[Array, Array, Array]):
+class VectorArmEnv(VectorEnv[Any, Array, Array]):
     """``num_envs`` copies of an :class:`tauguard.envs.gym.base.ArmEnv`, stepped on a thread pool.
 
     Results equal those of single environments bit for bit, for any number of threads. The scene is
@@ -47,6 +49,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         threads: int = 0,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        task: type[Task] | str | None = None,
+        goal: bool = False,
         **keywords: Any,
     ) -> None:
         """Compile the scene once.
@@ -57,7 +61,11 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             threads: number of threads; 0 means all processors.
             autoreset_mode: "NextStep", "SameStep" or "Disabled".
             render_mode: as for the single environment; the first copy is shown.
+            task, goal: as for the single environment.
             **keywords: as for the single environment.
+
+        Raises:
+            ArgumentError: a keyword out of range, or a task that cannot score arrays.
         """
         if num_envs < 1:
             raise ArgumentError(f"num_envs {num_envs}: expected 1 or more")
@@ -67,9 +75,15 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             one_of("render_mode", render_mode, RENDER_MODES)
         self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.compiled, self.batch, self.task = build(self.task_type, keywords, num_envs)
+        chosen = task_of(task, self.task_type)
+        self.compiled, self.batch, self.task = build(chosen, keywords, num_envs)
+        check_vectorised(self.task, num_envs)
         self.metadata = frame_rate(self.compiled) | {"autoreset_mode": self.autoreset_mode}
-        self.single_action_space, self.single_observation_space = make_spaces(self.batch)
+        self.goals = Goals(self.batch, self.task) if goal else None
+        self._terms = ("goal",) if goal else self.task.terms
+        self._looks = bool(self.task.measures or self.batch.own_entries)
+        spaces = make_spaces(self.batch, self.goals)
+        self.single_action_space, self.single_observation_space = spaces
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._limit, self._arrays = max_episode_steps, shown_arrays(self.batch)
@@ -81,19 +95,19 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode of every copy, or of the copies in ``options["reset_mask"]``.
 
         Args:
             seed: copy i gets ``seed + i``, or entry i of a list.
             options: ``reset_mask``, a bool array of shape (num_envs,), and values by name that
-                replace the draws of ``randomize`` in these episodes.
+                replace the draws of these episodes, as for the single environment; ``target`` can
+                have one row per copy.
         """
         stated = {key: value for key, value in (options or {}).items() if key != "reset_mask"}
-        try:
-            check_options(stated, self.compiled.settings.randomize or {})
-        except ValueError as error:
-            raise ArgumentError(f"{error}, or reset_mask") from None
+        places = targets(stated.pop("target", None), self.num_envs, self.compiled.arms)
+        known = self.compiled.settings.randomize or {}
+        check_options(stated, known, ("target", "reset_mask"))
         if isinstance(seed, list):
             seeds = seed
         else:
@@ -106,10 +120,17 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         self._seeded = True
         mask = self._chosen((options or {}).get("reset_mask"))
         for k in np.flatnonzero(mask):
-            self._begin(int(k), stated)
+            self._begin(int(k), stated, places[k])
         none = np.zeros_like(mask)
         infos = self._infos(self._no_reward(), none, mask, self._metrics())
-        return self.batch.observation.copy(), infos
+        return self._observed(), infos
+
+    def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any) -> Any:
+        """Reward of reached and desired goals, shapes (g,) or (N, g); :meth:`Task.goal_reward`."""
+        return goal_reward(self.task, achieved_goal, desired_goal, info)
+
+    def _observed(self) -> Any:
+        return self.batch.observation.copy() if self.goals is None else self.goals.all()
 
     def _chosen(self, mask: Any) -> Bools:
         if mask is None:
@@ -118,14 +139,16 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             raise ArgumentError(f"reset_mask: expected a bool array of shape ({self.num_envs},)")
         return mask.astype(np.bool_)
 
-    def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
+    def _begin(
+        self, i: int, stated: Mapping[str, Any] = MappingProxyType({}), target: Array | None = None
+    ) -> None:
         self.batch.draw(i, self._rngs[i], stated)
-        self.task.begin(i, self._rngs[i])
+        self.task.begin(i, self._rngs[i], target)
         self._elapsed[i], self._over[i] = 0, False
 
     def step(  # type: ignore[override]
         self, actions: ArrayLike
-    ) -> tuple[Array, Array, Bools, Bools, dict[str, Any]]:
+    ) -> tuple[Any, Array, Bools, Bools, dict[str, Any]]:
         """Apply one action to every copy.
 
         Raises:
@@ -146,9 +169,19 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
                 f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
             )
         batch.step_all(values, going, self._rngs, self._threads)
-        task, step = self.task, self._metrics()
+        task, diverged = self.task, batch.metrics["diverged"] != 0
+        if self._looks:
+            for i in (going & ~diverged).nonzero()[0]:
+                task.look(int(i))
+        step = self._metrics()
         terms, successes, task.memory[:], overs = task.score(step, task.memory.copy())
-        diverged = step.diverged != 0
+        left = {} if not batch.objects.leaving else self._left(going & ~diverged & ~overs)
+        if left:
+            overs = np.isin(np.arange(self.num_envs), list(left)) | overs
+        if self.goals is not None:
+            seen = self.goals.all()
+            reached, wanted = seen["achieved_goal"], seen["desired_goal"]
+            terms = {"goal": task.goal_reward(reached, wanted, {})}
         self._elapsed += going
         late = self._elapsed >= self._limit if self._limit else np.zeros_like(diverged)
         terminated = overs & ~diverged & going
@@ -163,21 +196,31 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         infos = self._infos(terms, successes & going, np.ones_like(going), step)
         infos["reason"][terminated & successes] = task.ended
         infos["reason"][terminated & ~successes] = task.failed
-        for i in (successes & going & ~diverged).nonzero()[0]:
+        for i, why in left.items():
+            infos["reason"][i] = why
+        for i in (successes & going & ~diverged).nonzero()[0] if self.goals is None else ():
             task.after(int(i), self._rngs[i])
+            if self._looks:
+                task.look(int(i))
         self._over = terminated | truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             infos = self._restart(infos)
         if self.render_mode == "human":
             self.render()
-        return batch.observation.copy(), rewards, terminated, truncated, infos
+        return self._observed(), rewards, terminated, truncated, infos
+
+    def _left(self, going: Bools) -> dict[int, str]:
+        """The copies that end because an object left the workspace, and why."""
+        reasons = {int(i): self.batch.objects.reason(int(i)) for i in going.nonzero()[0]}
+        return {i: why for i, why in reasons.items() if why}
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
         """Restart finished copies (SAME_STEP); keys ``final_...`` keep their last values."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
-            observations[i] = self.batch.observation[i].copy()
+            one = self.batch.observation[i].copy() if self.goals is None else self.goals.one(int(i))
+            observations[i] = one
         final = {key: value.copy() for key, value in infos.items()}
         for key in [k for k in final if not k.startswith("_")]:
             final[key][~done] = np.zeros_like(final[key][~done])
@@ -194,15 +237,15 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "_final_info": done.copy(),
         } | infos
 
-    def _metrics(self) -> StepMetrics:
+    def _metrics(self) -> Any:
         """The results of the last action, as copies that the next action does not overwrite."""
-        return StepMetrics(*self.batch.numbers.T.copy())
+        return self.task.step_type._make(self.batch.numbers.T.copy())
 
     def _no_reward(self) -> dict[str, Array]:
-        return {name: np.zeros(self.num_envs) for name in self.task.terms}
+        return {name: np.zeros(self.num_envs) for name in self._terms}
 
     def _infos(
-        self, terms: dict[str, Array], success: Bools, mask: Bools, step: StepMetrics
+        self, terms: dict[str, Array], success: Bools, mask: Bools, step: Any
     ) -> dict[str, Any]:
         batch, area = self.batch, self.compiled.settings.contact_area
         reason = np.full(self.num_envs, "", dtype=object)
@@ -215,6 +258,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "force": step.force,
             "cost": step.cost,
             "cost_sum": step.cost_sum,
+            "excess": step.excess,
+            "excess_cause": causes(step),
             "pressure": step.region_force / area if area else np.zeros(self.num_envs),
             "limit_ratio": step.limit_ratio,
             "region": step.region.astype(np.int64),
@@ -227,6 +272,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "reason": reason,
         } | {name: rows.copy() for name, rows in self._arrays.items()}
         infos |= {f"reward_{name}": term for name, term in terms.items()}
+        infos |= {name: getattr(step, name) for name in self.task.measures}
+        if self.goals is not None:
+            infos["is_success"] = infos["success"]
         shown = mask.copy()
         return infos | {f"_{key}": shown for key in infos}
 
@@ -244,3 +292,10 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         if self._picture is not None:
             self._picture.close()
             self._picture = None
+
+
+def causes(step: Any) -> Any:
+    """``info["excess_cause"]`` of every copy."""
+    cause = np.full(len(step.cost), "", dtype=object)
+    cause[step.excess > 0], cause[step.cost > 0] = "region", "arm"
+    return cause

@@ -192,8 +192,8 @@ class Plant {
     for (Vec3& v : speeds_) each(v.x), each(v.y), each(v.z);
     for (Person& person : around_.people) person.visit(each);
     Contact& c = contact_;
-    each(c.force), each(c.cost), each(c.ratio), each(c.region_force), each(c.link), each(c.region);
-    each(c.onset), each(c.onset_time), each(c.last);
+    each(c.force), each(c.cost), each(c.excess), each(c.ratio), each(c.region_force);
+    each(c.link), each(c.region), each(c.onset), each(c.onset_time), each(c.last);
     each(count_), each(sound_), each(impossible_), each(fastest_), each(controls.override);
     Command& command = controls.command;
     each(command.servo), each(command.powered), each(command.brake);
@@ -377,6 +377,7 @@ class Plant {
     m.time = static_cast<double>(count_) * drives_.dt;
     m.force = contact_.force;
     m.cost = contact_.cost;
+    m.excess = contact_.excess;
     m.limit_ratio = contact_.ratio;
     m.region_force = contact_.region_force;
     m.onset = contact_.onset ? 1.0 : 0.0;

@@ -54,7 +54,8 @@ struct Touched {
 // The largest values over one control step, and the state of the collision.
 struct Contact {
   double force = 0;         // peak net force on a link [N]
-  double cost = 0;          // impulse beyond the regions' limits [N s]
+  double cost = 0;          // impulse beyond the regions' limits that the arm causes [N s]
+  double excess = 0;        // impulse beyond the regions' limits, whoever causes it [N s]
   double ratio = 0;         // peak ratio of a region's force to its limit
   double region_force = 0;  // peak force on a region [N]
   int link = 0;             // 1-based, of the peak force; 0: none
@@ -62,7 +63,7 @@ struct Contact {
   bool onset = false;
   double onset_time = -1, last = -1e9;  // [s]
   void begin_step() {
-    force = cost = ratio = region_force = 0;
+    force = cost = excess = ratio = region_force = 0;
     link = region = 0;
     onset = false;
   }
@@ -135,12 +136,13 @@ struct Sensed {
 // Reads the regions' contact sensors. The limit of an impact is the transient limit. The limit of
 // contact that lasts longer than `transient_time`, or on a region that cannot move away, is the
 // quasi-static one. (With a transient limit of 0, `ratio` is relative to the quasi-static limit.)
-// The cost is the impulse beyond the limit. It counts only force that the arm causes: at most the
-// stiffness times the arm's advance during the contact, so it is 0 if somebody runs into an arm at
-// rest. `between` is the force between two arms, which must not touch; all of it is cost.
+// The excess is the impulse beyond the limit. The cost is the part that the arm causes: a force
+// counts at most as the stiffness times the arm's advance during the contact, so the cost is 0 if
+// somebody runs into an arm at rest. `between` is the force between two arms, which must not touch;
+// all of it is excess and cost.
 inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, const Sensed& step,
                          Contact& c, const Touched& peak, double between) {
-  double excess = between;
+  double caused = between, whole = between;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Region& r = regions[i];
     const double* s = step.all + r.sensor;
@@ -156,7 +158,8 @@ inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, c
     const bool impact = !r.held && r.touching <= transient_time;
     const double limit = impact ? r.transient : r.quasi_static;
     const double ratio = force / (limit > 0 ? limit : r.quasi_static);
-    excess += std::max(0.0, std::min(force, r.stiffness * r.advance) - limit);
+    caused += std::max(0.0, std::min(force, r.stiffness * r.advance) - limit);
+    whole += std::max(0.0, force - limit);
     c.region_force = std::max(c.region_force, force);
     if (force > peak.force.data()[i]) {
       double* d = peak.direction.data() + 3 * i;
@@ -170,7 +173,8 @@ inline void read_regions(std::vector<Region>& regions, const Kinematics& arms, c
       c.region = static_cast<int>(i) + 1;
     }
   }
-  c.cost += step.dt * excess;
+  c.cost += step.dt * caused;
+  c.excess += step.dt * whole;
 }
 
 }  // namespace tauguard::envs

@@ -14,7 +14,7 @@ namespace tauguard::envs {
 // Metrics of one action; Python's StepMetrics has the same fields in this order.
 struct Metrics {
   double time, distance, force, cost, limit_ratio, region_force;
-  double onset, onset_time, link, region, diverged, speed_ratio, cost_sum;
+  double onset, onset_time, link, region, diverged, speed_ratio, cost_sum, excess;
 };
 constexpr std::size_t metrics_width = sizeof(Metrics) / sizeof(double);
 

@@ -37,19 +37,21 @@ def press(rate, seconds=1.4):
     """The shoulder turns down onto the block; cost of each action, and MuJoCo's forces."""
     env = sinking(rate)
     action = np.array([0, 0.4, 0, 0, 0, 0])
-    costs, forces = [], []
+    costs, forces, whole = [], [], []
     for _ in range(round(seconds * rate)):
         info = env.step(action)[4]
         costs.append(info["cost"])
+        whole.append(info["excess"])
         forces.append(force_on_block(env))
     assert info["cost_sum"] == pytest.approx(sum(costs))
-    return info["cost_sum"], np.array(costs), np.array(forces)
+    return info["cost_sum"], np.array(costs), np.array(forces), np.array(whole)
 
 
 def test_the_cost_is_the_impulse_beyond_the_limit_at_any_control_rate():
-    cost, costs, forces = press(1000)
+    cost, costs, forces, whole = press(1000)
     assert forces.max() > 5 * LIMIT
     truth = 1e-3 * np.maximum(forces - LIMIT, 0)
+    np.testing.assert_allclose(whole, truth, rtol=1e-9, atol=1e-12)
     # At the beginning of a touch the arm's advance lags the depth by a part of a step.
     assert (costs <= truth + 1e-9).all()
     assert np.isclose(costs, truth)[truth > 0].mean() > 0.9
@@ -58,30 +60,35 @@ def test_the_cost_is_the_impulse_beyond_the_limit_at_any_control_rate():
         assert press(rate)[0] == pytest.approx(cost, rel=0.01)
 
 
-def meet(arm, hand, cost=0.0, force=0.0):
-    """Cost [N s] and largest force [N] of the first joint's turn against a hand's flight [m/s]."""
+def meet(arm, hand, force=0.0):
+    """The first joint turns against a hand's flight [m/s]: cost, peak force, excess, its causes."""
     proxy = BodyProxy("hand", position=(0.0, 0.6, 0.45), direction=(0.0, -1.0, 0.0))
     env = gym.make(REACH, obstacles=(proxy,), control_rate=500).unwrapped
     env.reset(seed=0)
     joint = env.model.joint("hand")
-    turn = np.zeros(6)
+    turn, excess, causes = np.zeros(6), 0.0, set()
     env.data.qpos[joint.qposadr[0]], env.data.qvel[joint.dofadr[0]] = 0.0, hand
     for _ in range(500):
         turn[0] = arm
         info = env.step(turn)[4]
-        force, cost = max(force, info["region_force"][0]), info["cost_sum"]
+        force, excess = max(force, info["region_force"][0]), excess + info["excess"]
+        assert (info["limit_ratio"] > 1) == bool(info["excess_cause"])
+        causes |= {info["excess_cause"]} - {""}
         if force and not info["region_force"][0]:
             break
-    return cost, force
+    return info["cost_sum"], force, excess, causes
 
 
 def test_who_runs_into_an_arm_that_stands_is_not_billed_to_it():
-    cost, force = meet(0.0, 4.0)
+    cost, force, excess, causes = meet(0.0, 4.0)
     assert force > 280
     assert cost == 0
+    assert excess > 0.05
+    assert causes == {"region"}
 
 
 def test_an_arm_that_runs_into_somebody_is_billed():
-    cost, force = meet(-1.0, 4.0)
+    cost, force, excess, causes = meet(-1.0, 4.0)
     assert force > 280
-    assert cost > 0.1
+    assert excess >= cost > 0.1
+    assert "arm" in causes

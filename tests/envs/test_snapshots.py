@@ -2,12 +2,16 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-import tauguard  # noqa: F401
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, SrqSvr, train
+from tauguard.envs import simulate
+from tauguard.models import cura6, cura6_drive, pin_model
 
 CASES = {
     "Reach-v0": {"detector": "observer", "control": "cartesian", "noise": True},
@@ -40,6 +44,60 @@ def test_a_snapshot_goes_on_with_the_same_bits(name):
     np.testing.assert_array_equal(played(env, actions[12:]), expected)
     for other in (twin, stored):
         np.testing.assert_array_equal(played(other, actions[12:]), expected)
+
+
+class Sums:
+    """A method of another's whose score depends on all samples."""
+
+    name, dt, settle = "sums", 1e-3, 0.0
+
+    def __init__(self):
+        numbers = RobotNumbers.from_pin(pin_model(cura6.arm_xml()))
+        self.arm = ArmModel(numbers, cura6_drive().gain, noise=np.ones(6))
+
+    def scores(self, trace):
+        return np.cumsum(np.abs(trace.qd).sum(axis=1))
+
+    def stream(self):
+        return Sum()
+
+
+class Sum:
+    def __init__(self):
+        self.total = 0.0
+
+    def step(self, q, qd, current, dt=None):
+        self.total += float(np.abs(qd).sum())
+        return self.total
+
+
+@pytest.fixture(scope="module")
+def detectors():
+    episodes = free_episodes(5, 3, 10.0, (30.0, 60.0), (0.0,), None)
+    episodes += struck_episodes(6, 2, 3, (30.0, 60.0), (0.0,), None)
+    traces = [simulate(episode) for episode in episodes]
+    arm = ArmModel(Sums().arm.robot, cura6_drive().gain)
+    checked = train(SrqSvr(windows=200, mined=50), traces, arm, 60.0, folds=1)
+    unchecked = replace(checked, inputs=None)
+    return {"own": CollisionAlarm(Sums(), 1700.0), "kernel": unchecked, "checked": checked}
+
+
+@pytest.mark.parametrize("kind", ["own", "kernel", "checked"])
+def test_a_snapshot_with_a_trained_detector_goes_on_with_the_same_bits(kind, detectors):
+    env = gym.make("tauguard/Reach-v0", detector=detectors[kind], noise=True).unwrapped
+    actions = np.random.default_rng(0).uniform(-1, 1, (60, *env.action_space.shape))
+    env.reset(seed=1)
+    played(env, actions[:30])
+    state = env.get_state()
+    twin, stored = copy.deepcopy(env), pickle.loads(pickle.dumps(state))
+    expected = played(env, actions[30:])
+    for restored in (state, state, stored):  # a state can be restored more than once
+        env.set_state(restored)
+        np.testing.assert_array_equal(played(env, actions[30:]), expected)
+    np.testing.assert_array_equal(played(twin, actions[30:]), expected)
+    if kind == "own":
+        alarms = expected[:, env.observation_space.shape[0] + 2]
+        assert 0 < alarms.sum() < len(alarms)
 
 
 def test_a_person_goes_on_in_another_environment_from_any_moment():
