@@ -31,18 +31,14 @@ from tauguard.findings import (
     note,
     raise_errors,
 )
-from tauguard.traces.logs import Load, Log, Logs, log_named
+from tauguard.traces.loads import LoadLike, load_of, loads_of
+from tauguard.traces.logs import Log, Logs
 from tauguard.traces.resample import averaged
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import check_no_device
 
-#: A load: kg, or kg and its centre [m]; None: unknown.
-LoadLike = Load | float | tuple[float, Sequence[float]] | None
 #: A column map, the name of a preset, "auto", or the path of a map's JSON file.
 Columns = ColumnMap | str | Path | None
-
-#: Heaviest load that is accepted [kg]; a larger number probably means grams.
-HEAVIEST = 100.0
 
 #: Positions that are outside of a range by more than this are far from it [rad].
 NEARBY = 0.5
@@ -413,47 +409,3 @@ def _saturated(log: str, trace: Trace) -> list[Finding]:
         )
         for joint, row, count, peak in saturated(trace)
     ]
-
-
-# -- loads -----------------------------------------------------------------------------------------
-
-
-def load_of(value: LoadLike, log: str = "") -> Load | None:
-    """The load that a value stands for; ``log`` names the log in an error.
-
-    Raises:
-        ArgumentError: neither kg nor (kg, (x, y, z)), a negative mass, or above ``HEAVIEST``.
-    """
-    if value is None or isinstance(value, Load):
-        return value
-    said = f'`payload={{"{log}": {_python(value)}}}`' if log else f"`payload={_python(value)}`"
-    try:
-        pair: Any = value if isinstance(value, tuple | list) else (value, None)
-        mass, centre = float(pair[0]), None if pair[1] is None else tuple(map(float, pair[1]))
-    except (TypeError, ValueError, IndexError):
-        text = f"{said}: expected kg, or (kg, (x, y, z)), or None for an unknown load"
-        raise ArgumentError(cause("payload", text)) from None
-    if mass > HEAVIEST:
-        text = f"{said}: {mass:g} kg, expected at most {HEAVIEST:g}; loads are given in kg"
-        raise ArgumentError(cause("payload", text))
-    return Load(mass, centre)  # type: ignore[arg-type]
-
-
-def loads_of(payload: Mapping[str, LoadLike], logs: Sequence[str]) -> dict[str, Load | None]:
-    """The load of each log; logs that ``payload`` does not name have none.
-
-    Raises:
-        ArgumentError: a name of no log, or as for :func:`load_of`.
-    """
-    loads: dict[str, Load | None] = dict.fromkeys(logs, Load())
-    for name, value in payload.items():
-        log = log_named(name, f'`payload={{"{name}": {_python(value)}}}`', logs)
-        loads[log] = load_of(value, name)
-    return loads
-
-
-def _python(value: Any) -> str:
-    """A load as Python, with short numbers."""
-    if isinstance(value, tuple | list):
-        return f"({', '.join(map(_python, value))})"
-    return f"{value:g}" if isinstance(value, int | float) else repr(value)

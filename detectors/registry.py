@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
-    from tauguard.detectors.scores.detector import Detector
+    from tauguard.detectors.scores.method import Method
 
 
 def _score(module: str, maker: str) -> Any:
@@ -24,7 +24,7 @@ def _score(module: str, maker: str) -> Any:
 
 
 #: Functions that make the default settings of each method, in the order of reports.
-DETECTORS: dict[str, Callable[[], Detector]] = {
+DETECTORS: dict[str, Callable[[], Method]] = {
     "srq-svr": partial(_score, "windowed", "SrqSvr"),
     "srq-svr-plain": partial(_score, "windowed", "PlainSrqSvr"),
     "current-network": partial(_score, "currents", "CurrentNetwork"),
@@ -68,7 +68,7 @@ _NAMED: set[str] = set()
 MODULES = "TAUGUARD_DETECTORS"
 
 
-def make_detector(name: str) -> Detector:
+def make_detector(name: str) -> Method:
     """The settings of a method by its name, or of a user's class as ``module:Class``.
 
     Classes of a module that is named here, or in the environment variable ``TAUGUARD_DETECTORS``,
@@ -88,7 +88,7 @@ def make_detector(name: str) -> Detector:
     return DETECTORS[name]()
 
 
-def _of_another(name: str) -> Detector:
+def _of_another(name: str) -> Method:
     module, _, attribute = name.partition(":")
     admit(module)
     try:
@@ -103,7 +103,7 @@ def _of_another(name: str) -> Detector:
         raise ArgumentError(
             f"detector {name!r}: expected a class with `name` and `fit(traces, arm)`"
         )
-    found: Detector = made
+    found: Method = made
     return found
 
 

@@ -13,8 +13,6 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 
 import tauguard
 from tauguard.datasets import free_episodes, struck_episodes
-from tauguard.detectors import make_detector, train
-from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.replay.video import frames
 
@@ -26,13 +24,12 @@ VIEW = (215.0, -12.0, 1.8)
 
 def main(target="struck.gif"):
     speeds = (30.0,)
-    motion = [
-        simulate(e) for e in struck_episodes(1, 1, 8, speeds) + free_episodes(1, 6, 20.0, speeds)
-    ]
-    alarm = train(make_detector("srq-svr"), motion, nominal_arm(motion), per_hour=1)
+    episodes = struck_episodes(1, 1, 8, speeds) + free_episodes(1, 6, 20.0, speeds)
+    motion = tauguard.simulated(simulate(episode) for episode in episodes)
+    detector = tauguard.train(motion, method="srq-svr", false_alarms_per_hour=1)
     strike = CollisionPlan("strike", time=3.0, link=4)
     trace = simulate(Episode(seed=1, seconds=6, collisions=(strike,)))
-    found = alarm.detect(trace)
+    found = detector.detect(trace)
     onset, start = trace.truth.collisions[0].onset, found.alarms[0].start
     print(f"alarm {1e3 * (start - onset):.0f} ms after the contact")
     residual = tauguard.residual(trace)

@@ -12,7 +12,8 @@ import pytest
 
 import tauguard
 from tauguard import cloth, contacts, rigid
-from tauguard.detectors import make_detector, train
+from tauguard.detectors import make_detector
+from tauguard.detectors.alarms.training import train
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import (
     SceneObject,

@@ -40,7 +40,7 @@ ALLOWED = {
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models", "detectors", "report"},
     "live": {"detectors", "traces"},
-    "twin": {"detectors", "models", "traces"},
+    "twin": {"detectors", "models", "traces", "report"},
     "benchmark": {"datasets", "detectors", "models", "traces", "report"},
     "speed": {"envs", "detectors", "models", "traces"},
     "report": set(),
@@ -139,9 +139,14 @@ BELOW, ABOVE = (
     {"codec", "events", "frozen", "model_archive", "samples"},
     {
         "__init__",
+        "arm_calibration",
+        "detection",
+        "detector",
+        "evaluating",
         "model_file",
         "registry",
         "self_check",
+        "training",
     },
 )
 NATIVE = {"_kernel", "_observer", "_network"}

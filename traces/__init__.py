@@ -6,7 +6,8 @@ from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
     from tauguard.traces.contacts import CheckedContacts
-    from tauguard.traces.logs import Load, Log, Logs, Recording
+    from tauguard.traces.loads import Load
+    from tauguard.traces.logs import Log, Logs, Recording
     from tauguard.traces.mcap import read_mcap, write_mcap
     from tauguard.traces.resample import resampled
     from tauguard.traces.trace import (

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tauguard.findings import ArgumentError, Findings, cause
+from tauguard.findings import ArgumentError, Findings
 from tauguard.results import Result, Row, finding_rows
+from tauguard.traces.loads import Load as Load
 from tauguard.traces.motion import motion_length
 from tauguard.traces.trace import Trace
 
@@ -18,30 +19,12 @@ if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(frozen=True)
-class Load:
-    """Mass and centre of mass of the load that the arm carried; the centre may be unknown."""
-
-    mass: float = 0.0  #: [kg]
-    centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]. None: unknown; it is identified with the arm's parameters."""
-
-    def __post_init__(self) -> None:
-        """``ArgumentError`` for a mass below 0 or numbers that are not finite."""
-        if not (np.isfinite(self.mass) and self.mass >= 0):
-            raise ArgumentError(f"load: {self.mass} kg, expected 0 or more")
-        if self.centre is not None and not (
-            len(self.centre) == 3 and np.isfinite(self.centre).all()
-        ):
-            raise ArgumentError(f"load: centre {self.centre}, expected three finite numbers [m]")
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A trace and the load that the arm carried."""
 
     trace: Trace
-    load: Load | None = Load()  #: None: an unknown load
+    load: Load | None = field(default_factory=Load)  #: None: an unknown load
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,19 +170,3 @@ def cut(trace: Trace, rows: slice) -> Trace:
     """The given rows of a log, without its truth."""
     q, qd, current = trace.q[rows], trace.qd[rows], trace.current[rows]
     return Trace(trace.joint_names, trace.t[rows], q, qd, current, meta=trace.meta)
-
-
-def log_named(name: str, argument: str, logs: Sequence[str]) -> str:
-    """The log whose file name, with or without extension, is ``name``; errors name ``argument``.
-
-    Raises:
-        ArgumentError: no log or several logs have this name.
-    """
-    fitting = [log for log in logs if name == log] or [
-        log for log in logs if name == Path(log).stem
-    ]
-    if len(fitting) != 1:
-        there = f"two are called {name!r}" if fitting else f"no log {name!r}"
-        text = f"{argument}: {there}; expected one of {', '.join(logs)}"
-        raise ArgumentError(cause("log-name", text, name))
-    return fitting[0]

@@ -53,7 +53,7 @@ class Twin:
         return value
 
 
-def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) -> Twin:
+def fit_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) -> Twin:
     """Identify the drives of a calibrated arm from collision-free logs.
 
     Args:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors import ArmModel, Estimator, Unknowns
+from tauguard.detectors import ArmModel, Estimator
+from tauguard.detectors.estimation.estimator import Unknowns
 from tauguard.models import Drive, Friction
 from tauguard.traces import Trace
 from tauguard.twin.signals import motion_of

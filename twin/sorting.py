@@ -8,10 +8,10 @@ import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import ArmModel
-from tauguard.detectors.calibration.assessment import OUTLYING, outlier, residual_rms
+from tauguard.detectors.calibration.assessment import UnexplainedCheck, outlier, residual_rms
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.recording import Load, Recording
-from tauguard.findings import ArgumentError
+from tauguard.findings import RefusedError, TauguardError, cause
 
 #: Logs are of two arms if calibrations from each of two groups of logs reduce the sum of the logs'
 #: residuals by this factor, compared with one calibration from all logs. The factor is 1.0 to 1.2
@@ -31,14 +31,14 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         recordings: with their loads, all with motion.
 
     Raises:
-        ArgumentError: the logs are of two arms or two loads; names the logs of each.
+        RefusedError: the logs are of two arms or two loads; names the logs of each.
     """
     told = [k for k, r in enumerate(recordings) if r.load == Load()]
     errors = _errors(arm, [recordings[k] for k in told])
     odd: list[int] = []
     while len(told) - len(odd) >= 3 and 3 * len(odd) < len(told):
         rest = [k for k in range(len(told)) if k not in odd]
-        found = outlier([np.array([errors(k, rest)]) for k in rest], OUTLYING)
+        found = outlier([np.array([errors(k, rest)]) for k in rest], UnexplainedCheck.outlying)
         if found is None:
             break
         odd.append(rest[found[0]])
@@ -47,10 +47,12 @@ def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording
         side = _split_in_two(errors, rest)
         if side is not None:
             one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
-            raise ArgumentError(
+            text = (
                 f"{one} and {two} do not predict each other: they are of two arms, or some carry a "
-                'load that was not given (`payload={"LOG": KG}`, or None for an unknown load)'
+                'load that was not given (`payload={"LOG": KG}` or `payload={"LOG": None}` for '
+                "each that does)"
             )
+            raise RefusedError(cause("two-arms", text))
     return [told[k] for k in odd]
 
 
@@ -65,7 +67,7 @@ def _errors(arm: ArmModel, recordings: Sequence[Recording]) -> Errors:
     def arm_of(own: tuple[int, ...]) -> ArmModel | None:
         try:
             return calibrated(own)
-        except ValueError:  # too little motion
+        except TauguardError:  # too little motion
             return None
 
     def error(k: int, group: Sequence[int]) -> float:

@@ -22,7 +22,7 @@ from tauguard.detectors.features.front_end import NativeStream, plain_residual
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import same_rate
 from tauguard.detectors.scores.baselines import FittedThresholds
-from tauguard.detectors.scores.detector import FittedDetector
+from tauguard.detectors.scores.method import FittedMethod
 from tauguard.detectors.thresholds.free_scores import (
     FreeScores,
     SpeedNormalisation,
@@ -47,7 +47,7 @@ class CollisionAlarm(Frozen):
     confirmation time. It is always off until the detector has settled.
     """
 
-    detector: FittedDetector
+    detector: FittedMethod
     threshold: float  #: of the normalised score
     confirmation: float = CONFIRMATION  #: confirmation time [s]
     normalisation: SpeedNormalisation | None = None  #: None: the score is not normalised
@@ -223,7 +223,7 @@ def _levels(speed: SpeedNormalisation | None) -> _observer.Levels:
     )
 
 
-def native_scores(detector: FittedDetector) -> _observer.Scores:
+def native_scores(detector: FittedMethod) -> _observer.Scores:
     """A native stream of the detector's scores. A stream written in Python is wrapped."""
     stream = detector.stream()
     if isinstance(stream, NativeStream):

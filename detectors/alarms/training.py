@@ -29,13 +29,13 @@ from tauguard.detectors.codec import check_storable
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
-from tauguard.detectors.scores.detector import Detector, FittedDetector
 from tauguard.detectors.scores.free_motion import CONFIRMATION as FREE_CONFIRMATION
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.method import FittedMethod, Method
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, Finding, Findings, note
 from tauguard.models.stored_robot import StoredRobot
 from tauguard.traces.trace import Trace
 
@@ -69,7 +69,7 @@ def held_out(traces: Sequence[Trace]) -> tuple[list[Trace], list[Trace]]:
 
 
 def train(
-    detector: Detector,
+    detector: Method,
     traces: Sequence[Trace],
     arm: ArmModel | None = None,
     per_hour: float = 10.0,
@@ -109,7 +109,7 @@ def free_alarm(fitted: FittedFreeMotion, traces: Sequence[Trace]) -> CollisionAl
 
 
 def train_and_score(
-    detector: Detector,
+    detector: Method,
     traces: Sequence[Trace],
     arm: ArmModel,
     per_hour: float,
@@ -135,12 +135,12 @@ def train_and_score(
 
 
 def train_beside(
-    detector: Detector,
+    detector: Method,
     struck: Sequence[Trace],
     logs: Mapping[str, Trace],
     arm: ArmModel,
     per_hour: float,
-) -> tuple[CollisionAlarm, list[FreeScores], tuple[str, ...]]:
+) -> tuple[CollisionAlarm, list[FreeScores], Findings]:
     """Train a learned alarm that runs together with a free-motion detector.
 
     The threshold comes from the logs alone, because simulated noise differs. Each log, or each half
@@ -167,16 +167,17 @@ def train_beside(
     names = [f"half {k} of {name}" for name in logs for k in (1, 2)] if halved else list(logs)
     moving = [k for k, part in enumerate(parts) if moves(part.trace)]
     calibrated = Subsets(arm, [parts[k] for k in moving])
-    found, notes = list[FreeScores](), list[str]()
+    found, notes = list[FreeScores](), list[Finding]()
     for fold in range(min(FOLDS, len(parts))):
         rest, without = [k for k in range(len(parts)) if k % FOLDS != fold], arm
         if (seconds := motion_length([parts[k] for k in rest])) >= LEAST:
             without = calibrated([place for place, k in enumerate(moving) if k in rest])
         else:
-            notes.append(
+            text = (
                 f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "
                 f"because the rest has {seconds:.1f} s of motion, expected {LEAST:g} s or more"
             )
+            notes.append(note("too-short", text, *names[fold::FOLDS]))
         fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
         found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]])
     found = [replace(scores, floor=None) for scores in found]
@@ -187,11 +188,12 @@ def train_beside(
     if least > alarm.threshold:
         kind = "halves of a log" if halved else "logs"
         few = "; it is high because there are few logs: add separate logs" if beyond > 1 else ""
-        notes.append(
+        text = (
             f"the learned score's threshold is {beyond:.2g} times the highest score of "
-            f"{len(scores)} {kind}, whatever --false-alarms-per-hour{few}"
+            f"{len(scores)} {kind}, whatever `false_alarms_per_hour=`{few}"
         )
-    return replace(alarm, threshold=max(alarm.threshold, least)), scores, tuple(notes)
+        notes.append(note("few-logs", text))
+    return replace(alarm, threshold=max(alarm.threshold, least)), scores, Findings(notes)
 
 
 def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
@@ -225,7 +227,7 @@ def _collisions(trace: Trace) -> int:
 
 
 def _cross_fitted(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, parts: Sequence[set[int]]
+    detector: Method, traces: Sequence[Trace], arm: ArmModel, parts: Sequence[set[int]]
 ) -> list[FreeScores]:
     """Scores of each collision-free trace, by a detector that was trained without its fold."""
     found: list[FreeScores] = []
@@ -236,7 +238,7 @@ def _cross_fitted(
     return found
 
 
-def with_rate(detector: FittedDetector, traces: Sequence[Trace], per_hour: float) -> CollisionAlarm:
+def with_rate(detector: FittedMethod, traces: Sequence[Trace], per_hour: float) -> CollisionAlarm:
     """The alarm of a fitted detector with a speed normalisation and a threshold for a rate.
 
     Args:
@@ -250,14 +252,14 @@ def with_rate(detector: FittedDetector, traces: Sequence[Trace], per_hour: float
     return _with_rate(detector, _free_scores(detector, traces), per_hour)[0]
 
 
-def _free_scores(detector: FittedDetector, traces: Sequence[Trace]) -> list[FreeScores]:
+def _free_scores(detector: FittedMethod, traces: Sequence[Trace]) -> list[FreeScores]:
     """Scores of the collision-free rows, not yet normalised."""
     plain = CollisionAlarm(detector, np.inf, CONFIRMATION)
     return [plain.free_scores(trace) for trace in long_enough(plain, traces)]
 
 
 def _with_rate(
-    detector: FittedDetector, found: Sequence[FreeScores], per_hour: float
+    detector: FittedMethod, found: Sequence[FreeScores], per_hour: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """Normalise the scores and choose the threshold from them."""
     alarm, scores = normalised(detector, found)
@@ -265,7 +267,7 @@ def _with_rate(
 
 
 def normalised(
-    detector: FittedDetector, found: Sequence[FreeScores]
+    detector: FittedMethod, found: Sequence[FreeScores]
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """An alarm with infinite threshold, and the scores from which the threshold is chosen.
 

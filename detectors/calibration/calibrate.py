@@ -1,4 +1,4 @@
-"""Calibration of an arm model from collision-free motion, by regularised least squares.
+"""Calibration of an arm model from traces of collision-free motion, by regularised least squares.
 
 The residual of the nominal observer is linear in the errors of the inertial numbers, in the weights
 of the friction columns, in the relative errors of the drive gains and in the unknown payloads (four
@@ -54,7 +54,7 @@ class Priors:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class TraceCalibration:
     """A calibrated arm, with the payloads of its traces and the residual that remains."""
 
     arm: ArmModel
@@ -82,7 +82,7 @@ def calibrate(
     *,
     friction: FrictionModel | None = None,
     priors: Priors | None = None,
-) -> Calibration:
+) -> TraceCalibration:
     """Identify inertial numbers, friction, drive gains and the traces' payloads together.
 
     Args:
@@ -124,7 +124,7 @@ def calibrate(
         SensorNoise.measured(kept) if fast else None,
     )
     payloads: Array = solution[system.load :].reshape(-1, INERTIAL)[:, :PAYLOAD]
-    return Calibration(found, payloads, level)
+    return TraceCalibration(found, payloads, level)
 
 
 _COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel], Filtered]] = {}

@@ -36,7 +36,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.physical_consistency import solve_physically_consistent
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers, mass_matrix
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, Findings, note
 
 #: Friction columns of a real geared joint: presliding of several lengths, Stribeck friction,
 #: viscous friction that saturates at high speed, and load-dependent friction. A torque per ampere
@@ -99,7 +99,7 @@ class Identified:
     rms: Array  #: root mean square of the residual on the recordings [N m], shape (n,)
     scale: str  #: "gains", "payload" or "masses", see :func:`identify`
     gain_error: Array  #: relative standard deviation of each gain, 0 if it was given, (n,)
-    notes: tuple[str, ...]  #: warnings for the user
+    findings: Findings  #: ``"scale-open"``: gains that the logs do not determine
     inertial_error: Array
     """Standard deviations of the inertial numbers, shape (n, 10). NaN if the recordings do not
     reduce the variance of the prior to half, so that the prior dominates the number."""
@@ -238,12 +238,15 @@ def _identify_scale(
     unsure = error > 0.5 * BELIEFS.gain
     start = ArmModel(arm.robot, np.where(unsure, arm.drive_gain, sought.arm.drive_gain))
     found, _ = _fit(start, recordings, "gains", friction, None, 2)
-    notes = tuple(
-        f"{arm.robot.joint_names[j]}: the logs do not determine the scale of its torques (gain "
-        f"uncertain by {100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept; give --gains"
-        for j in np.flatnonzero(unsure)
-    )
-    return replace(found, scale=scale, gain_error=error, notes=notes)
+    findings = []
+    for j in np.flatnonzero(unsure):
+        name = arm.robot.joint_names[j]
+        text = (
+            f"{name}: the logs do not determine the scale of its torques (gain uncertain by "
+            f"{100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept; give `gains=`"
+        )
+        findings.append(note("scale-open", text, name))
+    return replace(found, scale=scale, gain_error=error, findings=Findings(findings))
 
 
 def _fit(
@@ -349,4 +352,4 @@ def _result(
     noise = np.maximum(np.where(rms > 0, rms, rms.max()), 1e-6)
     identified = ArmModel(found, gain, replace(friction, weights=weights), noise)
     unknown = np.full((n, INERTIAL), np.nan)
-    return Identified(identified, loads, rms, "gains", np.zeros(n), (), unknown)
+    return Identified(identified, loads, rms, "gains", np.zeros(n), Findings(), unknown)

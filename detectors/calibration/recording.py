@@ -9,9 +9,9 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.findings import ArgumentError, Findings, note
+from tauguard.findings import Finding, Findings, RefusedError, cause, note
 from tauguard.traces import motion
-from tauguard.traces.logs import Load as Load
+from tauguard.traces.loads import Load as Load
 from tauguard.traces.logs import Recording as Recording
 from tauguard.traces.logs import cut as cut
 from tauguard.traces.motion import MOVING as MOVING
@@ -52,18 +52,26 @@ def motion_length(recordings: Sequence[Recording]) -> float:
     return motion.motion_length([recording.trace for recording in recordings])
 
 
+def length_finding(recordings: Sequence[Recording], least: float = LEAST) -> Finding | None:
+    """An error ``"too-short"`` if there is less motion than ``least`` [s]; it says how much."""
+    if (seconds := motion_length(recordings)) >= least:
+        return None
+    still = "" if seconds else "no joint moves: "
+    return cause(
+        "too-short",
+        f"{still}{int(10 * seconds) / 10:g} s of motion in all, in each log from the first to "
+        f"the last: {least:g} s are the least, two minutes are good",
+    )
+
+
 def check_length(recordings: Sequence[Recording], least: float = LEAST) -> None:
     """Refuse less motion than ``least`` [s].
 
     Raises:
-        ArgumentError: there is less motion; the message says how much.
+        RefusedError: see :func:`length_finding`.
     """
-    if (seconds := motion_length(recordings)) < least:
-        still = "" if seconds else "no joint moves: "
-        raise ArgumentError(
-            f"{still}{int(10 * seconds) / 10:g} s of motion in all, in each log from the first to "
-            f"the last: {least:g} s are the least, two minutes are good"
-        )
+    if finding := length_finding(recordings, least):
+        raise RefusedError(finding)
 
 
 def each_can_be_left_out(recordings: Sequence[Recording]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +74,23 @@ class Diagnosis:
         likely = self.links[self.link - 1]
         moved = self.joints[self.link - 1]
         return f"{self.kind}, link {self.link} (of joint {moved}, probability {likely:.2f}), {size}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The diagnosis as JSON values, with units in the names."""
+        return {
+            "summary": self.summary,
+            "kind": self.kind,
+            "kinds": self.kinds,
+            "link": self.link,
+            "link_identifiable": self.link_identifiable,
+            "links": self.links.tolist(),
+            "force_n": self.force.tolist(),
+            "point_m": self.point.tolist(),
+            "impulse_ns": self.severity.impulse.to_dict(),
+            "peak_force_n": self.severity.peak.to_dict(),
+            **self.severity.torque.to_dict(),
+            "payload_kg": None if self.collision else self.signs.mass,
+        }
 
     @property
     def link_identifiable(self) -> bool:

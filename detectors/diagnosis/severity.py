@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -151,6 +152,15 @@ class Interval90:
         """Whether the estimate is identifiable, see :data:`IDENTIFIABLE`."""
         return self.high <= IDENTIFIABLE * self.low
 
+    def to_dict(self) -> dict[str, Any]:
+        """The interval as JSON values."""
+        return {
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "identifiable": self.identifiable,
+        }
+
     def text(self, unit: str) -> str:
         """``120 N [90, 180]``, or ``at least 7 N`` if the estimate is not identifiable."""
         if not self.identifiable:
@@ -182,6 +192,15 @@ class ContactTorque:
         """The joint with the largest torque, in a few words."""
         joint = int(np.abs(self.peak).argmax())
         return f"{two_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Duration, peak torques and impulses, as JSON values."""
+        return {
+            "contact_s": self.seconds,
+            "contact_goes_on": self.goes_on,
+            "peak_torque_nm": self.peak.tolist(),
+            "joint_impulse_nms": self.impulse.tolist(),
+        }
 
     @classmethod
     def of(cls, after: PostAlarmWindow, smooth: float = 0.0) -> ContactTorque:

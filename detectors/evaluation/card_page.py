@@ -1,19 +1,22 @@
-"""The threshold card as text for the terminal, and as a picture."""
+"""The threshold card: torques and forces that a detector finds, as text and as a picture."""
 
 from __future__ import annotations
 
 import textwrap
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
+import numpy as np
+
+from tauguard.arrays import Array
 from tauguard.atomic_write import atomic_file
-from tauguard.detectors.evaluation.threshold_card import UPPER
+from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import ANYWHERE
 from tauguard.detectors.features.motion_regimes import SEEN, unseen_text
-
-if TYPE_CHECKING:
-    from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
-    from tauguard.detectors.evaluation.threshold_card import ThresholdCard
+from tauguard.findings import Findings
+from tauguard.report import table
+from tauguard.results import Result, Row
 
 SHORTEST = 300.0  # least length of logs for which an alarm rate is printed [s]
 SHORT = 1800.0  # length of logs below which the text asks for longer ones [s]
@@ -37,10 +40,120 @@ TOOL = {
 }
 
 
+#: Ratio of the upper threshold, at which a robot stops, to the lower one, which reports a contact.
+UPPER = 1.5
+#: Numbers of joints of the arms that libfranka supports, and of UR's arms.
+FRANKA_JOINTS, UR_JOINTS = 7, 6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ThresholdCard(Result):
+    """Estimates of the least torques and forces that a detector finds; no safety function."""
+
+    joints: tuple[str, ...]
+    standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
+    stopped: Array  #: torque found on a joint that has just stopped [N m], (n,)
+    moving: Array  #: torque found in motion; NaN: moves in no log [N m], (n,)
+    starting: Array  #: torque found on a joint that starts; NaN: moves in no log [N m], (n,)
+    tool: dict[str, tuple[float, float]]
+    """Force at the last link's origin that is found in half, and in 95 %, of all poses and
+    directions [N]; infinite: none. Keys: "standing" (pushed within 0.1 s), "slowly" (standing,
+    pushed over 1 s), "stopped" (or held by static friction), "moving"."""
+    moment: float  #: moment on the last link found in motion, in half of poses and directions [N m]
+    seconds: float  #: total length of the logs [s]
+    alarms: int  #: number of alarms in all logs, in cross-validation
+    false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
+    logs: tuple[CrossValidatedLog, ...]  #: the logs with their alarms in cross-validation
+    left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
+    unseen: dict[str, tuple[str, ...]]  #: by regime of motion, the joints that no log shows in it
+    replay: tuple[int, int]
+    """Numbers of events in the logs with constant thresholds of the plain observer's residual:
+    contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""
+    fast: Array  #: speeds in the logs, up to which ``moving`` holds [rad/s], shape (n,)
+    twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
+    linear: tuple[str, ...] = ()  #: prismatic joints: N and m/s instead of N m and rad/s
+
+    findings: Findings = field(default_factory=Findings)
+
+    def rows(self) -> list[Row]:
+        """One row per joint: the torque that is found in each state; None: not known."""
+        return [
+            {"joint": _labelled(self, joint)}
+            | {f"{name} [N m]": _number(getattr(self, COLUMNS[name][0])[j]) for name in COLUMNS}
+            for j, joint in enumerate(self.joints)
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The card as JSON values."""
+        return {
+            "torques_nm": {
+                name: [_number(value) for value in getattr(self, level)]
+                for name, (level, _) in COLUMNS.items()
+            },
+            "tool_n": {name: [_number(f) for f in forces] for name, forces in self.tool.items()},
+            "seconds": self.seconds,
+            "alarms": self.alarms,
+            "false_alarms_per_hour": self.false_alarms_per_hour,
+            "left_out": [log.name for log in self.left_out],
+            "unseen": {name: list(joints) for name, joints in self.unseen.items()},
+            "franka": self.franka,
+            "ur": self.ur,
+        }
+
+    def __str__(self) -> str:
+        """The card as one page of text."""
+        return text(self)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return (
+            f"ThresholdCard({len(self.joints)} joints, {self.seconds:.0f} s, {self.alarms} alarms)"
+        )
+
+    def draw(self, path: str | Path) -> None:
+        """Draw the card (PNG)."""
+        draw(Path(path), self)
+
+    @property
+    def franka(self) -> dict[str, list[float]]:
+        """Arguments of libfranka's ``setCollisionBehavior``.
+
+        They are torques of 7 joints [N m], and forces and moments of three axes [N, N m]. Empty for
+        an arm with another number of joints or a prismatic one, or if a number is unknown.
+        """
+        numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
+        if self.linear or len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
+            return {}
+        tool = np.repeat([self.tool["moving"][0], self.moment], 3)
+        lower = {
+            "torque_thresholds_acceleration": self.starting,
+            "torque_thresholds_nominal": self.moving,
+            "force_thresholds_acceleration": 1.5 * tool,
+            "force_thresholds_nominal": tool,
+        }
+        both = {f"lower_{k}": v for k, v in lower.items()}
+        both |= {f"upper_{k}": UPPER * v for k, v in lower.items()}
+        return {name: values.tolist() for name, values in both.items()}
+
+    @property
+    def ur(self) -> dict[str, float]:
+        """The tool force limit of UR's safety settings [N]; empty for another arm, or if unknown.
+
+        UR's arms have six joints, none of them prismatic.
+        """
+        limit = UPPER * self.tool["moving"][1]
+        known = np.isfinite([limit, *self.moving]).all()
+        other = bool(self.linear) or len(self.joints) != UR_JOINTS
+        return {"tool_force_limit_n": limit} if known and not other else {}
+
+
+def _number(value: float) -> float | None:
+    """A number of the card; None: not known, or no such force."""
+    return float(value) if np.isfinite(value) else None
+
+
 def text(card: ThresholdCard) -> str:
     """The card as one page of text."""
-    from tauguard.report import table
-
     rows = [
         {"found from [N m]": _labelled(card, joint)}
         | {name: _torque(card, name, j) for name in COLUMNS}
@@ -203,7 +316,6 @@ def times(log: CrossValidatedLog) -> str:
 
 def draw(target: Path, card: ThresholdCard) -> None:
     """The card as a picture (PNG)."""
-    import numpy as np
     from matplotlib.figure import Figure
 
     lines = [line for part in _lines(card) for line in _wrapped(part)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -14,7 +13,8 @@ from tauguard.detectors import _observer
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
 from tauguard.detectors.estimation.observer import LOG_GAIN
-from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
+from tauguard.detectors.evaluation.card_page import UPPER, ThresholdCard
+from tauguard.detectors.evaluation.cross_validation import CrossValidation
 from tauguard.detectors.events import find_alarms
 from tauguard.detectors.features.free_bound import FREE_GAIN
 from tauguard.detectors.features.motion_regimes import motion_regimes
@@ -37,72 +37,8 @@ LASTS = 0.04  # time above the bound until an alarm [s]
 TRACKED = 1.25
 #: Ratio of the torque in motion to the least bound, for logs with too few pulses.
 LITTLE = 1.5
-#: Ratio of the upper threshold, at which a robot stops, to the lower one, which reports a contact.
-UPPER = 1.5
-#: Numbers of joints of the arms that libfranka supports, and of UR's arms.
-FRANKA_JOINTS, UR_JOINTS = 7, 6
 #: Numbers of poses and directions of the force at the tool.
 POSES, DIRECTIONS = 24, 100
-
-
-@dataclass(frozen=True, eq=False)
-class ThresholdCard:
-    """Estimates of the least torques and forces that a detector finds; no safety function."""
-
-    joints: tuple[str, ...]
-    standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
-    stopped: Array  #: torque found on a joint that has just stopped [N m], (n,)
-    moving: Array  #: torque found in motion; NaN: moves in no log [N m], (n,)
-    starting: Array  #: torque found on a joint that starts; NaN: moves in no log [N m], (n,)
-    tool: dict[str, tuple[float, float]]
-    """Force at the last link's origin that is found in half, and in 95 %, of all poses and
-    directions [N]; infinite: none. Keys: "standing" (pushed within 0.1 s), "slowly" (standing,
-    pushed over 1 s), "stopped" (or held by static friction), "moving"."""
-    moment: float  #: moment on the last link found in motion, in half of poses and directions [N m]
-    seconds: float  #: total length of the logs [s]
-    alarms: int  #: number of alarms in all logs, in cross-validation
-    false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
-    logs: tuple[CrossValidatedLog, ...]  #: the logs with their alarms in cross-validation
-    left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
-    unseen: dict[str, tuple[str, ...]]  #: by regime of motion, the joints that no log shows in it
-    replay: tuple[int, int]
-    """Numbers of events in the logs with constant thresholds of the plain observer's residual:
-    contacts with ``moving`` and ``starting``, collisions with :data:`UPPER` times these."""
-    fast: Array  #: speeds in the logs, up to which ``moving`` holds [rad/s], shape (n,)
-    twice: Array  #: as ``moving``, at twice these speeds and accelerations [N m], shape (n,)
-    linear: tuple[str, ...] = ()  #: prismatic joints: N and m/s instead of N m and rad/s
-
-    @property
-    def franka(self) -> dict[str, list[float]]:
-        """Arguments of libfranka's ``setCollisionBehavior``.
-
-        They are torques of 7 joints [N m], and forces and moments of three axes [N, N m]. Empty for
-        an arm with another number of joints or a prismatic one, or if a number is unknown.
-        """
-        numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
-        if self.linear or len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
-            return {}
-        tool = np.repeat([self.tool["moving"][0], self.moment], 3)
-        lower = {
-            "torque_thresholds_acceleration": self.starting,
-            "torque_thresholds_nominal": self.moving,
-            "force_thresholds_acceleration": 1.5 * tool,
-            "force_thresholds_nominal": tool,
-        }
-        both = {f"lower_{k}": v for k, v in lower.items()}
-        both |= {f"upper_{k}": UPPER * v for k, v in lower.items()}
-        return {name: values.tolist() for name, values in both.items()}
-
-    @property
-    def ur(self) -> dict[str, float]:
-        """The tool force limit of UR's safety settings [N]; empty for another arm, or if unknown.
-
-        UR's arms have six joints, none of them prismatic.
-        """
-        limit = UPPER * self.tool["moving"][1]
-        known = np.isfinite([limit, *self.moving]).all()
-        other = bool(self.linear) or len(self.joints) != UR_JOINTS
-        return {"tool_force_limit_n": limit} if known and not other else {}
 
 
 def threshold_card(

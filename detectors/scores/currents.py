@@ -166,7 +166,7 @@ class CurrentNetwork:
 
 @dataclass(frozen=True, eq=False)
 class FittedCurrentNetwork(Frozen):
-    """A :class:`~tauguard.detectors.scores.detector.FittedDetector`."""
+    """A :class:`~tauguard.detectors.scores.method.FittedMethod`."""
 
     name: str
     arm: ArmModel  #: as given; the scores do not depend on it

@@ -186,7 +186,7 @@ def evaluated(
 
 @dataclass(frozen=True, eq=False)
 class FittedWindowed(OnFrontEnd):
-    """A fitted regressor on windows, a ``FittedDetector``."""
+    """A fitted regressor on windows, a ``FittedMethod``."""
 
     name: str
     front: FrontEnd

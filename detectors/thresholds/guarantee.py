@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, RefusedError, cause
 
 #: Alarms per episode are counted at a threshold that COUNTED episodes exceed, or FRACTION of all
 #: episodes if that number is smaller.
@@ -55,7 +55,8 @@ def guaranteed_threshold(
             which the guarantee holds, between 0 and 1.
 
     Raises:
-        ArgumentError: bad arguments, or too few episodes; the message says how many are enough.
+        ArgumentError: bad arguments.
+        RefusedError: too few episodes; the message says how many are enough.
     """
     check_guarantee([e.seconds for e in episodes], per_hour, confidence)
     count = len(episodes)
@@ -86,7 +87,8 @@ def check_guarantee(seconds: Sequence[float], per_hour: float, confidence: float
         confidence: between 0 and 1.
 
     Raises:
-        ArgumentError: bad arguments, or too few episodes; the message says how many are enough.
+        ArgumentError: bad arguments.
+        RefusedError: too few episodes; the message says how many are enough.
     """
     if not per_hour > 0:
         raise ArgumentError(f"per_hour: {per_hour}, expected above 0")
@@ -102,13 +104,14 @@ def check_guarantee(seconds: Sequence[float], per_hour: float, confidence: float
 
 def _too_few(
     count: int, hours: float, alpha: float, per_hour: float, confidence: float
-) -> ValueError:
+) -> RefusedError:
     needed = int(np.ceil(np.log(1 - confidence) / np.log1p(-alpha)))
-    return ValueError(
+    text = (
         f"{count} episodes ({hours:.2g} h) cannot guarantee {per_hour:g} false alarms per hour "
         f"with confidence {confidence:g}: give {needed} ({hours * needed / count:.2g} h), "
         "or ask for more alarms or less confidence"
     )
+    return RefusedError(cause("too-short", text))
 
 
 def allowed_episodes(count: int, alpha: float, confidence: float) -> int:

@@ -10,16 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from tauguard.arrays import Array, Bools
-from tauguard.detectors import (
-    CollisionAlarm,
-    Estimator,
-    MomentumObserver,
-    RobotNumbers,
-    Unknowns,
-)
+from tauguard.detectors import CollisionAlarm, Estimator, MomentumObserver, RobotNumbers
 from tauguard.detectors.alarms.monitor import Monitor
 from tauguard.detectors.dynamics.same_arm import arm_difference
-from tauguard.detectors.estimation.estimator import MOTION
+from tauguard.detectors.estimation.estimator import MOTION, Unknowns
 from tauguard.detectors.estimation.observer import ENVIRONMENT_GAIN, PLAIN_GAIN
 from tauguard.detectors.samples import same_rate
 from tauguard.envs.gym.actions import observation_table

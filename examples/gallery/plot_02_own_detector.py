@@ -14,8 +14,6 @@ import numpy as np
 
 import tauguard
 from tauguard.datasets import free_episodes, struck_episodes
-from tauguard.detectors import detection_metrics, make_detector, match_detection, train
-from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import simulate
 
 
@@ -46,17 +44,19 @@ class Fitted:
 
 
 speeds = (30.0,)
-motion = [simulate(e) for e in struck_episodes(1, 1, 5, speeds) + free_episodes(1, 4, 12.0, speeds)]
-fresh = [simulate(e) for e in struck_episodes(2, 1, 8, speeds)]
-for detector in (ResidualChange(), make_detector("moving-thresholds")):
-    alarm = train(detector, motion, nominal_arm(motion), per_hour=10)
-    found = [alarm.detect(trace) for trace in fresh]
-    pairs = zip(found, fresh, strict=True)
-    metrics = detection_metrics(match_detection(f, t, alarm.settle) for f, t in pairs)
+motion = tauguard.simulated(
+    simulate(e) for e in struck_episodes(1, 1, 5, speeds) + free_episodes(1, 4, 12.0, speeds)
+)
+fresh = tauguard.simulated(simulate(e) for e in struck_episodes(2, 1, 8, speeds))
+trace = fresh.traces[0]
+for method in (ResidualChange(), "moving-thresholds"):
+    detector = tauguard.train(motion, method=method, false_alarms_per_hour=10)
+    metrics = tauguard.evaluate(detector, fresh).metrics
     part, delay = metrics["sensitivity"], metrics["delay_ms"]["median"]
-    print(f"{detector.name:<17} found {part['value']:.0%} of {part['n']}, median {delay:.0f} ms")
-    plt.plot(fresh[0].t, found[0].score / found[0].threshold, linewidth=0.7, label=detector.name)
-for hit in fresh[0].truth.collisions:
+    print(f"{detector.method:<17} found {part['value']:.0%} of {part['n']}, median {delay:.0f} ms")
+    score = detector.detect(trace).signals.score
+    plt.plot(trace.t, score / detector.threshold, linewidth=0.7, label=detector.method)
+for hit in trace.truth.collisions:
     plt.axvspan(hit.onset, hit.end, color="tab:red", alpha=0.4)
 plt.axhline(1.0, color="black", linewidth=0.8)
 plt.ylim(0, 8)

@@ -14,11 +14,11 @@ from tauguard.datasets import free_episodes
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import simulate
 from tauguard.models import Mismatch
-from tauguard.twin import identify_twin, played
+from tauguard.twin import fit_twin, played
 
 hidden = Mismatch(seed=12)
 logs = [simulate(e) for e in free_episodes(4, 6, 20.0, (30.0,), (0.0,), hidden)]
-twin = identify_twin(nominal_arm(logs), logs[:5], np.full(6, 30.0))
+twin = fit_twin(nominal_arm(logs), logs[:5], np.full(6, 30.0))
 print("Coulomb friction [N m]:", twin.drive.friction.coulomb.round(2))
 print(*twin.notes, sep="\n")
 

@@ -22,22 +22,23 @@ from tauguard.environments import register_environments
 
 if TYPE_CHECKING:
     from tauguard.datasets.arm_logs import read_log, read_logs, simulated
+    from tauguard.detectors.arm_calibration import Calibration, calibrate
     from tauguard.detectors.calibration.nominal import residual
+    from tauguard.detectors.detection import LogDetection
+    from tauguard.detectors.detector import Detector, load_detector
+    from tauguard.detectors.evaluating import Evaluation, evaluate
+    from tauguard.detectors.training import detect_after_quiet, train
     from tauguard.replay.plot import plot
     from tauguard.speed.limits import speed_limits
-    from tauguard.traces.logs import Load, Log, Logs
+    from tauguard.traces.loads import Load
+    from tauguard.traces.logs import Log, Logs
+    from tauguard.twin.of_logs import TwinOfLogs, identify_twin
 
 __all__ = [
-    "Load",
-    "Log",
-    "Logs",
-    "plot",
-    "read_log",
-    "read_logs",
-    "residual",
-    "simulated",
-    "speed_limits",
-]
+    "Calibration", "Detector", "Evaluation", "Load", "Log", "LogDetection", "Logs", "TwinOfLogs",
+    "calibrate", "detect_after_quiet", "evaluate", "identify_twin", "load_detector", "plot",
+    "read_log", "read_logs", "residual", "simulated", "speed_limits", "train",
+]  # fmt: skip
 __version__ = version("tauguard")
 
 register_environments()
@@ -49,7 +50,14 @@ _PACKAGES = (
 )  # fmt: skip
 _FUNCTIONS = {
     **dict.fromkeys(("read_log", "read_logs", "simulated"), "tauguard.datasets.arm_logs"),
-    **dict.fromkeys(("Load", "Log", "Logs"), "tauguard.traces.logs"),
+    "Load": "tauguard.traces.loads",
+    **dict.fromkeys(("Log", "Logs"), "tauguard.traces.logs"),
+    **dict.fromkeys(("Calibration", "calibrate"), "tauguard.detectors.arm_calibration"),
+    **dict.fromkeys(("Detector", "load_detector"), "tauguard.detectors.detector"),
+    **dict.fromkeys(("Evaluation", "evaluate"), "tauguard.detectors.evaluating"),
+    **dict.fromkeys(("detect_after_quiet", "train"), "tauguard.detectors.training"),
+    **dict.fromkeys(("TwinOfLogs", "identify_twin"), "tauguard.twin.of_logs"),
+    "LogDetection": "tauguard.detectors.detection",
     "plot": "tauguard.replay.plot",
     "residual": "tauguard.detectors.calibration.nominal",
     "speed_limits": "tauguard.speed.limits",

@@ -20,15 +20,10 @@ from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import arms_of, episodes_of_splits
 from tauguard.datasets.recordings import labelled
-from tauguard.detectors import (
-    DETECTORS,
-    Matching,
-    detection_metrics,
-    make_detector,
-    matchings,
-    train,
-)
+from tauguard.detectors import DETECTORS, Matching, detection_metrics, make_detector
+from tauguard.detectors.alarms.training import train
 from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.detectors.evaluation.matching import matchings
 from tauguard.report import Row
 
 NAME = "tauguard-collisions-v2"  #: name of the dataset

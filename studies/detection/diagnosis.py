@@ -17,7 +17,8 @@ from studies.detection.events import Event, payload_events, push_events, struck_
 from studies.detection.motions import CALIBRATE, SPEEDS, TEST, Training, free_pool, stream
 from studies.framework import groups, per, time_in_turn
 from tauguard.arrays import Array
-from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
+from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector
+from tauguard.detectors.alarms.training import with_rate
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.diagnosis.classification import KINDS
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians

@@ -35,7 +35,7 @@ from studies.detection.operating import (
     trained,
 )
 from studies.framework import Each, Incomplete, JobCache, Workers
-from tauguard.detectors import FittedDetector, make_detector
+from tauguard.detectors import FittedMethod, make_detector
 from tauguard.envs import PayloadPick, simulate
 from tauguard.report import Row
 from tauguard.traces import STRATA
@@ -173,7 +173,7 @@ def _fleets(
     half = -(-len(size.detectors) // 2)
     halves = [own for own in (size.detectors[:half], size.detectors[half:]) if own]
     training = [(seed, arm, own, size.training) for arm in arms for own in halves]
-    detectors: dict[int, dict[str, FittedDetector]] = {arm: {} for arm in arms}
+    detectors: dict[int, dict[str, FittedMethod]] = {arm: {} for arm in arms}
     for job, own in zip(training, cache.over(each, "train")(_train, training), strict=True):
         detectors[job[1]].update(own)
     hours = size.calibration_hours / len(SPEEDS)
@@ -187,7 +187,7 @@ def _fleets(
     return {arm: operated(detectors[arm], free[arm], network, size.target) for arm in arms}
 
 
-def _train(job: tuple[int, int, tuple[str, ...], Training]) -> dict[str, FittedDetector]:
+def _train(job: tuple[int, int, tuple[str, ...], Training]) -> dict[str, FittedMethod]:
     seed, arm, names, training = job
     return trained(training.traces(seed, arm), names, Conditions())
 

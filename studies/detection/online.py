@@ -209,7 +209,8 @@ def _one_window(model: KernelMachine, slices: list[Array]) -> Callable[[int], ob
 
 def measure(quick: bool, seed: int) -> list[Row]:
     """Rows ``real time`` (scene to alarm), ``step`` (methods), ``kernel`` (fewer vectors)."""
-    from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
+    from tauguard.detectors import DETECTORS, SrqSvr, make_detector
+    from tauguard.detectors.alarms.training import held_out, train
     from tauguard.detectors.calibration.nominal import nominal_design
     from tauguard.detectors.scores.kernel import SrqRegressor
 

@@ -15,17 +15,11 @@ import numpy as np
 from studies.detection.motions import CALIBRATE, Conditions, Struck, free_pool, stream
 from tauguard.arrays import Array
 from tauguard.datasets.plans import BEGIN, TRAINING_PAYLOADS
-from tauguard.detectors import (
-    CollisionAlarm,
-    FittedDetector,
-    FreeScores,
-    find_alarms,
-    make_detector,
-    match,
-)
+from tauguard.detectors import CollisionAlarm, FittedMethod, find_alarms, make_detector, match
 from tauguard.detectors.alarms.training import normalised
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.evaluation.matching import Matching
+from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.traces import Collision, Trace
@@ -47,7 +41,7 @@ Free = Mapping[str, Sequence[FreeScores]]
 class Operated:
     """A trained detector of one arm and its alarm at every operating point."""
 
-    detector: FittedDetector
+    detector: FittedMethod
     alarms: Mapping[str, CollisionAlarm]
 
     @property
@@ -71,13 +65,13 @@ Fleet = Mapping[str, Operated]
 
 def trained(
     traces: Sequence[Trace], names: Sequence[str], under: Conditions
-) -> dict[str, FittedDetector]:
+) -> dict[str, FittedMethod]:
     """The detectors of one arm, trained on its slices."""
     robot = nominal_design(under.robot)
     return {name: make_detector(name).fit(traces, robot) for name in names}
 
 
-def free_scores(detectors: Mapping[str, FittedDetector], trace: Trace) -> Free:
+def free_scores(detectors: Mapping[str, FittedMethod], trace: Trace) -> Free:
     """Every detector's scores over a collision-free trace."""
     plain = {name: CollisionAlarm(detector, np.inf) for name, detector in detectors.items()}
     return {name: [alarm.free_scores(trace)] for name, alarm in plain.items()}
@@ -88,7 +82,7 @@ def joined(parts: Sequence[Free]) -> Free:
     return {name: [one for part in parts for one in part[name]] for name in parts[0]}
 
 
-def calibration(job: tuple[int, int, Mapping[str, FittedDetector], float, float]) -> Free:
+def calibration(job: tuple[int, int, Mapping[str, FittedMethod], float, float]) -> Free:
     """Scores of an arm's collision-free motion with the training payloads, at one speed [%]."""
     seed, arm, detectors, speed, hours = job
     under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
@@ -109,7 +103,7 @@ def at_fraction(scores: Sequence[FreeScores], fraction: float) -> float:
 
 
 def operated(
-    detectors: Mapping[str, FittedDetector],
+    detectors: Mapping[str, FittedMethod],
     free: Mapping[float, Free],
     network: str | None,
     per_hour: float,

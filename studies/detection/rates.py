@@ -31,9 +31,10 @@ from studies.detection.operating import (
 )
 from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
-from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
+from tauguard.detectors import CollisionAlarm, FittedMethod, poisson_rate
 from tauguard.detectors.alarms.training import normalised
 from tauguard.detectors.evaluation.matching import HEADLINE, delay_metrics
+from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
@@ -155,7 +156,7 @@ def _logged(trace: Trace, hz: float | None) -> Trace:
 
 
 def _alarms(
-    detector: FittedDetector, scores: Sequence[FreeScores], asked: Sequence[float]
+    detector: FittedMethod, scores: Sequence[FreeScores], asked: Sequence[float]
 ) -> Iterator[tuple[str, CollisionAlarm]]:
     aimed, levels = normalised(detector, scores)
     for per_hour in asked:

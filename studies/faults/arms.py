@@ -8,7 +8,8 @@ from functools import cached_property
 
 from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned, touched
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import CollisionAlarm, make_detector, train
+from tauguard.detectors import CollisionAlarm, make_detector
+from tauguard.detectors.alarms.training import train
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion

@@ -56,7 +56,8 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
     """Train as `tauguard demo` does, and record the errors on its test motions."""
     from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR
     from tauguard.datasets import demo_plan, simulate_all
-    from tauguard.detectors import SrqSvr, match_detection, train
+    from tauguard.detectors import SrqSvr, match_detection
+    from tauguard.detectors.alarms.training import train
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.replay.events import EventFolder
 

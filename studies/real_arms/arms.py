@@ -9,8 +9,8 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.datasets import read_log
-from tauguard.datasets.drives import DRIVES
 from tauguard.detectors import ArmModel, RobotNumbers
+from tauguard.detectors.calibration.initial_arm import DRIVES
 from tauguard.detectors.calibration.recording import Load, Recording, cut
 from tauguard.models import pin_model
 from tauguard.models.known_robots import PUBLISHED

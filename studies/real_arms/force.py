@@ -36,7 +36,7 @@ from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tauguard.models import Friction, arm_surface
 from tauguard.report import Row
 from tauguard.traces import Trace
-from tauguard.twin import identify_twin
+from tauguard.twin import fit_twin
 from tauguard.twin.play import modelled
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     spans = sensor_spans(trace.t, size)
     rows = [row for cause in causes if (row := _beside(trace.t, size, cause)) is not None]
     limit = np.full(fitted.arm.robot.joints, np.inf)
-    twin = identify_twin(fitted.arm, [r.trace for r in free.values()], limit)
+    twin = fit_twin(fitted.arm, [r.trace for r in free.values()], limit)
     rows += pushed(fitted.arm, twin.drive.friction, trace, force, spans)
     return [*rows, *_errors(rows)]
 

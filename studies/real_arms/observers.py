@@ -12,7 +12,7 @@ import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import ArmModel
-from tauguard.detectors.calibration.checks import drive_torque
+from tauguard.detectors.calibration.log_torques import drive_torque
 from tauguard.detectors.dynamics.robot import inverse_dynamics, mass_matrix, momentum_terms
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.events import confirmation_samples, confirmed

@@ -13,7 +13,8 @@ from oracles.reaction_swings import SPEEDS, spread, swing
 from studies.framework import answer, number, per, table_rows, time_in_turn
 from tauguard.contacts import registered
 from tauguard.datasets import demo_plan, simulate_all
-from tauguard.detectors import CollisionAlarm, make_detector, train
+from tauguard.detectors import CollisionAlarm, make_detector
+from tauguard.detectors.alarms.training import train
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs.adapters.reactions import REACTIONS
 from tauguard.models import body_region

@@ -14,8 +14,10 @@ from typing import Any
 
 from studies.framework import Workers, draw_found, time_in_turn
 from tauguard.datasets import plans
-from tauguard.detectors import SrqSvr, detection_metrics, matchings, train
+from tauguard.detectors import SrqSvr, detection_metrics
+from tauguard.detectors.alarms.training import train
 from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.detectors.evaluation.matching import matchings
 from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.models.drive import PARTS

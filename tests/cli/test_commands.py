@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tauguard import Detector, evaluate
 from tauguard.cli import COMMANDS, main
-from tauguard.cli.evaluate import evaluated, name_of
 from tauguard.cli.replay import newest
 from tauguard.traces import Detection, Trace, Truth
 
@@ -138,11 +138,6 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     assert f"<td>{next(struck.iterdir()).name}</td>" in page  # the file, not a number of our own
 
 
-def test_an_episode_of_a_dataset_has_the_name_that_inspect_takes():
-    assert name_of(SimpleNamespace(meta={"episode": "test/3"}), 7) == "test/3"
-    assert name_of(SimpleNamespace(meta={}), 0) == "0"
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -159,8 +154,11 @@ def test_a_recording_that_does_not_fit_is_named_by_its_file(change, said):
     none = np.zeros(50)
     detection = Detection("none", t, still, none, 1.0, none > 0, ())
     alarm = SimpleNamespace(detector=detector, settle=0.0, detect=lambda trace: detection)
+    episode = dataclasses.replace(first, meta={"episode": "test/3"})
+    unnamed = dataclasses.replace(first, meta={})
+    assert evaluate(Detector(alarm), [episode, unnamed]).names == ("test/3", "1")
     with pytest.raises(ValueError, match=said):
-        evaluated(alarm, [first, second], None)
+        evaluate(Detector(alarm), [first, second])
 
 
 def quiet(t):

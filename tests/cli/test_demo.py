@@ -3,7 +3,8 @@
 import numpy as np
 
 from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR, false_alarm_text, requested
-from tauguard.detectors import FreeScores, poisson_rate
+from tauguard.detectors import poisson_rate
+from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 
 

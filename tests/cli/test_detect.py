@@ -7,11 +7,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tauguard import Log, LogDetection
 from tauguard.cli import main
-from tauguard.cli.detect import diagnosed
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.calibration import joints
 from tauguard.detectors.events import Alarm
+from tauguard.findings import Findings
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 
@@ -136,8 +137,8 @@ def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):
         ),
         (("--gains", "8", "5", "--columns", "ur10e"), "line 1: 7 columns, expected 31"),
         (("--gains", "8", "5", "--robot", "no.urdf"), "no.urdf: no such robot file"),
-        (("--gains", "8000", "5000"), "milliamperes?"),
-        (("--gains", "-8", "-5"), "seem to have the opposite sign"),
+        (("--gains", "8000", "5000"), "milliamperes, add --mend mA; else check the gains"),
+        (("--gains", "8", "-5"), "the currents of j2 seem to have the opposite sign"),
         (
             ("--model", "m.json", "--quiet", "5", "--gains", "8", "5"),
             "--quiet and --gains cannot be combined",
@@ -222,10 +223,20 @@ def test_a_urdf_gives_link_and_force_of_each_alarm(tmp_path, shape, said):
         FrictionModel.coulomb_viscous([0.0, 0.0], [0.0, 0.0]),
         np.array([0.1, 0.1]),
     )
-    alarms = SimpleNamespace(detection=SimpleNamespace(alarms=[Alarm(2.02, 2.4)]))
-    (event,), notes = diagnosed(SimpleNamespace(arm=arm), trace, alarms, robot)
-    assert event["link"] == 2
+    detector = SimpleNamespace(detector=SimpleNamespace(arm=arm))
+    found = SimpleNamespace(
+        detection=SimpleNamespace(alarms=[Alarm(2.02, 2.4)]),
+        findings=Findings(),
+        joint_of=lambda alarm: 1,
+    )
+    detection = LogDetection(Log(trace), trace, detector, found, robot=robot)
+    (one,) = detection.diagnose()
+    event = one.to_dict()
+    assert event["link"] == one.link == 2
     assert event["force_n"][1] == pytest.approx(30, rel=0.35)
     assert event["peak_force_n"]["low"] < 30 < event["peak_force_n"]["high"]
+    notes = [finding.text for finding in detection.findings.of("shapes")]
     assert len(notes) == len(said)
     assert all(text in note for text, note in zip(said, notes, strict=True))
+    (row,) = detection.rows()
+    assert row["link"] == (2 if one.link_identifiable else None)

@@ -1,12 +1,14 @@
 """The least lengths of logs: every command enforces the same ones, and every text states them."""
 
 import dataclasses
+import inspect
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tauguard import detect_after_quiet
 from tauguard.cli import calibrate, detect, main, train
 from tauguard.detectors.calibration import identification
 from tauguard.detectors.calibration.recording import LEAST, LEAST_STANDING, cut
@@ -84,6 +86,7 @@ def test_texts_state_what_is_enforced():
         plain = " ".join(text.split())
         assert re.findall(r"(\d+) s of (?:collision-free )?motion", plain) == [f"{LEAST:g}"]
     assert f"only stands needs {LEAST_STANDING:g} s" in " ".join(page.split())
-    assert f"`--quiet` seconds ({detect.QUIET:g})" in " ".join(page.split())
-    assert f"[s] (default: {detect.QUIET:g})" in " ".join(detect.command.__doc__.split())
-    assert LEAST_STANDING < LEAST < detect.QUIET
+    quiet = inspect.signature(detect_after_quiet).parameters["quiet"].default
+    assert f"`--quiet` seconds ({quiet:g})" in " ".join(page.split())
+    assert f"[s] (default: {quiet:g})" in " ".join(detect.command.__doc__.split())
+    assert LEAST_STANDING < LEAST < quiet

@@ -13,8 +13,9 @@ import pytest
 from tauguard.cli import main
 from tauguard.cli.listen import Terminal, check_source, opened, report
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model, train
+from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model
 from tauguard.detectors.alarms.monitor import Answer, Monitor, detect_with_faults
+from tauguard.detectors.alarms.training import train
 from tauguard.envs import simulate
 from tauguard.live import PlayedStream, StreamClosed, UrServer, UrStream, rtde, ur
 from tauguard.live.packets import Fault, Packets

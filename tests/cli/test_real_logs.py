@@ -8,16 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tauguard import Calibration
 from tauguard.cli import main
-from tauguard.cli.calibrate import report
 from tauguard.cli.payload import loads
-from tauguard.datasets import columns, real_arms
-from tauguard.datasets.arm_logs import loads_of
-from tauguard.datasets.drives import DRIVES, preset_gains
+from tauguard.datasets import columns
 from tauguard.detectors.calibration.arm_file import load_arm
+from tauguard.detectors.calibration.initial_arm import DRIVES, initial_arm, preset_gains
 from tauguard.detectors.calibration.joints import robot_numbers
 from tauguard.detectors.calibration.recording import Load, Recording, cut
 from tauguard.detectors.features.motion_regimes import unseen_motion
+from tauguard.traces.loads import loads_of
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 from tests.oracles.added_contact import Added, add_contact
 
@@ -88,7 +88,7 @@ def test_detect_without_a_model_is_free_motion_trained_on_the_logs_beginning(
         out = capsys.readouterr().out
         assert source in out
         assert "1 alarm in" in out
-        model = str(folder / "head.skops")
+        model = str(folder / "head.tauguard")
         main(["train", "--free", head, *robot, "--model", model])
         main(["detect", log, *robot[:4], "--model", model, "--out", str(folder / "found")])
         own = json.loads((folder / "own.json").read_text())
@@ -111,7 +111,7 @@ def test_held_out_residuals_have_the_joints_names(folder, capsys):
 @pytest.mark.parametrize(
     ("scale", "order", "doubt"),
     [
-        (1000.0, (0, 1, 2), "of the torque is not explained"),
+        (1000.0, (0, 1, 2), "if they are milliamperes, add --mend mA"),
         (1.0, (2, 0, 1), "give the columns in the order of the robot file's joints"),
         (-1.0, (0, 1, 2), "the sign of the current"),
     ],
@@ -125,7 +125,7 @@ def test_strange_currents_are_refused(folder, calibrated, capsys, scale, order, 
 
 def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
-    model = str(folder / "model.skops")
+    model = str(folder / "model.tauguard")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", *logs, *robot, "--model", model])
     assert "at the tool:" in capsys.readouterr().out
@@ -150,7 +150,7 @@ def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
 def test_detect_names_the_columns_of_a_log_that_do_not_fit_the_model(
     folder, calibrated, capsys, fields, order, sign, said
 ):
-    model, robot = str(folder / "own.skops"), flags(folder, calibrated.name)
+    model, robot = str(folder / "own.tauguard"), flags(folder, calibrated.name)
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
     main(["train", "--free", *logs, *robot, "--model", model])
     capsys.readouterr()
@@ -162,11 +162,12 @@ def test_detect_names_the_columns_of_a_log_that_do_not_fit_the_model(
         main(["detect", log, *robot, "--model", model])
     out = capsys.readouterr().out
     assert said in out
-    assert out.count("seem") + out.count("friction would push") == 1
+    assert out.count("seem") <= 1
+    assert out.count("friction would push") <= 1
 
 
 def test_what_does_not_belong_to_a_model_is_named(folder, calibrated, tmp_path, capsys):
-    model = str(folder / "own.skops")
+    model = str(folder / "own.tauguard")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", str(folder / "log0.csv"), *robot, "--model", model])
     log = written(folder, "seen.csv", record(8))
@@ -188,7 +189,7 @@ def test_logs_of_another_arm_are_refused(folder, tmp_path, capsys, command):
     named = {"calibrate": ["calibrate"], "train": ["train", "--free"]}[command]
     gains = ["--gains", *GAINS]
     if command == "train":
-        gains += ["--model", str(tmp_path / "m.skops")]
+        gains += ["--model", str(tmp_path / "m.tauguard")]
     wrong = record(5)
     wrong.current[:, 1] *= -1
     mixed = [str(folder / "log0.csv"), written(folder, "mixed.csv", wrong)]
@@ -203,7 +204,7 @@ def test_logs_of_another_arm_are_refused(folder, tmp_path, capsys, command):
 
 def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     logs = [written(folder, f"held{seed}.csv", held_joint(seed)) for seed in range(3)]
-    model = str(folder / "held.skops")
+    model = str(folder / "held.tauguard")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", *logs, *robot, "--model", model])
     out = capsys.readouterr().out
@@ -238,7 +239,7 @@ def test_what_a_detector_fails_in_its_own_logs_is_refused_unless_accepted(
             push = Added(start + seed, 0.2, (28.0, 20.0, 10.0), "push")
             trace = add_contact(trace, GAIN, push)
         logs.append(written(tmp_path, f"pushed{seed}.csv", trace))
-    model = tmp_path / "model.skops"
+    model = tmp_path / "model.tauguard"
     asked = ["train", "--free", *logs, *flags(folder, calibrated.name), "--model", str(model)]
     line = refused_until_accepted(capsys, asked, model)
     assert "in bursts, as contacts do" in line
@@ -266,7 +267,7 @@ def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, ca
     still = record(4, seconds=8.0)
     still.q[:], still.qd[:], still.current[:] = still.q[0], 0.0, still.current[0]
     logs = [str(folder / "log0.csv"), written(folder, "still.csv", still)]
-    out, model = str(tmp_path / "own.xml"), str(tmp_path / "own.skops")
+    out, model = str(tmp_path / "own.xml"), str(tmp_path / "own.tauguard")
     main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", out])
     assert "note: still.csv: no joint moves in it" in capsys.readouterr().out
     columns = ["--columns", str(folder / "columns.json")]
@@ -301,7 +302,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
     with contextlib.suppress(SystemExit):
         main(arguments)
     said = "".join(capsys.readouterr())
-    assert "did laden.csv carry something (then give --payload laden.csv=KG or =unknown)" in said
+    assert "did laden.csv carry something (then give --payload laden.csv=KG or --payload " in said
     main([*arguments, "--payload", "laden=unknown"])
     assert "carry something" not in capsys.readouterr().out
 
@@ -352,26 +353,29 @@ def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
 def test_where_the_scale_comes_from_is_said(folder):
     numbers = robot_numbers(folder / "arm.xml")
     recordings = [Recording(record(0, 12.0))]
-    assert real_arms.initial_arm(numbers, recordings, tuple(GAIN), "auto")[1] == "gains"
-    assert real_arms.initial_arm(numbers, recordings, (), "auto")[1] == "masses"
+    assert initial_arm(numbers, recordings, tuple(GAIN), "auto")[1] == "gains"
+    assert initial_arm(numbers, recordings, (), "auto")[1] == "masses"
     (one,) = recordings
     ur10e = [Recording(dataclasses.replace(one.trace, meta={"columns": "ur10e"}))]
     with pytest.raises(ValueError, match="6 numbers for 3 joints"):
-        real_arms.initial_arm(numbers, ur10e, (), "auto")
+        initial_arm(numbers, ur10e, (), "auto")
     assert load_arm(folder / "arm.xml") is None
 
 
-def test_a_linear_axis_has_its_own_units_in_the_table(capsys):
-    robot = SimpleNamespace(prismatic=[False, True])
-    kinds = ("drive_gain", "gain_relative_sd", "mass", "armature", "rms_nm", "speed_rad_s")
-    numbers = {kind: [1.0, 2.0] for kind in kinds} | {"moves": [True, True]}
-    held = {"held_out_rms_nm": {"a.csv": [1.0, 2.0]}, "loads_kg": {"a.csv": 0.0}}
-    result = {"joints": ["turn", "rail"], "scale": "gains", "robot": "r.xml"} | numbers | held
-    report(result, SimpleNamespace(arm=SimpleNamespace(robot=robot), notes=()), "")
-    out = capsys.readouterr().out
-    assert "rail (linear: N, m, kg)" in out
-    assert "turn [N m]" in out
-    assert "rail [N]" in out
+def test_a_linear_axis_has_its_own_units_in_the_table():
+    robot = SimpleNamespace(
+        joint_names=("turn", "rail"),
+        prismatic=[False, True],
+        inertial=np.ones((2, 10)),
+        armature=np.ones(2),
+    )
+    arm, ones = SimpleNamespace(robot=robot, drive_gain=np.ones(2)), np.ones(2)
+    held = {"a.csv": np.array([1.0, 2.0])}
+    loads = {"a.csv": 0.0}
+    text = str(Calibration(arm, "gains", ones, held, loads, 0 * ones, ones, ones > 0))
+    assert "rail (linear: N, m, kg)" in text
+    assert "turn [N m]" in text
+    assert "rail [N]" in text
 
 
 def tabled(folder, name, trace, effort, scale=1.0, velocities=True):
@@ -394,7 +398,7 @@ def test_torques_need_no_gains_and_velocities_may_lack(tmp_path, capsys):
         for k in range(3)
     ]
     common = ["--robot", str(tmp_path / "arm.xml"), "--columns", logs[0][1]]
-    model, card = str(tmp_path / "model.skops"), tmp_path / "card.png"
+    model, card = str(tmp_path / "model.tauguard"), tmp_path / "card.png"
     files = [log for log, _ in logs]
     main(["train", "--free", *files[:2], *common, "--model", model, "--card", str(card)])
     out = capsys.readouterr().out
@@ -425,7 +429,7 @@ def test_joints_that_the_log_lacks_are_held(tmp_path, capsys):
     files = [log for log, _ in logs]
     main(["calibrate", *files, *common, str(tmp_path / "arm.xml"), "--out", str(out)])
     assert "the log lacks finger of arm.xml: held fixed at 0" in capsys.readouterr().out
-    model = str(tmp_path / "model.skops")
+    model = str(tmp_path / "model.tauguard")
     main(["train", "--free", *files, *common, str(out), "--model", model])
     main(["detect", files[0], *common, str(out), "--model", model])
     assert "0 alarms" in capsys.readouterr().out
@@ -445,7 +449,7 @@ def test_a_log_of_pushes_among_free_ones_is_named_and_left_out(folder, calibrate
         trace = add_contact(trace, GAIN, Added(start, 0.4, (14.0, -18.0, 9.0), "push"))
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
     arguments = ["train", "--free", *logs, written(folder, "touched.csv", trace)]
-    arguments += [*flags(folder, calibrated.name), "--model", str(folder / "touched.skops")]
+    arguments += [*flags(folder, calibrated.name), "--model", str(folder / "touched.tauguard")]
     main(arguments)
     out = " ".join(capsys.readouterr().out.split())
     assert "touched.csv stands out: 6 alarms at 3." in out
@@ -461,7 +465,7 @@ def test_a_log_of_pushes_among_free_ones_is_named_and_left_out(folder, calibrate
 
 def test_a_standing_arm_alone_is_watched_while_it_stands(folder, tmp_path, capsys):
     trace = record(5, dwell=(-1.0, 99.0))
-    log, model = written(tmp_path, "still.csv", trace), str(tmp_path / "m.skops")
+    log, model = written(tmp_path, "still.csv", trace), str(tmp_path / "m.tauguard")
     main(["train", "--free", log, *flags(folder), "--gains", *GAINS, "--model", model])
     out = capsys.readouterr().out
     assert "a, b, c: moves in none of the logs" in out
@@ -482,7 +486,7 @@ def test_a_standing_log_that_is_touched_all_along_is_refused(folder, tmp_path, c
     trace = record(5, dwell=(-1.0, 99.0))
     for start in np.arange(2.0, 24.0, 0.8):
         trace = add_contact(trace, GAIN, Added(start, 0.5, (2.0, -2.0, 1.0), "push"))
-    log, model = written(tmp_path, "touched.csv", trace), tmp_path / "m.skops"
+    log, model = written(tmp_path, "touched.csv", trace), tmp_path / "m.tauguard"
     train = ["train", "--free", log, *flags(folder), "--gains", *GAINS, "--model", str(model)]
     line = refused_until_accepted(capsys, train, model)
     assert "touched.csv: 28 alarms at 2." in line
@@ -493,7 +497,7 @@ def test_time_is_unwatched_while_a_joint_of_unknown_motion_stands_elsewhere(
     folder, tmp_path, capsys
 ):
     logs = [written(tmp_path, f"held{k}.csv", held_joint(k)) for k in range(3)]
-    model, json_file = str(tmp_path / "m.skops"), tmp_path / "found.json"
+    model, json_file = str(tmp_path / "m.tauguard"), tmp_path / "found.json"
     main(["train", "--free", *logs, *flags(folder), "--gains", *GAINS, "--model", model])
     trace = held_joint(7)
     moved = dataclasses.replace(trace, q=trace.q + np.array([0.0, 0.0, 0.6]))

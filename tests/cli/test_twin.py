@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tauguard.cli import main
+from tauguard.datasets import TwinEpisodes, twin_contacts
 from tauguard.datasets.recordings import labelled
 from tauguard.detectors import load_model
 from tauguard.detectors.calibration.recording import Load, cut
@@ -111,8 +112,8 @@ def test_from_logs_to_detection(folder, made, capsys):
 
 def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, capsys):
     model = tmp_path / "model.tauguard"
-    for name, count in (("STRUCK", 4), ("CONTACTS", 2)):
-        monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
+    few = TwinEpisodes(episodes=4, contacts=2)
+    monkeypatch.setattr("tauguard.datasets.twin_contacts", lambda path: twin_contacts(path, few))
     run(folder, "train", "--twin", made, "--free", folder / "free", "--model", model)
     said = capsys.readouterr().out
     assert "free-motion and srq-svr, trained on 3 logs and" in said
@@ -139,7 +140,7 @@ def test_contacts_are_learned_on_the_twin(folder, made, tmp_path, monkeypatch, c
     other.write_text(f'file = "{folder / "arm.xml"}"')
     with pytest.raises(SystemExit):
         run(folder, "train", "--twin", other, "--free", folder / "free", "--model", model)
-    assert "not a file that `tauguard twin` wrote" in capsys.readouterr().err
+    assert "not the file of a twin" in capsys.readouterr().err
 
 
 def test_clipped_currents_and_gaps_are_named(folder, tmp_path, capsys):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, RobotNumbers, SrqSvr, train
+from tauguard.detectors import ArmModel, RobotNumbers, SrqSvr
+from tauguard.detectors.alarms.training import train
 from tauguard.envs import simulate
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
 

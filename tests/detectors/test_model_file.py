@@ -22,9 +22,9 @@ from tauguard.detectors import (
     model_archive,
     registry,
     save_model,
-    train,
 )
 from tauguard.detectors import model_file as files
+from tauguard.detectors.alarms.training import train
 from tauguard.detectors.registry import make_detector
 from tauguard.findings import ArgumentError, ModelFileError
 from tauguard.traces import Trace

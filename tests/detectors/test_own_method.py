@@ -9,7 +9,8 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-from tauguard.detectors import load_model, make_detector, registry, save_model, with_rate
+from tauguard.detectors import load_model, make_detector, registry, save_model
+from tauguard.detectors.alarms.training import with_rate
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own_detector.md"
 

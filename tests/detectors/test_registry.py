@@ -11,14 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors import (
-    CollisionAlarm,
-    calibrate,
-    held_out,
-    load_model,
-    model_file,
-    save_model,
-)
+from tauguard.detectors import CollisionAlarm, load_model, model_file, save_model
+from tauguard.detectors.alarms.training import held_out
+from tauguard.detectors.calibration.calibrate import calibrate
 from tauguard.detectors.events import free_rows
 from tauguard.detectors.features import front_end
 from tauguard.detectors.registry import DETECTORS, make_detector

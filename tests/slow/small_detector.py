@@ -22,7 +22,8 @@ def bare_arm() -> ArmModel:
 
 def trained(traces: Sequence[Trace], rate: float, per_hour: float, name: str) -> CollisionAlarm:
     """Train the method ``name`` on collision-free motion at ``rate`` [Hz]."""
-    from tauguard.detectors import make_detector, train
+    from tauguard.detectors import make_detector
+    from tauguard.detectors.alarms.training import train
     from tauguard.traces import Trace
 
     thinned = []

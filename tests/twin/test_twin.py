@@ -8,7 +8,7 @@ import pytest
 from tauguard.detectors import ArmModel, FrictionModel, observe
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models import Friction, load_arm
-from tauguard.twin import compare, identify_twin, with_intervals
+from tauguard.twin import compare, fit_twin, with_intervals
 from tauguard.twin.description import write_twin
 from tauguard.twin.drive_fit import fit_friction
 from tauguard.twin.identify import USUAL, left_over, turned
@@ -40,7 +40,7 @@ def logs():
 
 @pytest.fixture(scope="module")
 def twin(arm, logs):
-    return identify_twin(arm, logs[:2], np.full(3, 30.0))
+    return fit_twin(arm, logs[:2], np.full(3, 30.0))
 
 
 def test_friction_of_a_known_arm_is_found(twin):
@@ -68,7 +68,7 @@ def test_the_twin_is_more_like_its_arm_than_one_without_friction(arm, logs, twin
 
 
 def test_a_joint_that_never_moves_keeps_a_prior_and_is_named(arm):
-    found = identify_twin(arm, [held_joint(1), held_joint(2)], np.full(3, 30.0))
+    found = fit_twin(arm, [held_joint(1), held_joint(2)], np.full(3, 30.0))
     assert found.fits[2] is None
     assert found.notes[0].startswith("c: hardly moves")
     assert found.drive.friction.coulomb[2] > 0
@@ -77,7 +77,7 @@ def test_a_joint_that_never_moves_keeps_a_prior_and_is_named(arm):
 def test_logs_without_motion_are_refused(arm, logs):
     still = replace(logs[0], qd=0 * logs[0].qd)
     with pytest.raises(ValueError, match="no joint moves"):
-        identify_twin(arm, [still], np.full(3, 30.0))
+        fit_twin(arm, [still], np.full(3, 30.0))
 
 
 def test_the_description_is_the_robot_that_is_simulated(twin, tmp_path):
@@ -180,7 +180,7 @@ def test_a_log_is_cut_at_its_gaps(logs):
 
 
 def test_intervals_hold_the_friction_of_a_known_arm(arm, logs, twin):
-    rest = [identify_twin(arm, [log], np.full(3, 30.0)) for log in logs[:2]]
+    rest = [fit_twin(arm, [log], np.full(3, 30.0)) for log in logs[:2]]
     found = with_intervals(twin, rest)
     away = np.abs(found.number("viscous") - VISCOUS)
     assert (away < found.intervals["viscous"]).all()

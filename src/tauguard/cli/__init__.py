@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 
 from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
-from tauguard.findings import ArgumentError, as_flags
+from tauguard.findings import ArgumentError, TauguardError, as_flags
 
 COMMANDS = {
     "demo": "simulate an arm, train a detector, detect collisions, write a recording",
@@ -106,6 +106,11 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
     except Exception as error:
         if debug:
             raise
+        if isinstance(error, TauguardError):
+            from tauguard.cli.output import causes, print_findings
+
+            print_findings(error.findings)
+            fail(*(f"{name}: {cause}" for cause in causes(error)))
         if isinstance(error, ValueError | OSError):
             fail(f"{name}: {said(error)}")
         kind, wanted = type(error).__name__, os.environ.get("MUJOCO_GL")
@@ -114,7 +119,7 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
                 f"{name}: MUJOCO_GL={wanted}: MuJoCo finds no such OpenGL; install libegl1 for egl "
                 "or libosmesa6 for osmesa, or unset it"
             )
-        fail(f"{name}: a defect of tauguard (--debug shows where): {kind}: {error}", 1)
+        fail(f"{name}: a defect of tauguard (--debug shows where): {kind}: {error}", code=1)
 
 
 def said(error: Exception) -> str:
@@ -133,8 +138,9 @@ def expect(flag: str, value: float, least: float, most: float = float("inf")) ->
         raise ArgumentError(f"{flag} {value:g}: expected {wanted}")
 
 
-def fail(message: str, code: int = 2) -> None:
-    """Print one line to standard error and exit with ``code`` (``SystemExit``)."""
-    line = " ".join(as_flags(message).split())
-    print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
+def fail(*messages: str, code: int = 2) -> None:
+    """Print one line per message to standard error and exit with ``code`` (``SystemExit``)."""
+    for message in messages:
+        line = " ".join(as_flags(message).split())
+        print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
     raise SystemExit(code)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.detectors import CollisionAlarm, FreeScores, Matching
+    from tauguard.detectors import CollisionAlarm, Matching
+    from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 

@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING, Any
 from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
-    from tauguard.detectors import CollisionAlarm, Matching
-    from tauguard.replay.events import EventFolder
-    from tauguard.traces import Trace
-
-    #: Name of a split or folder, its matched recordings, and their metrics.
-    Part = tuple[str, list[Matching], dict[str, Any]]
+    from tauguard import Detector, Evaluation
+    from tauguard.replay import EventFolder
 
 
 def command(
@@ -49,11 +45,10 @@ def command(
             file of its recording; with --data by SPLIT/NUMBER, as for `tauguard inspect --episode`.
         late: with --events, delay above which a detection is late [s].
     """
-    from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
-    from tauguard.replay.events import EventFolder, command_to_open
+    from tauguard.replay import EventFolder, command_to_open
     from tauguard.report import measured, write_json
 
-    wrong = None
+    errors = None
     if alarms is not None:
         if data is None or detector is not None or events is not None:
             raise ArgumentError("--alarms goes with --data, and not with --detector or --events")
@@ -61,82 +56,56 @@ def command(
     else:
         if (traces is None) == (data is None):
             raise ArgumentError("give --traces (a folder of recordings) or --data (a dataset)")
-        alarm = loaded(model, detector)
-        wrong = None if events is None else EventFolder(events, late, alarm)
-        parts = of_model(alarm, traces, data, splits, wrong)
+        trained = loaded(model, detector)
+        errors = None if events is None else EventFolder(events, late, trained.alarm)
+        parts = of_model(trained, traces, data, splits, errors)
     rows: list[dict[str, Any]] = []
-    for name, matchings, summary in parts:
-        rows.append({"split": name, **summary} if data is not None else summary)
-        print(f"{len(matchings)} recordings in {name}")
-        print(text(summary))
-        if "diagnosis" in summary:
-            print(diagnosis_text(summary["diagnosis"]))
+    for name, found in parts:
+        metrics = found.to_dict()
+        rows.append(metrics if data is None else {"split": name, **metrics})
+        print(f"{len(found.names)} recordings in {name}\n{found}")
         if figure is not None:
-            drawn = figure if data is None else figure.with_stem(f"{figure.stem}-{name}")
-            draw(drawn, summary, matchings)
-    if wrong is not None:
-        page = wrong.finish()
+            found.draw(figure if data is None else figure.with_stem(f"{figure.stem}-{name}"))
+    if errors is not None:
+        page = errors.finish()
         print(f"{page}: open it with `{command_to_open(page.parent)}`")
     if json is not None:
         write_json(json, measured("evaluate", rows))
 
 
-def loaded(model: Path, detector: str | None) -> CollisionAlarm:
-    """The model in a file; ``detector`` names its class if that is the user's own."""
-    from tauguard.detectors import load_model
-    from tauguard.detectors.registry import make_detector
+def loaded(model: Path, method: str | None) -> Detector:
+    """The detector in a file; ``method`` names its class if that is the user's own."""
+    import tauguard as tg
+    from tauguard.detectors import make_detector
 
-    if detector is not None:
-        make_detector(detector)
-    return load_model(model)
+    if method is not None:
+        make_detector(method)
+    return tg.load_detector(model)
 
 
-def of_file(data: Path, alarms: Path, splits: tuple[str, ...]) -> Iterator[Part]:
+def of_file(data: Path, alarms: Path, splits: tuple[str, ...]) -> Iterator[tuple[str, Evaluation]]:
     """Match the alarms of a file with the collisions of a dataset, split by split."""
-    from tauguard.datasets.alarm_files import judged_alarms
-    from tauguard.detectors import detection_metrics
+    from tauguard import Evaluation
+    from tauguard.datasets import judged_alarms
 
     for name, matchings in judged_alarms(data, alarms, splits):
-        yield name, matchings, detection_metrics(matchings)
+        yield name, Evaluation.of([str(k) for k in range(len(matchings))], matchings)
 
 
 def of_model(
-    alarm: CollisionAlarm,
+    detector: Detector,
     traces: Path | None,
     data: Path | None,
     splits: tuple[str, ...],
-    wrong: EventFolder | None,
-) -> Iterator[Part]:
+    errors: EventFolder | None,
+) -> Iterator[tuple[str, Evaluation]]:
     """Evaluate a detector on the splits of a dataset, or on a folder of recordings."""
-    from tauguard.datasets.reader import episodes_of_splits
-    from tauguard.datasets.recordings import labelled
+    import tauguard as tg
+    from tauguard.datasets import episodes_of_splits
 
-    if data is not None:
-        parts = episodes_of_splits(data, alarm.detector.arm.robot, splits)
-    else:
-        parts = iter([(str(traces), iter(labelled(Path(str(traces)))))])
-    for name, recordings in parts:
-        yield name, *evaluated(alarm, recordings, wrong)
-
-
-def evaluated(
-    alarm: CollisionAlarm, recordings: Iterable[Trace], wrong: EventFolder | None
-) -> tuple[list[Matching], dict[str, Any]]:
-    """Match alarms with the truth and compute all metrics; ``wrong`` records the errors."""
-    from tauguard.detectors import detection_metrics, diagnosis_metrics
-    from tauguard.detectors.evaluation.diagnosis_metrics import judge_recording
-
-    matchings, said = [], []
-    for number, trace in enumerate(recordings):
-        name = name_of(trace, number)
-        one = judge_recording(alarm, name, trace)
-        matchings.append(one.matching)
-        said += one.diagnoses(alarm)
-        if wrong is not None:
-            wrong.add(name, one.matching, (trace, one.detection))
-    return matchings, {**detection_metrics(matchings), "diagnosis": diagnosis_metrics(said)}
-
-
-def name_of(trace: Trace, number: int) -> str:
-    """The name of a recording: its file, or its split and number in the dataset."""
-    return trace.meta.get("log") or trace.meta.get("episode") or str(number)
+    visit = None if errors is None else errors.add
+    if data is None:
+        yield str(traces), tg.evaluate(detector, tg.read_logs(str(traces)), visit)
+        return
+    for name, recordings in episodes_of_splits(data, detector.arm.robot, splits):
+        yield name, tg.evaluate(detector, recordings, visit)

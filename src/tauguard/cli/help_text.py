@@ -1,14 +1,12 @@
-"""Text helpers of all commands: arguments in ``--help``, and notes."""
+"""The text of arguments in ``--help``."""
 
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
-
-from tauguard.findings import Finding, as_flags
 
 #: An argument of a docstring: its name, and its text with continuation lines.
 ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
@@ -37,9 +35,3 @@ def tidy(command: Callable[..., Any]) -> None:
         )
         hints[name] = Annotated[hints[name], shown]
     command.__annotations__ = hints
-
-
-def print_notes(notes: Iterable[Finding | str]) -> None:
-    """Print one line per note, with the names of arguments as flags."""
-    for note in notes:
-        print(f"note: {as_flags(note if isinstance(note, str) else note.text)}")

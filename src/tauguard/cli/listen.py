@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tauguard.findings import ArgumentError
+from tauguard.findings import ArgumentError, as_flags
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,16 +64,12 @@ def command(
         record: write the received samples as MCAP here.
         rerun: `view` opens the rerun viewer; FILE.rrd records the same display in a file.
     """
+    import tauguard as tg
     from tauguard.cli import expect
-    from tauguard.datasets.real_arms import check_robot
-    from tauguard.detectors import load_model
-    from tauguard.detectors.alarms.monitor import Monitor
-    from tauguard.detectors.calibration.joints import robot_numbers
+    from tauguard.cli.payload import load
     from tauguard.live.display import BackgroundDisplay
     from tauguard.live.session import listen
-    from tauguard.models.robot import bodies_file
 
-    robot = bodies_file(robot)
     sources = (ur is not None, play is not None, stdin, ros is not None)
     if sum(sources) != 1:
         raise ArgumentError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")
@@ -90,10 +86,13 @@ def command(
     expect("--seconds", seconds, 0)
     expect("--reconnect", reconnect, 0)
     expect("--port", port, 1, 65535)
-    alarm = with_load(load_model(model), model, payload, torque)
-    if alarm.inputs is None:
-        raise ArgumentError(f"{model}: has no limits of usual samples; train the detector anew")
-    check_robot(robot_numbers(robot), robot, alarm.detector.arm.robot, model)
+    carried = None if payload is None else load(payload)
+    detector = tg.load_detector(model, robot)
+    if torque and not (detector.arm.drive_gain == 1).all():
+        raise ArgumentError(f"--torque: {model} was trained on currents")
+    detector = detector if carried is None else detector.carrying(carried)
+    alarm, monitor = detector.alarm, detector.stream()
+    robot = detector.robot or robot
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)
         source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))
@@ -101,7 +100,6 @@ def command(
         views = [stack.enter_context(BackgroundDisplay(Terminal(alarm.threshold).show))]
         if rerun is not None:
             views.append(stack.enter_context(BackgroundDisplay(charts(robot, shown, alarm))))
-        monitor = Monitor(alarm, alarm.inputs)
 
         def show(sample: Sample, answer: Answer) -> None:
             for view in views:
@@ -119,24 +117,6 @@ def command(
         write_json(json, result)
     if session.lost:
         raise SystemExit(3)
-
-
-def with_load(
-    alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
-) -> CollisionAlarm:
-    """The detector for an arm with this load.
-
-    Raises:
-        ArgumentError: ``torque``, although the detector was trained on currents.
-    """
-    from tauguard.cli.payload import load
-    from tauguard.datasets.arm_logs import load_of
-    from tauguard.detectors.alarms.training import carrying
-    from tauguard.traces import Load
-
-    if torque and not (alarm.detector.arm.drive_gain == 1).all():
-        raise ArgumentError(f"--torque: {model} was trained on currents")
-    return alarm if payload is None else carrying(alarm, load_of(load(payload)) or Load())
 
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
@@ -172,7 +152,6 @@ def opened(
     if ur is not None:
         return UrStream(ur, port, 1 / dt, reconnect)
     if play is not None:
-        from tauguard.cli.help_text import print_notes
         from tauguard.datasets.columns import column_map
         from tauguard.datasets.log_table import Options
         from tauguard.datasets.logs import read_source
@@ -180,7 +159,8 @@ def opened(
 
         options = Options(column_map(columns), names, robot_joints=names)
         log = read_source(play, play.name, options)
-        print_notes(f"{play.name}: {note.text}" for note in log.findings)
+        for note in log.findings:
+            print(f"note: {play.name}: {as_flags(note.text)}")
         return PlayedStream(matched(log.trace, names))
     if ros is not None:
         from tauguard.live.ros import RosStream

@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from tauguard.datasets.columns import AS_IS, Reading
+from tauguard.datasets import AS_IS, Reading
 from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from tauguard.detectors import ArmModel
-    from tauguard.detectors.calibration.recording import Recording
-    from tauguard.detectors.evaluation.cross_validation import CrossValidation
-    from tauguard.detectors.scores.free_motion import FittedFreeMotion
-    from tauguard.traces import Trace
+    from tauguard import Detector
 
 
 def command(
@@ -40,6 +36,7 @@ def command(
     arm: str | None = None,
     folds: int | None = None,
     reading: Annotated[Reading, tyro.conf.arg(name="")] = AS_IS,
+    json: Path | None = None,
 ) -> None:
     """Train a detector and write its model file.
 
@@ -83,26 +80,39 @@ def command(
             fold needs one more training (default: 3). 1 is quicker, but only a third of the
             recordings then set the threshold.
         reading: with --free, how logs are read.
+        json: write the results here as JSON.
     """
     _check_flags({name for name, value in locals().items() if value != DEFAULTS[name]})
+
+    import tauguard as tg
+    from tauguard.cli.output import print_findings
+    from tauguard.cli.read import read_free
+    from tauguard.datasets import twin_contacts
+    from tauguard.report import write_json
+
     if folds is not None and folds < 1:
         raise ArgumentError(f"--folds {folds}: expected 1 or more")
     target = _target(model)
     rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
     if traces is not None:
-        sure = 0.95 if confidence is None else confidence
-        labelled_motion(traces, target, detector, calibration, rate, sure, arm, folds)
+        trained = labelled_motion(traces, detector, calibration, rate, confidence, arm, folds)
     elif twin is not None:
-        from tauguard.cli.train_twin import twin_contacts
-
-        twin_contacts(twin, free, target, columns, detector, rate, torque, reading)
+        logs = read_free(free, twin, columns, (), torque, reading)
+        simulated, believed = twin_contacts(twin)
+        trained = tg.train(logs, believed, detector, false_alarms_per_hour=rate, contacts=simulated)
     elif robot is None:
         raise ArgumentError("--free needs --robot")
     else:
-        from tauguard.models.robot import bodies_file
-
-        args = (columns, gains, payload, torque, card, accept, rate, reading)
-        free_motion(free, bodies_file(robot), target, *args)
+        logs = read_free(free, robot, columns, payload, torque, reading)
+        trained = tg.train(logs, gains=gains, false_alarms_per_hour=rate, accept=accept)
+    trained.save(target)
+    print_findings(trained.findings)
+    print(f"{target}: {trained}")
+    if card is not None:
+        trained.card().draw(card)
+        print(f"{card}: drawn")
+    if json is not None:
+        write_json(json, trained.to_dict())
 
 
 DEFAULTS = {name: one.default for name, one in inspect.signature(command).parameters.items()}
@@ -150,164 +160,25 @@ def _target(model: Path | None) -> Path:
 
 def labelled_motion(
     traces: Path,
-    model: Path,
-    name: str,
+    method: str,
     calibration: Path | None,
     rate: float,
-    confidence: float,
-    arm: str | None = None,
-    folds: int | None = None,
-) -> None:
+    confidence: float | None,
+    arm: str | None,
+    folds: int | None,
+) -> Detector:
     """Train on labelled recordings."""
-    from tauguard.datasets.recordings import labelled
-    from tauguard.detectors import make_detector, save_model, with_guarantee
-    from tauguard.detectors.alarms.training import FOLDS, train_and_score
-    from tauguard.detectors.calibration.nominal import nominal_arm
-    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
-    from tauguard.detectors.thresholds.guarantee import check_guarantee
-    from tauguard.report import two_digits
+    import tauguard as tg
 
-    # Check inputs and guarantee first, because the training takes minutes.
-    method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ArgumentError(
             f"--calibration {calibration}: the same folder as --traces; give other recordings"
         )
-    free = labelled(calibration) if calibration is not None else []
-    if free:
-        check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
-    recordings = labelled(traces, arm)
-    parts = 1 if free else folds or FOLDS  # --calibration replaces the threshold
-    alarm, scores = train_and_score(method, recordings, nominal_arm(recordings), rate, parts)
-    guarantee = None
-    if free:
-        alarm, guarantee = with_guarantee(alarm, free, rate, confidence)
-    save_model(alarm, model)
-    collisions = sum(len(t.truth.collisions) for t in recordings if t.truth)
-    print(
-        f"{model}: {name} trained on {len(recordings)} recordings with {collisions} collisions, "
-        f"threshold {alarm.threshold:.3g}"
+    return tg.train(
+        tg.read_logs(traces, arm=arm),
+        method=method,
+        false_alarms_per_hour=rate,
+        folds=3 if folds is None else folds,
+        calibration=None if calibration is None else tg.read_logs(calibration),
+        confidence=0.95 if confidence is None else confidence,
     )
-    if guarantee is None:
-        print(ExpectedRate.of(scores).at(alarm.threshold, rate))
-    else:
-        hours = two_digits(guarantee.hours)
-        print(
-            f"guaranteed: at most {rate:g} false alarms per hour on motion like that of "
-            f"{calibration} ({guarantee.episodes} episodes, {hours} h), with a "
-            f"confidence of {guarantee.confidence:.0%}"
-        )
-
-
-def free_motion(
-    free: tuple[Path, ...],
-    robot: Path,
-    model: Path,
-    columns: str | None,
-    gains: tuple[float, ...],
-    payload: tuple[str, ...],
-    torque: bool,
-    card: Path | None,
-    accept: tuple[str, ...] = (),
-    per_hour: float = 10.0,
-    reading: Reading | None = None,
-) -> None:
-    """Train on logs in which nothing should have touched the arm."""
-    from tauguard.cli.free_logs import ACCEPTABLE, free_arm, free_detector, read_real, run_check
-    from tauguard.cli.help_text import print_notes
-    from tauguard.detectors import save_model
-    from tauguard.detectors.alarms.training import free_alarm
-    from tauguard.detectors.evaluation.acceptance import check_own_alarms, check_own_error
-    from tauguard.detectors.features.motion_regimes import unseen_motion
-
-    read = read_real(free, robot, columns, payload, torque, reading)
-    print_notes(read.findings)
-    own: dict[str, Recording] = dict(read)
-    arm, _ = free_arm(robot, read.numbers, own, gains)
-    logs_kept = [name for name in accept if name not in ACCEPTABLE]
-    own, validation = validated_logs(own, arm, logs_kept)
-    traces = {name: recording.trace for name, recording in own.items()}
-    detector = free_detector(arm, own, accept)
-    print_notes(unseen_motion(list(traces.values())))
-    held = [log for log in validation.kept if log not in validation.accepted]
-    run_check("error", accept, lambda: check_own_error(held))
-    run_check("alarms", accept, lambda: check_own_alarms(held, per_hour))
-    save_model(free_alarm(detector, list(traces.values())), model, robot)
-    logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
-    print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
-    show_card(detector, list(traces.values()), validation, card)
-
-
-def validated_logs(
-    recordings: dict[str, Recording], arm: ArmModel, accept: Sequence[str]
-) -> tuple[dict[str, Recording], CrossValidation]:
-    """Return the logs for the training, and print notes on logs that are left out or differ.
-
-    Args:
-        recordings: by file name.
-        arm: nominal numbers and drive gains.
-        accept: names of logs to keep in any case.
-
-    Raises:
-        ArgumentError: a name in ``accept`` is not that of a log.
-    """
-    from tauguard.cli.help_text import print_notes
-    from tauguard.detectors.evaluation.cross_validation import cross_validate
-    from tauguard.traces.logs import log_named
-
-    names = list(recordings)
-    accepted = [log_named(name, f"--accept {name}", names) for name in accept]
-    validation = cross_validate(recordings, arm, accepted)
-    print_notes(odd_notes(validation))
-    out = {log.name for log in validation.left_out}
-    return {name: recordings[name] for name in names if name not in out}, validation
-
-
-def odd_notes(validation: CrossValidation) -> list[str]:
-    """A line on each log with far more alarms than the others, or with other torques throughout."""
-    from tauguard.detectors.evaluation.card_page import times
-
-    notes = []
-    count = sum(len(log.alarms) for log in validation.kept) or "none"
-    others = f"{count} in {sum(log.seconds for log in validation.kept) / 60:.1f} min"
-    for log in validation.left_out:
-        cause = (
-            f"a load (then give --payload {log.name}=KG or =unknown), another temperature"
-            if log.throughout
-            else "something touched the arm"
-        )
-        notes.append(
-            f"{log.name} stands out: {times(log)}, judged by thresholds from the other logs, which "
-            f"have {others}. Possible causes: {cause}, or a motion that the others lack. The log "
-            "is left out of the training; if nothing touched the arm, keep it with --accept "
-            f"{log.name}"
-        )
-    notes += [
-        f"{log.name} stands out ({times(log)}) and is kept as --accept says: if it contains a "
-        "contact, the thresholds rise, and similar contacts are missed"
-        for log in validation.accepted
-    ]
-    notes += [
-        f"{log.name}: its torques differ throughout from those of the other logs: did the arm "
-        f"carry something (then give --payload {log.name}=KG or =unknown)?"
-        for log in validation.kept
-        if log.throughout
-    ]
-    return notes
-
-
-def show_card(
-    detector: FittedFreeMotion,
-    traces: list[Trace],
-    validation: CrossValidation,
-    target: Path | None,
-) -> None:
-    """Print the threshold card of the detector, and draw it if ``target`` is given."""
-    from tauguard.detectors.evaluation.card_page import draw, text
-    from tauguard.detectors.evaluation.threshold_card import threshold_card
-
-    found = threshold_card(detector, traces, validation)
-    print(text(found))
-    if target is not None:
-        draw(target, found)
-        print(f"{target}: drawn")

@@ -7,19 +7,12 @@ import pytest
 from scipy.spatial.distance import pdist
 
 from tauguard.datasets.plans import free_episodes
-from tauguard.detectors import (
-    ArmModel,
-    PlainSrqSvr,
-    SrqSvr,
-    detection_metrics,
-    held_out,
-    match_detection,
-    train,
-)
-from tauguard.detectors.alarms.training import left_out, train_and_score, with_rate
+from tauguard.detectors import ArmModel, SrqSvr, detection_metrics, match_detection
+from tauguard.detectors.alarms.training import held_out, left_out, train, train_and_score, with_rate
 from tauguard.detectors.features.front_end import FrontEndSettings
 from tauguard.detectors.samples import plain_rate
 from tauguard.detectors.scores.baselines import MovingThresholds
+from tauguard.detectors.scores.windowed import PlainSrqSvr
 from tauguard.detectors.thresholds.free_scores import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate

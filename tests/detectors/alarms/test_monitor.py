@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.detectors import CollisionAlarm, Estimator, Unknowns
+from tauguard.detectors import CollisionAlarm, Estimator
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Monitor
-from tauguard.detectors.estimation.estimator import MOTION
+from tauguard.detectors.estimation.estimator import MOTION, Unknowns
 from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.envs.gym.sensing import AlarmListener
 from tauguard.live.packets import Fault, Packets

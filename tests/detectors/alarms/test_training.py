@@ -37,7 +37,7 @@ def test_a_log_is_scored_by_a_detector_and_an_arm_model_made_without_it(count, f
     logs = [record(seed) for seed in range(count)]
     alarm, scores, notes, seen, whole = trained(logs)
     assert len(scores) == count
-    (note,) = notes
+    (note,) = (finding.text for finding in notes)
     assert f"is {factor:.2g} times the highest score of {count} logs" in note
     # Beyond all logs, the more the fewer they are; free motion's thresholds take the floor's place.
     assert alarm.threshold >= factor * max(one.peak for one in scores) * (1 - 1e-12)
@@ -60,7 +60,8 @@ def test_a_log_is_scored_by_a_detector_and_an_arm_model_made_without_it(count, f
 
 def test_a_log_without_which_the_others_are_too_short_is_named():
     long, short = record(0), cut(record(1), slice(0, 700))
-    _, _, (note, floor), seen, whole = trained([long, short])
+    _, _, notes, seen, whole = trained([long, short])
+    note, floor = (finding.text for finding in notes)
     assert note.startswith("log0: scored by the arm model calibrated with it")
     assert "because the rest has 7.0 s of motion" in note
     assert seen[0][1] is whole
@@ -70,7 +71,7 @@ def test_a_log_without_which_the_others_are_too_short_is_named():
 
 def test_halves_of_one_log_count_as_two():
     *_, notes, _, _ = trained([record(0)])
-    assert "times the highest score of 2 halves of a log" in notes[-1]
+    assert "times the highest score of 2 halves of a log" in notes[-1].text
 
 
 @pytest.mark.parametrize("count", [0, 2])
@@ -81,7 +82,7 @@ def test_logs_in_which_no_joint_moves_are_scored_too(count):
     named = {f"log{k}": log for k, log in enumerate(logs)}
     _, scores, notes = train_beside(Watched(), [], named, whole, 10.0)
     assert len(scores) == len(logs)
-    assert any("the rest has 0.0 s of motion" in note for note in notes) == (count == 0)
+    assert any("the rest has 0.0 s of motion" in note.text for note in notes) == (count == 0)
 
 
 def test_other_errors_of_the_calibration_are_not_hidden(monkeypatch):
@@ -99,4 +100,4 @@ def test_many_logs_leave_the_threshold_to_the_rate():
     logs = [cut(record(k), slice(s, s + 400)) for k in range(5) for s in (100, 1100, 1500, 2000)]
     _, scores, notes, _, _ = trained(logs)
     assert len(scores) == 20
-    assert not any("few logs" in note for note in notes)
+    assert not any("few logs" in note.text for note in notes)

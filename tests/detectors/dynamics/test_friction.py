@@ -7,14 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors import (
-    ArmModel,
-    Estimator,
-    FrictionModel,
-    Unknowns,
-    calibrate,
-    gravity_torque,
-)
+from tauguard.detectors import ArmModel, Estimator, FrictionModel, gravity_torque
+from tauguard.detectors.calibration.calibrate import calibrate
+from tauguard.detectors.estimation.estimator import Unknowns
 from tauguard.models import Mismatch, cura6_drive
 from tests.detectors.synthetic_arm import nominal
 

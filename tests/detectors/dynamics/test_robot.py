@@ -6,14 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors import (
-    RobotNumbers,
-    gravity_torque,
-    inverse_dynamics,
-    mass_matrix,
-    momentum_regressor,
-    momentum_terms,
-)
+from tauguard.detectors import RobotNumbers, gravity_torque, inverse_dynamics, mass_matrix
+from tauguard.detectors.dynamics.robot import momentum_regressor, momentum_terms
 from tauguard.models import cura6, pin_model
 
 

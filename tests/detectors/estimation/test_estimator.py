@@ -5,14 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.detectors import (
-    ArmModel,
-    Estimator,
-    FrictionModel,
-    Unknowns,
-    mass_matrix,
-    observe,
-)
+from tauguard.detectors import ArmModel, Estimator, FrictionModel, mass_matrix, observe
+from tauguard.detectors.estimation.estimator import Unknowns
 from tauguard.traces import resampled
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tauguard.detectors import ArmModel, Estimator, RobotNumbers, Unknowns
+from tauguard.detectors import ArmModel, Estimator, RobotNumbers
+from tauguard.detectors.estimation.estimator import Unknowns
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.traces import Trace
 

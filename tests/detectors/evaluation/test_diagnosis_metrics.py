@@ -1,10 +1,15 @@
 import numpy as np
 import pytest
 
-from tauguard.detectors import Diagnosis, diagnosis_metrics, match_diagnoses
+from tauguard.detectors import Diagnosis, diagnosis_metrics
 from tauguard.detectors.diagnosis.classification import Signs
 from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90, Severity
-from tauguard.detectors.evaluation.diagnosis_metrics import ContactErrors, TrueSeverity, contact_at
+from tauguard.detectors.evaluation.diagnosis_metrics import (
+    ContactErrors,
+    TrueSeverity,
+    contact_at,
+    match_diagnoses,
+)
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 3, 1e-3)

@@ -464,5 +464,5 @@ def test_a_load_is_asked_for_only_if_it_was_not_given(alarm):
     """A load of 4 kg that is not there: most of the log is in alarm."""
     wrong, trace = carrying(alarm, Load(4.0)), record(9, seconds=10.0)
     for given, verb in ((False, "give"), (True, "check")):
-        (note,) = (n for n in detect_in_log(wrong, trace, given).notes if "fill much" in n)
-        assert f"{verb} the load (--payload)" in note
+        (note,) = detect_in_log(wrong, trace, given).findings.of("many-alarms")
+        assert f"{verb} the load (`payload=`)" in note.text

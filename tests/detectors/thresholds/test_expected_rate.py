@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tauguard.detectors import FreeScores
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
+from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 
 #: Blocks of an hour, and pieces of a block.

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tauguard.detectors import CollisionAlarm, FreeScores
-from tauguard.detectors.thresholds.free_scores import PIECE
+from tauguard.detectors import CollisionAlarm
+from tauguard.detectors.thresholds.free_scores import PIECE, FreeScores
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.traces import Trace
 

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tauguard.detectors import CollisionAlarm, FreeScores, guaranteed_threshold, with_guarantee
-from tauguard.detectors.thresholds.guarantee import allowed_episodes
+from tauguard.detectors import CollisionAlarm, with_guarantee
+from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.detectors.thresholds.guarantee import allowed_episodes, guaranteed_threshold
 from tauguard.traces import Trace
 
 

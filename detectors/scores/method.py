@@ -15,14 +15,14 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
 
 
-class Detector(Protocol):
+class Method(Protocol):
     """The settings of a method, which can be fitted to traces."""
 
     @property
     def name(self) -> str:
         """The method's name in reports."""
 
-    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedDetector:
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedMethod:
         """Train on traces of one arm at one sample rate.
 
         Args:
@@ -35,7 +35,7 @@ class Detector(Protocol):
         """
 
 
-class FittedDetector(Protocol):
+class FittedMethod(Protocol):
     """A trained method, immutable.
 
     A frozen dataclass can be written into a model file if its fields are finite numbers, text,
@@ -75,7 +75,7 @@ class ScoreStream(Protocol):
     """The scores of one recording, computed sample by sample."""
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample, equal to the result of :meth:`FittedDetector.scores`.
+        """The score of this sample, equal to the result of :meth:`FittedMethod.scores`.
 
         Args:
             q: [rad], float64, shape (n,).
