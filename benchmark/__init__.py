@@ -4,14 +4,12 @@
 one arm with their contacts.
 """
 
-from typing import TYPE_CHECKING
-
 from tauguard.lazy import on_demand
 
-if TYPE_CHECKING:
-    from tauguard.benchmark.fetching import fetch
-    from tauguard.benchmark.manifest import DataSet, data_folder, sets
-
-__all__ = ["DataSet", "data_folder", "fetch", "sets"]
-
-__getattr__ = on_demand(__name__)
+__getattr__, __dir__, __all__ = on_demand(
+    __name__,
+    {
+        "fetching": "fetch",
+        "manifest": "DataSet data_folder sets",
+    },
+)

@@ -138,7 +138,7 @@ class Configuration:
         return sum(s.episodes * s.seconds for s in self.splits) / 3600
 
 
-def load(source: str | Path) -> Configuration:
+def load_configuration(source: str | Path) -> Configuration:
     """The configuration in a TOML file, or this package's configuration of that name.
 
     Raises:

@@ -1,11 +1,19 @@
 """Live robot streams (RTDE, ROS 2, lines of text, a replayed log), and a server for tests."""
 
-from tauguard.live.lines import LineStream
-from tauguard.live.played import PlayedStream
-from tauguard.live.stream import RobotStream, Sample, StreamClosed
-from tauguard.live.ur import UrStream
-from tauguard.live.ur_server import UrServer
+from tauguard.lazy import on_demand
 
-__all__ = [
-    "LineStream", "PlayedStream", "RobotStream", "Sample", "StreamClosed", "UrServer", "UrStream",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = on_demand(
+    __name__,
+    {
+        "tauguard.detectors.alarms.monitor": "Answer",
+        "display": "BackgroundDisplay",
+        "lines": "LineStream",
+        "listening": "Listening listen",
+        "packets": "Fault Packets",
+        "played": "PlayedStream",
+        "ros": "RosStream",
+        "stream": "RobotStream Sample StreamClosed",
+        "ur": "UrStream",
+        "ur_server": "UrServer",
+    },
+)

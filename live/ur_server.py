@@ -36,7 +36,7 @@ OUTPUTS = {
 
 
 class UrServer(Closing):
-    """Sends packets to every client that connects, in real time, on 127.0.0.1.
+    """Sends packets to every client that connects, in real time, on 127.0.0.1 (``host``).
 
     Args:
         packets: the packets to send, of six joints.
@@ -47,6 +47,8 @@ class UrServer(Closing):
     Raises:
         ArgumentError: the number of joints is not six, or the port cannot be opened.
     """
+
+    host = HOST
 
     def __init__(
         self,

@@ -1,9 +1,12 @@
 """What one types by hand: completion, a residual, a figure, values that print in a line."""
 
+import ast
+import importlib
 import inspect
 import subprocess
 import sys
 from dataclasses import fields, replace
+from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -34,7 +37,7 @@ def trace():
 
 
 #: Packages that load names at their first use come first: the others load what they would.
-PACKAGES = "traces datasets detectors replay rigid cloth models envs contacts"
+PACKAGES = "traces datasets detectors replay live twin benchmark rigid cloth models envs contacts"
 
 
 def test_dir_lists_every_public_name_and_loads_none():
@@ -48,6 +51,23 @@ for name in {PACKAGES.split()}:
     assert not {{"Any", "TYPE_CHECKING", "importlib", "on_demand"}} & names, name
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+PLACE = Path(tauguard.__file__).parent
+STUBS = sorted(PLACE.glob("*/__init__.pyi"))
+
+
+@pytest.mark.parametrize("stub", [PLACE / "__init__.pyi", *STUBS], ids=lambda p: p.parent.name)
+def test_type_checkers_see_the_names_that_there_are(stub):
+    lines = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    modules = {alias.name: line.module for line in lines for alias in line.names}
+    folder = stub.parent.relative_to(PLACE.parent)
+    package = importlib.import_module(".".join(folder.parts))
+    packages = {name for name, module in modules.items() if module == "tauguard"}
+    assert set(modules) - packages == set(package.__all__)
+    assert packages <= set(dir(package))
+    for name, module in modules.items():
+        assert getattr(package, name) is getattr(importlib.import_module(module), name), name
 
 
 def test_the_package_itself_completes_without_loading_a_package():

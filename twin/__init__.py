@@ -1,11 +1,13 @@
 """Twins: simulated arms identified from collision-free logs of real arms, tested on other logs."""
 
-from tauguard.twin.identify import Twin, fit_twin, with_intervals
-from tauguard.twin.judge import Likeness, compare, with_alarms
-from tauguard.twin.of_logs import TwinOfLogs, identify_twin
-from tauguard.twin.play import played
+from tauguard.lazy import on_demand
 
-__all__ = [
-    "Likeness", "Twin", "TwinOfLogs", "compare", "fit_twin", "identify_twin", "played",
-    "with_alarms", "with_intervals",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = on_demand(
+    __name__,
+    {
+        "identify": "Twin fit_twin with_intervals",
+        "judge": "Likeness compare with_alarms",
+        "of_logs": "TwinOfLogs identify_twin",
+        "play": "played",
+    },
+)

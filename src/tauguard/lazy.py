@@ -2,45 +2,38 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import sys
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Mapping
 from typing import Any
 
 
-def on_demand(package: str) -> Callable[[str], Any]:
-    """A ``__getattr__`` for ``package`` that imports names listed under ``if TYPE_CHECKING:``.
+def on_demand(
+    package: str, modules: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
-    Type checkers read these imports. At run time a name loads only the module that defines it, so
-    that a light part of a package does not load the libraries of the heavy parts. ``dir`` and
-    completion list all names without importing any.
+    A name loads only the module that defines it, so that a light part of a package does not load
+    the libraries of the heavy parts. ``dir`` and completion list all names without importing any.
+    Type checkers read ``__init__.pyi`` beside the package.
+
+    Args:
+        package: its name.
+        modules: by the path of a module below the package, its public names, separated by spaces;
+            a path that begins with "tauguard." is of another package.
     """
-    where = _typed_imports(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
+    where = {name: module for module, names in modules.items() for name in names.split()}
 
     def __getattr__(name: str) -> Any:
         if name not in where:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module, original = where[name]
-        value = getattr(importlib.import_module(module), original)
+        module = where[name]
+        path = module if module.startswith("tauguard.") else f"{package}.{module}"
+        value = getattr(importlib.import_module(path), name)
         setattr(sys.modules[package], name, value)
         return value
 
-    module = sys.modules[package]
-    tools = {"TYPE_CHECKING", "on_demand"}
-    vars(module)["__dir__"] = lambda: sorted((vars(module).keys() | where.keys()) - tools)
-    return __getattr__
+    def __dir__() -> list[str]:
+        return sorted((vars(sys.modules[package]).keys() | where.keys()) - {"on_demand"})
 
-
-def _typed_imports(source: str) -> dict[str, tuple[str, str]]:
-    """Module and name of everything imported under ``if TYPE_CHECKING:``."""
-    found = {}
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            for line in node.body:
-                assert isinstance(line, ast.ImportFrom)
-                assert line.module is not None
-                for alias in line.names:
-                    found[alias.asname or alias.name] = (line.module, alias.name)
-    return found
+    return __getattr__, __dir__, sorted(where)

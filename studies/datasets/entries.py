@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from studies.framework import Workers, draw_found, groups
-from tauguard.datasets.configuration import Configuration, load
+from tauguard.datasets.configuration import Configuration, load_configuration
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import arms_of, episodes_of_splits
 from tauguard.datasets.recordings import labelled
@@ -79,7 +79,7 @@ def draw(rows: list[Row], figure: Any) -> None:
 
 def configuration(quick: bool, seed: int) -> Configuration:
     """The quick configuration of the dataset (two hours), with another seed unless it is 0."""
-    whole = load(NAME).quick()
+    whole = load_configuration(NAME).quick()
     whole = replace(whole, seed=seed) if seed else whole
     if not quick:
         return whole

@@ -15,7 +15,7 @@ from oracles.processor_time import clock, count_time
 from studies.framework import table_rows, time_in_turn
 from tauguard.datasets import columns_of_shards
 from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.datasets.shard import residual_of, writing
@@ -64,7 +64,7 @@ def rate_rows(quick: bool, seed: int) -> list[Row]:
     split and four from the last, whose arm is not in the first. A quick run takes one of each kind
     from the first.
     """
-    configuration = replace(load(NAME), seed=987_000 + seed)
+    configuration = replace(load_configuration(NAME), seed=987_000 + seed)
     count = 1 if quick else 4
     first, *_, last = configuration.splits
     splits = (first,) if quick else (first, last)
@@ -117,7 +117,7 @@ def timed_parts(one: Planned) -> dict[str, float]:
 
 def size_rows(quick: bool, seed: int) -> list[Row]:
     """MB an hour with and without residual, and the rate of reading one column."""
-    whole, rows = load(NAME), []
+    whole, rows = load_configuration(NAME), []
     split = replace(whole.splits[0], episodes=12)
     if quick:
         split = replace(split, episodes=1, seconds=20.0, collisions=5)

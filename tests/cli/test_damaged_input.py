@@ -8,7 +8,7 @@ import pytest
 
 from slow.damaged import damage
 from tauguard.cli import main
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.generation import generate_dataset
 from tauguard.replay import write_rrd
 from tauguard.traces import read_mcap, write_mcap
@@ -92,7 +92,7 @@ def intact(tmp_path_factory):
         trace = record(seed)
         table = np.column_stack([trace.t, trace.q, trace.qd, trace.current])
         np.savetxt(folder / f"log{seed}.csv", table, delimiter=",", fmt="%.9g")
-    generate_dataset(load(folder / "tiny.toml"), folder / "dataset", workers=1)
+    generate_dataset(load_configuration(folder / "tiny.toml"), folder / "dataset", workers=1)
     free = ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "free.model")
     traces = ("--traces", "mcap", "--model", "a.model", "--detector", "residual-thresholds")
     struck = ("--out", "mcap", "--episodes", "3", "--collisions", "1", "--workers", "1")

@@ -10,14 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tauguard as tg
 from tauguard.cli import main
-from tauguard.cli.listen import Terminal, check_source, opened, report
+from tauguard.cli.listen import Terminal
+from tauguard.cli.listen import read_log as read_played
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model
+from tauguard.detectors import ArmModel, Detector, RobotNumbers, make_detector, save_model
 from tauguard.detectors.alarms.monitor import Answer, Monitor, detect_with_faults
 from tauguard.detectors.alarms.training import train
 from tauguard.envs import simulate
-from tauguard.live import PlayedStream, StreamClosed, UrServer, UrStream, rtde, ur
+from tauguard.live import Listening, PlayedStream, StreamClosed, UrServer, UrStream, rtde, ur
+from tauguard.live.listening import check_stream
 from tauguard.live.packets import Fault, Packets
 from tauguard.live.session import BINS, Session, listen
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
@@ -71,12 +74,32 @@ def test_the_same_alarms_as_on_the_file(alarm, struck):
     assert np.array_equal(heard.trace().current, struck.current)
 
 
+def test_a_log_and_a_stream_give_the_same_session(alarm, struck):
+    detector, rows = Detector(alarm), slice(0, 250)
+    signals = (getattr(struck, name)[rows] for name in ("t", "q", "qd", "current"))
+    short = Trace(struck.joint_names, *signals)
+    back = tuple(reversed(struck.joint_names))
+    mixed = Trace(back, short.t, *(x[:, ::-1] for x in (short.q, short.qd, short.current)))
+    played = [tg.listen(detector, one, keep=True) for one in (short, tg.read_log(mixed))]
+    handed = tg.listen(detector, Handed(short), keep=True)
+    for one in played:
+        assert one.trace().q.tobytes() == handed.trace().q.tobytes()
+        assert one.detection().score.tobytes() == handed.detection().score.tobytes()
+    assert repr(handed).startswith(
+        "Listening(1.0 s, 0 collisions, 0 faults, the log is over; state"
+    )
+    assert handed.to_dict()["findings"] == []
+    assert [row["state"] for row in handed.rows()] == ["collision"] * handed.to_dict()["alarms"]
+    with pytest.raises(tg.MismatchError, match="`torque=True`: the detector was trained on"):
+        tg.listen(detector, short, torque=True)
+
+
 def test_over_rtde_nothing_is_lost(alarm, struck):
     with (
         UrServer(Packets.of(struck), 0) as server,
         UrStream("127.0.0.1", server.port, 250.0, reconnect=0) as source,
     ):
-        check_source(source, alarm, "model")
+        check_stream(source, Detector(alarm))
         heard = listen(source, Monitor(alarm, alarm.inputs), keep=True)
         assert source.events == []
     assert heard.samples == len(struck.t)
@@ -110,15 +133,13 @@ def test_every_line_says_why(struck, capsys):
     ]
 
 
-def test_latencies_beyond_the_last_bin_are_not_given_a_number(capsys):
+def test_latencies_beyond_the_last_bin_are_not_given_a_number(alarm):
     heard = Session(("a",))
     heard.samples, heard.slowest = 1000, 250_000_000
     heard.counts[[40, BINS]] = 995, 5
     found = heard.quantiles()
     assert (found["median"], found["p99"], found["p99_9"], found["max"]) == (41, 41, None, 250_000)
-    none = {"events": [], "faults": [], "connection": [], "ended": "by hand", "state": "free"}
-    report({**none, "samples": 1000, "seconds": 2.0, "latency_us": found})
-    assert "p99 41, p99.9 100,000 or more, " in capsys.readouterr().out
+    assert "p99 41, p99.9 100,000 or more, " in str(Listening(Detector(alarm), heard))
 
 
 def test_a_silent_robot_is_a_fault(alarm, struck):
@@ -235,13 +256,11 @@ def test_another_robot_is_refused_before_anything_is_watched(alarm, joints, rate
     names = tuple(f"j{i}" for i in range(joints))
     still = Trace(names, t, *(np.zeros((len(t), joints)) for _ in range(3)))
     with pytest.raises(ValueError, match=said):
-        check_source(PlayedStream(still), alarm, "model")
+        check_stream(PlayedStream(still), Detector(alarm))
 
 
 def test_the_summary_is_json(alarm, struck):
-    from tauguard.cli.listen import summary
-
-    result = summary(listen(Handed(struck), Monitor(alarm, alarm.inputs)), [], alarm)
+    result = tg.listen(Detector(alarm), Handed(struck)).to_dict()
     assert json.loads(json.dumps(result))["samples"] == len(struck.t)
     assert set(result["latency_us"]) == {"median", "p99", "p99_9", "p99_99", "max"}
 
@@ -329,7 +348,8 @@ def test_what_reading_a_played_log_mended_is_said(alarm, struck, tmp_path, capsy
     rows[[20, 21]] = rows[[21, 20]]
     names = ["t", *(f"{what}_{i}" for what in ("q", "qd", "current") for i in range(1, 7))]
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(names), comments="")
-    opened(None, 1, tmp_path / "a.csv", "auto", False, None, 0.0, alarm).close()
+    (tmp_path / "arm.xml").write_text(cura6.arm_xml())
+    read_played(tmp_path / "a.csv", "auto", Detector(alarm), tmp_path / "arm.xml")
     assert "note: a.csv: rows sorted by time; 1 were out of order" in capsys.readouterr().out
 
 

@@ -4,7 +4,7 @@ import textwrap
 
 import pytest
 
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.generation import generate_dataset
 
 TINY = """
@@ -42,7 +42,7 @@ def tiny_toml(tmp_path_factory):
 @pytest.fixture(scope="session")
 def tiny(tiny_toml, tmp_path_factory):
     folder = tmp_path_factory.mktemp("datasets") / "tiny"
-    generate_dataset(load(tiny_toml), folder, workers=1)
+    generate_dataset(load_configuration(tiny_toml), folder, workers=1)
     return folder
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.datasets.configuration import NAMED, Configuration, load, parse
+from tauguard.datasets.configuration import NAMED, Configuration, load_configuration, parse
 from tauguard.datasets.schedule import dealt, planned, stated_balance
 
 GOOD = """
@@ -25,7 +25,7 @@ episodes = 4
 
 @pytest.mark.parametrize("name", NAMED)
 def test_what_ships_is_whole_and_survives_json(name):
-    configuration = load(name)
+    configuration = load_configuration(name)
     assert Configuration.from_json(configuration.to_json()) == configuration
     assert configuration.name == name
     assert configuration.quick().hours < configuration.hours / 5
@@ -48,18 +48,20 @@ def test_objects_stand_in_every_episode_and_survive_json(tmp_path):
 
 @pytest.mark.parametrize("version", ["v1", "v2"])
 def test_the_benchmark_is_100_hours_of_four_arms(version):
-    configuration = load(f"tauguard-collisions-{version}")
+    configuration = load_configuration(f"tauguard-collisions-{version}")
     assert configuration.hours == pytest.approx(100, rel=1e-3)
     assert configuration.quick().hours == pytest.approx(2, rel=0.01)
     assert len({arm for split in configuration.splits for arm in split.arms}) == 4
 
 
 def test_the_twin_has_15_slices_of_7_minutes_and_65_collisions_a_speed():
-    train, *judged = load("cura6-twin").splits
+    train, *judged = load_configuration("cura6-twin").splits
     assert train.episodes * train.seconds == 15 * 7 * 60
     assert sorted(train.payloads_g).count(0) == 3
     assert [split.speeds for split in judged] == [(v,) for v in (10, 20, 30, 40, 50, 60)]
-    for stated in [stated_balance(load("cura6-twin"))[split.name] for split in judged]:
+    for stated in [
+        stated_balance(load_configuration("cura6-twin"))[split.name] for split in judged
+    ]:
         assert sum(stated["kind"].values()) == 65
 
 
@@ -104,12 +106,12 @@ def test_what_is_no_configuration_is_refused_with_the_files_name(tmp_path, text)
     path = tmp_path / "bad.toml"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"bad\.toml"):
-        load(path)
+        load_configuration(path)
 
 
 def test_a_name_that_does_not_ship_is_met_with_those_that_do():
     with pytest.raises(FileNotFoundError, match=r"did you mean cura6-twin\?"):
-        load("cura6-twins")
+        load_configuration("cura6-twins")
 
 
 @settings(deadline=None)
@@ -121,7 +123,7 @@ def test_a_deck_deals_every_value_equally_often(values, seed, count):
 
 
 def test_hashes_of_published_descriptions_stay():
-    assert load("tauguard-collisions-v1").sha256.startswith("ba6ceca843d9d137")
+    assert load_configuration("tauguard-collisions-v1").sha256.startswith("ba6ceca843d9d137")
 
 
 def all_planned(configuration):
@@ -129,7 +131,7 @@ def all_planned(configuration):
 
 
 def test_a_pair_has_one_motion_and_the_second_has_the_collisions():
-    configuration = load("tauguard-collisions-v2").quick()
+    configuration = load_configuration("tauguard-collisions-v2").quick()
     episodes = [p for p in all_planned(configuration) if p.split == "test"]
     assert len(episodes) == configuration.splits[2].episodes
     for free, struck in zip(episodes[::2], episodes[1::2], strict=True):
@@ -143,7 +145,7 @@ def test_a_pair_has_one_motion_and_the_second_has_the_collisions():
 
 @pytest.mark.parametrize("version", ["v1", "v2"])
 def test_the_stated_balance_is_that_of_the_episodes(version):
-    configuration = load(f"tauguard-collisions-{version}").quick()
+    configuration = load_configuration(f"tauguard-collisions-{version}").quick()
     stated = stated_balance(configuration)
     for split in configuration.splits:
         episodes = [p.episode for p in all_planned(configuration) if p.split == split.name]
@@ -157,7 +159,7 @@ def test_the_stated_balance_is_that_of_the_episodes(version):
 
 
 def test_an_episode_depends_on_its_number_alone_and_quick_is_the_beginning():
-    whole = load("tauguard-collisions-v1")
+    whole = load_configuration("tauguard-collisions-v1")
     part = whole.quick()
     for split, quick in zip(whole.splits, part.splits, strict=True):
         last = quick.episodes - 1

@@ -17,7 +17,7 @@ import pytest
 
 from tauguard.atomic_write import atomic_file
 from tauguard.datasets import columns_of_shards, inspection
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.dataset_folder import HEAD, claimed, lines, read_head
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
@@ -66,7 +66,7 @@ def test_what_is_read_is_what_was_simulated(tiny, tiny_toml):
     _, same = inspection.same_again(tiny, line)
     assert same
     trace = next(t for t in read(tiny) if t.meta["key"] == line["key"])
-    configuration = load(tiny_toml)
+    configuration = load_configuration(tiny_toml)
     split = next(s for s in configuration.splits if s.name == line["split"])
     from tauguard.datasets.schedule import planned
 
@@ -86,7 +86,7 @@ def test_two_workers_killed_and_one_that_goes_on_give_the_same_bytes(tiny, tiny_
     wait_for(lambda: list(folder.glob("data/*.parquet")) or process.poll() is not None)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    generate_dataset(load(tiny_toml), folder, workers=1)
+    generate_dataset(load_configuration(tiny_toml), folder, workers=1)
     assert contents(folder) == contents(tiny)
 
 
@@ -150,7 +150,7 @@ def test_a_damaged_shard_is_found_named_and_made_again_alone(tiny, tiny_toml, tm
     assert "damaged" in wrong
     with pytest.raises(ValueError, match=r"train-000001\.parquet: damaged"):
         list(read(folder))
-    done = generate_dataset(load(tiny_toml), folder, workers=1)
+    done = generate_dataset(load_configuration(tiny_toml), folder, workers=1)
     assert (done.made, done.kept) == (1, 2)
     assert contents(folder) == contents(tiny)
     assert others == {p: p.stat().st_mtime_ns for p in others}
@@ -167,18 +167,18 @@ def test_any_damage_is_mended(tiny, tiny_toml, tmp_path, damage):
     else:
         victim.write_bytes(victim.read_bytes()[: victim.stat().st_size // 2])
     assert [name for name, _ in inspection.verified(folder)] == ["data/test-000000.parquet"]
-    generate_dataset(load(tiny_toml), folder, workers=1)
+    generate_dataset(load_configuration(tiny_toml), folder, workers=1)
     assert contents(folder) == contents(tiny)
 
 
 def test_a_folder_of_something_else_is_left_as_it_is(tiny, tiny_toml, tmp_path):
     before = contents(tiny)
     with pytest.raises(ValueError, match="holds another dataset"):
-        generate_dataset(load(tiny_toml).quick(), tiny, workers=1)
+        generate_dataset(load_configuration(tiny_toml).quick(), tiny, workers=1)
     assert contents(tiny) == before
     (tmp_path / "holiday.jpg").write_bytes(b"1")
     with pytest.raises(ValueError, match="not empty, and no dataset"):
-        generate_dataset(load(tiny_toml), tmp_path, workers=1)
+        generate_dataset(load_configuration(tiny_toml), tmp_path, workers=1)
     assert contents(tmp_path) == {"holiday.jpg": b"1"}
 
 
@@ -191,7 +191,7 @@ def test_a_newer_format_is_refused_with_its_number(tiny, tiny_toml, tmp_path):
     for attempt in (
         read_head,
         lambda f: list(read(f)),
-        lambda f: generate_dataset(load(tiny_toml), f),
+        lambda f: generate_dataset(load_configuration(tiny_toml), f),
     ):
         with pytest.raises(ValueError, match="format 99; this tauguard reads up to 2"):
             attempt(folder)
@@ -209,7 +209,7 @@ def test_a_head_with_another_number_of_episodes_is_damaged(tiny, tmp_path, episo
 
 
 def test_the_quick_part_is_the_beginning_of_the_whole(tiny, tiny_toml, tmp_path):
-    generate_dataset(load(tiny_toml).quick(), tmp_path / "quick", workers=1)
+    generate_dataset(load_configuration(tiny_toml).quick(), tmp_path / "quick", workers=1)
     name = "data/train-000000.parquet"
     assert contents(tmp_path / "quick")[name] == contents(tiny)[name]
 
@@ -229,7 +229,7 @@ def test_a_full_disk_leaves_no_part_and_the_old_file(tmp_path):
 
 
 def test_two_runs_do_not_write_one_folder(tiny, tiny_toml):
-    configuration = load(tiny_toml)
+    configuration = load_configuration(tiny_toml)
     with (
         claimed(tiny, configuration),
         pytest.raises(OSError, match="another process is generating"),
@@ -245,7 +245,7 @@ def test_a_damaged_arm_is_named_and_written_again(tiny, tiny_toml, tmp_path):
     assert [name for name, _ in inspection.verified(folder)] == ["arms/cura6"]
     with pytest.raises(ValueError, match=r"cura6\.xml: missing or damaged"):
         list(read(folder))
-    generate_dataset(load(tiny_toml), folder, workers=1)
+    generate_dataset(load_configuration(tiny_toml), folder, workers=1)
     assert contents(folder) == contents(tiny)
 
 
@@ -266,9 +266,10 @@ def test_a_column_is_what_pyarrow_makes_of_its_values(kind, gaps):
 def test_generating_leaves_libraries_unloaded_that_cost_more_than_an_episode(tiny_toml, tmp_path):
     code = (
         "import sys; from pathlib import Path\n"
-        "from tauguard.datasets.configuration import load\n"
+        "from tauguard.datasets.configuration import load_configuration\n"
         "from tauguard.datasets.generation import generate_dataset\n"
-        f"generate_dataset(load({str(tiny_toml)!r}), Path({str(tmp_path / 'made')!r}), workers=1)\n"
+        f"tiny = load_configuration({str(tiny_toml)!r})\n"
+        f"generate_dataset(tiny, Path({str(tmp_path / 'made')!r}), workers=1)\n"
         "print([m for m in ('sklearn', 'pandas', 'scipy', 'rerun') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tauguard.datasets.card import shards
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.dataset_folder import CARD, CROISSANT, lines
 from tauguard.datasets.exports.lerobot import combined, moments, write_lerobot
 from tauguard.datasets.exports.minari import write_minari
@@ -117,7 +117,7 @@ def test_the_card_and_croissant_name_every_file_and_column(tiny):
 def test_the_pattern_of_a_split_has_no_file_of_another(tmp_path):
     """The splits of the shipped benchmark, some of whose names begin as others do."""
     (tmp_path / "data").mkdir()
-    names = [split.name for split in load("tauguard-collisions-v2").splits]
+    names = [split.name for split in load_configuration("tauguard-collisions-v2").splits]
     own = {n: {f"{n}-000000.parquet", f"{n}-000012.parquet"} for n in names}
     for name in {file for files in own.values() for file in files}:
         (tmp_path / "data" / name).touch()

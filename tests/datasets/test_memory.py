@@ -2,7 +2,7 @@
 
 import gc
 
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.generation import tasks
 from tauguard.datasets.shard import make_shard
 
@@ -11,7 +11,7 @@ def test_a_shard_leaves_nothing_for_the_search_for_cycles(tiny_toml, tmp_path):
     """Python searches for cycles by counting objects; an episode is few of them and megabytes."""
     for name in ("data", "manifest"):
         (tmp_path / name).mkdir()
-    todo = list(tasks(load(tiny_toml), tmp_path))
+    todo = list(tasks(load_configuration(tiny_toml), tmp_path))
     make_shard(todo[0])  # with what is kept once for all
     gc.collect()
     gc.disable()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tauguard.datasets import inspection
-from tauguard.datasets.configuration import Configuration, load
+from tauguard.datasets.configuration import Configuration, load_configuration
 from tauguard.datasets.dataset_folder import HEAD, lines
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
@@ -52,7 +52,7 @@ def described(tmp_path):
 
 
 def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, tmp_path):
-    configuration = load(described)
+    configuration = load_configuration(described)
     assert Configuration.from_json(configuration.to_json()) == configuration
     for workers in (1, 2):
         generate_dataset(configuration, tmp_path / str(workers), workers=workers)
@@ -75,13 +75,13 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     with pytest.raises(ValueError, match=r"arm other: .*other\.toml is not what the dataset was"):
         inspection.same_again(tmp_path / "1", line, own)
     with pytest.raises(ValueError, match="holds another dataset"):
-        generate_dataset(load(described), tmp_path / "1", workers=1)
+        generate_dataset(load_configuration(described), tmp_path / "1", workers=1)
 
 
 def test_a_dataset_is_trained_on_where_the_arms_file_is_not(described, tmp_path):
     arm = load_arm(str(described.parent / "robots" / "other.toml"))
     there = tmp_path / "there"
-    generate_dataset(load(described), there, workers=1)
+    generate_dataset(load_configuration(described), there, workers=1)
     (known,) = read(there, arm="other")
     before = np.array(FrontEndSettings().fit([known], nominal_arm([known])).arm.drive_gain)
     shutil.move(there, tmp_path / "elsewhere")
@@ -104,7 +104,7 @@ def test_a_dataset_is_trained_on_where_the_arms_file_is_not(described, tmp_path)
 
 def test_an_older_dataset_is_read_and_trained_on_while_its_file_is_the_same(described, tmp_path):
     folder = tmp_path / "old"
-    generate_dataset(load(described), folder, workers=1)
+    generate_dataset(load_configuration(described), folder, workers=1)
     head = json.loads((folder / HEAD).read_text())
     head["format"] = 1
     own = (k.removesuffix(".xml") for k in head["arms_sha256"] if k.endswith(".xml"))
@@ -147,7 +147,7 @@ def test_an_arm_that_cannot_be_is_named_before_anything_is_written(described, as
         (folder / name).write_text(random_arm(SEED))
     described.write_text(described.read_text().replace('"cura6"', f'"{asked}"'))
     with pytest.raises(ValueError, match=message):
-        load(described)
+        load_configuration(described)
 
 
 def test_a_split_strikes_links_that_its_arms_have(described):
@@ -155,10 +155,10 @@ def test_a_split_strikes_links_that_its_arms_have(described):
         '", "'.join(load_arm(str(described.parent / "robots" / "arm.xml")).joints[:3])
     )
     (described.parent / "robots" / "other.toml").write_text(few)
-    assert load(described).splits[0].links == (2, 3)
+    assert load_configuration(described).splits[0].links == (2, 3)
     described.write_text(described.read_text() + "links = [5]\n")
     with pytest.raises(ValueError, match=r"links = \(5,\): expected 1 to 3, links of every arm"):
-        load(described)
+        load_configuration(described)
 
 
 @pytest.mark.parametrize("seed", [3, 8])

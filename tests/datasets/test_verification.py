@@ -8,7 +8,7 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.datasets import inspection
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.dataset_folder import SUMS
 from tauguard.datasets.generation import generate_dataset
 
@@ -80,7 +80,7 @@ def test_the_command_says_so_with_exit_code_2_and_generating_mends_it(
     number = path.name.removesuffix(".jsonl") if "manifest" in name else path.stem
     assert number in said.out + said.err or path.name in said.out + said.err
     if name != "dataset.json":  # which says what the folder is
-        generate_dataset(load(tiny_toml), copy, workers=1)
+        generate_dataset(load_configuration(tiny_toml), copy, workers=1)
         assert contents(copy) == contents(tiny)
 
 
@@ -91,7 +91,7 @@ def test_a_dataset_of_an_earlier_version_says_what_is_not_checked(copy, tiny, ti
     for name in ("dataset.json", "README.md", "croissant.json"):
         assert f"{name}: not checked" in out
     assert "every file is intact" not in out
-    generate_dataset(load(tiny_toml), copy, workers=1)
+    generate_dataset(load_configuration(tiny_toml), copy, workers=1)
     assert contents(copy) == contents(tiny)
 
 

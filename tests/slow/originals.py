@@ -117,14 +117,14 @@ def _write_robot(path: Path) -> None:
 
 
 def _write_part(kind: str, path: Path) -> None:
-    from tauguard.datasets.configuration import load
+    from tauguard.datasets.configuration import load_configuration
     from tauguard.datasets.generation import generate_dataset
 
     made = path.parent.parent / "made"  # one dataset serves all its files
     if not made.exists():
         text = path.parent.parent / "small.toml"
         text.write_text(SPLITS)
-        generate_dataset(load(text), made, workers=1)
+        generate_dataset(load_configuration(text), made, workers=1)
     shutil.copytree(made, path.parent / "dataset")
     shutil.copy(made / PLACES[kind], path)
 

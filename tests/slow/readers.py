@@ -63,9 +63,9 @@ def arm(path: Path) -> Any:
 
 def configuration(path: Path) -> Any:
     """A dataset's configuration."""
-    from tauguard.datasets.configuration import load
+    from tauguard.datasets.configuration import load_configuration
 
-    return load(path)
+    return load_configuration(path)
 
 
 def model(path: Path) -> Any:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tauguard.datasets.configuration import load
+from tauguard.datasets.configuration import load_configuration
 from tauguard.datasets.generation import generate_dataset
 
 #: Runs that are killed with each number of workers, and runs of which a node is lost.
@@ -54,7 +54,7 @@ def small_dataset(seed: int) -> Iterator[tuple[Path, dict[str, str]]]:
         config = Path(place) / "small.toml"
         config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
         wanted = Path(place) / "wanted"
-        generate_dataset(load(config), wanted, workers=1)
+        generate_dataset(load_configuration(config), wanted, workers=1)
         yield config, contents(wanted)
 
 
@@ -110,7 +110,7 @@ def test_killed_runs_are_continued_to_the_same_bytes(workers, slow_seed, counts)
             time.sleep(rng.uniform(0, 1.1 * (ended - begun)))
             os.killpg(command.pid, signal.SIGKILL)
             midway += command.wait() != 0
-            generate_dataset(load(config), folder, workers=1)
+            generate_dataset(load_configuration(config), folder, workers=1)
             same += contents(folder) == wanted
     counts(kills=KILLS, before_the_end=midway, same_bytes=same)
     assert same == KILLS

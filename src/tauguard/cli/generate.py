@@ -31,7 +31,7 @@ def command(
     """
     import time
 
-    from tauguard.datasets.configuration import load
+    from tauguard.datasets.configuration import load_configuration
     from tauguard.datasets.generation import generate_dataset
     from tauguard.datasets.workers import Terminated
 
@@ -39,7 +39,7 @@ def command(
         raise ArgumentError(f"--workers {workers}: expected 1 or more")
     if ray is not None and workers is not None:
         raise ArgumentError("give either --workers (this machine) or --ray (a cluster)")
-    configuration = load(config)
+    configuration = load_configuration(config)
     if quick:
         configuration = configuration.quick()
     began = time.perf_counter()

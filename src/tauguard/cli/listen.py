@@ -8,18 +8,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tauguard.findings import ArgumentError, as_flags
+from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tauguard.detectors import CollisionAlarm
-    from tauguard.detectors.alarms.monitor import Answer
-    from tauguard.live import RobotStream, Sample
-    from tauguard.live.session import Session
+    from tauguard import Detector, Log
+    from tauguard.live import Answer, Listening, Sample
 
-#: Frame rate in rerun [Hz].
-FRAMES = 30
 DISCLAIMER = "tauguard listens only: it stops nothing and certifies nothing"
 
 
@@ -67,8 +63,7 @@ def command(
     import tauguard as tg
     from tauguard.cli import expect
     from tauguard.cli.payload import load
-    from tauguard.live.display import BackgroundDisplay
-    from tauguard.live.session import listen
+    from tauguard.live import BackgroundDisplay
 
     sources = (ur is not None, play is not None, stdin, ros is not None)
     if sum(sources) != 1:
@@ -88,86 +83,65 @@ def command(
     expect("--port", port, 1, 65535)
     carried = None if payload is None else load(payload)
     detector = tg.load_detector(model, robot)
-    if torque and not (detector.arm.drive_gain == 1).all():
-        raise ArgumentError(f"--torque: {model} was trained on currents")
     detector = detector if carried is None else detector.carrying(carried)
-    alarm, monitor = detector.alarm, detector.stream()
-    robot = detector.robot or robot
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)
-        source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))
-        check_source(source, alarm, model)
-        views = [stack.enter_context(BackgroundDisplay(Terminal(alarm.threshold).show))]
+        source: Any
+        if play is None:
+            source = stack.enter_context(opened(ur, port, stdin, ros, reconnect, detector))
+        else:
+            source = read_log(play, columns, detector, robot)
+        views = [stack.enter_context(BackgroundDisplay(Terminal(detector.threshold).show))]
         if rerun is not None:
-            views.append(stack.enter_context(BackgroundDisplay(charts(robot, shown, alarm))))
+            show = charts(detector, robot, shown)
+            views.append(stack.enter_context(BackgroundDisplay(show)))
 
-        def show(sample: Sample, answer: Answer) -> None:
+        def put(sample: Sample, answer: Answer) -> None:
             for view in views:
                 view.put(sample, answer)
 
-        session = listen(source, monitor, seconds, show, keep=record is not None)
-        events = list(source.events)
-    result = summary(session, events, alarm)
-    report(result)
+        keep = record is not None
+        result = tg.listen(detector, source, torque=torque, seconds=seconds, report=put, keep=keep)
+    print(result)
     if record is not None:
-        save(record, session, alarm)
+        save(record, result)
     if json is not None:
         from tauguard.report import write_json
 
-        write_json(json, result)
-    if session.lost:
+        write_json(json, result.to_dict())
+    if result.lost:
         raise SystemExit(3)
-
-
-def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
-    """Raise ``ArgumentError`` if joints or sample rate differ from those of training."""
-    from tauguard.detectors.samples import same_rate
-
-    joints, dt = alarm.detector.arm.robot.joints, alarm.detector.dt
-    if len(source.joint_names) != joints:
-        raise ArgumentError(
-            f"the source has {len(source.joint_names)} joints, {model} has {joints}"
-        )
-    if not same_rate(1 / source.rate, dt):
-        raise ArgumentError(
-            f"the source gives {source.rate:.0f} samples a second, {model} was trained at "
-            f"{1 / dt:.0f}: train a detector on logs of that rate"
-        )
 
 
 def opened(
     ur: str | None,
     port: int,
-    play: Path | None,
-    columns: str | None,
     stdin: bool,
     ros: str | None,
     reconnect: float,
-    alarm: CollisionAlarm,
+    detector: Detector,
 ) -> Any:
-    """The connected source that the flags name."""
-    from tauguard.live import LineStream, PlayedStream, UrStream
+    """The connected stream that the flags name."""
+    from tauguard.live import LineStream, RosStream, UrStream
 
-    names, dt = alarm.detector.arm.robot.joint_names, alarm.detector.dt
+    names, rate = detector.joints, 1 / detector.dt
     if ur is not None:
-        return UrStream(ur, port, 1 / dt, reconnect)
-    if play is not None:
-        from tauguard.datasets.columns import column_map
-        from tauguard.datasets.log_table import Options
-        from tauguard.datasets.logs import read_source
-        from tauguard.detectors.calibration.joints import matched
-
-        options = Options(column_map(columns), names, robot_joints=names)
-        log = read_source(play, play.name, options)
-        for note in log.findings:
-            print(f"note: {play.name}: {as_flags(note.text)}")
-        return PlayedStream(matched(log.trace, names))
+        return UrStream(ur, port, rate, reconnect)
     if ros is not None:
-        from tauguard.live.ros import RosStream
-
-        return RosStream(ros, names, 1 / dt)
+        return RosStream(ros, names, rate)
     assert stdin
-    return LineStream(sys.stdin, names, 1 / dt)
+    return LineStream(sys.stdin, names, rate)
+
+
+def read_log(play: Path, columns: str | None, detector: Detector, robot: Path) -> Log:
+    """A log to play in real time; prints what was found in it."""
+    import tauguard as tg
+    from tauguard.cli.output import print_findings
+
+    robot = detector.robot or robot
+    log = tg.read_log(play, columns, robot=robot, joint_names=detector.joints)
+    print_findings(log.findings)
+    return log
 
 
 class Terminal:
@@ -209,107 +183,21 @@ def why_text(answer: Answer, threshold: float) -> str:
     return f": {'; '.join(parts)}" if parts else ""
 
 
-def charts(
-    robot: Path, save: Path | None, alarm: CollisionAlarm
-) -> Callable[[Sample, Answer], None]:
+def charts(detector: Detector, robot: Path, save: Path | None) -> Callable[[Sample, Answer], None]:
     """A function that shows arm, score and state in rerun's viewer, or records them in a file."""
-    import mujoco
-    import numpy as np
+    from tauguard.replay import StateView
 
-    from tauguard.replay.live import LiveView
-    from tauguard.replay.robot import load_model as load_robot
-
-    names = alarm.detector.arm.robot.joint_names
-    model = load_robot(robot)
-    view, data = LiveView(model, save), mujoco.MjData(model)
-    rows = [model.jnt_qposadr[model.joint(name).id] for name in names]
-    view.layout({"score": "Score (1: threshold)", "state": "0 free, 1 collision, 2 fault"})
-    states, due = {"free": 0, "collision": 1, "fault": 2}, [-np.inf, 0.0]
-
-    def show(sample: Sample, answer: Answer) -> None:
-        soon = due[0] <= sample.t < due[0] + 1 / FRAMES
-        if soon or not np.isfinite(sample.t):
-            return
-        due[0] = sample.t
-        if np.isfinite(sample.q).all():  # during silence the arm keeps its pose
-            data.qpos[rows] = sample.q
-            mujoco.mj_kinematics(model, data)
-        view.show(data, sample.t, [])
-        view.chart("score", ["score"], [answer.score / max(alarm.threshold, 1e-9)])
-        view.chart("state", ["state"], [states[answer.state]])
-
-    return show
+    view = StateView(detector.robot or robot, detector.joints, detector.threshold, save)
+    return lambda sample, answer: view.show(sample.t, sample.q, answer.state, answer.score)
 
 
-def summary(session: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
-    """The results of a run, as JSON values."""
-    collisions = session.spans.of("collision")
-    return {
-        "name": "listen",
-        "joints": list(session.joint_names),
-        "detector": alarm.detector.name,
-        "score_threshold": alarm.threshold,
-        "samples": session.samples,
-        "seconds": session.last - session.first if session.first == session.first else 0.0,
-        "alarms": len(collisions),
-        "events": [{"start": s.start, "end": s.end, "score": s.score} for s in collisions],
-        "faults": [{"start": s.start, "end": s.end, "reason": s.reason} for s in session.faults()],
-        "state": session.state,
-        "connection": events,
-        "ended": session.ended,
-        "latency_us": session.quantiles(),
-    }
-
-
-def report(result: dict[str, Any]) -> None:
-    """Print the results as text."""
-    for event in result["events"]:
-        line = (
-            f"collision {event['start']:.3f} s to {event['end']:.3f} s: score {event['score']:.2f}"
-        )
-        print(f"{line} above {result['score_threshold']:.2f}")
-    for fault in result["faults"]:
-        print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
-    for line in result["connection"]:
-        print(f"connection: {line}")
-    latency = result["latency_us"]
-    if latency:
-        print(
-            f"{result['samples']} samples in {result['seconds']:.1f} s, {result['ended']}; packet "
-            f"to answer: median {_us(latency['median'])} us, p99 {_us(latency['p99'])}, "
-            f"p99.9 {_us(latency['p99_9'])}, p99.99 {_us(latency['p99_99'])}, "
-            f"longest {_us(latency['max'])}"
-        )
-    else:
-        print(f"no sample was received: {result['ended']}")
-    print(f"state at the end: {result['state']}")
-
-
-def _us(value: float | None) -> str:
-    """Microseconds as text; None: above the range of the histogram."""
-    return "100,000 or more" if value is None else f"{value:,.0f}"
-
-
-def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
+def save(path: Path, result: Listening) -> None:
     """Write the recorded samples and their alarms as MCAP."""
-    import numpy as np
+    from tauguard.traces import write_mcap
 
-    from tauguard.detectors import find_alarms
-    from tauguard.traces import Detection, write_mcap
-
-    if len(session.rows) < 2:
-        raise ArgumentError(
-            f"--record {path}: fewer than 2 samples were received; nothing is written"
-        )
-    trace, up = session.trace(), np.array(session.alarms)
-    detection = Detection(
-        detector=alarm.detector.name,
-        t=trace.t,
-        residual=np.zeros_like(trace.q),
-        score=np.array(session.scores),
-        threshold=alarm.threshold,
-        alarm=up,
-        alarms=find_alarms(trace.t, up),
-    )
-    write_mcap(path, trace, detection)
-    print(f"{path}: {len(session.rows)} samples")
+    try:
+        trace = result.trace()
+    except ArgumentError as error:
+        raise ArgumentError(f"--record {path}: {error}") from None
+    write_mcap(path, trace, result.detection())
+    print(f"{path}: {len(trace.t)} samples")

@@ -26,14 +26,13 @@ def command(
             Names: frozen, stale, encoder, missing, late, repeated, rate, jump, bias, saturated,
             swapped, sign, nan.
     """
-    from tauguard import read_log
+    import tauguard as tg
     from tauguard.cli import expect
-    from tauguard.live.packets import Fault, Packets
-    from tauguard.live.ur_server import HOST, UrServer
+    from tauguard.live import Fault, Packets, UrServer
 
     expect("--port", port, 0, 65535)
     faults = [Fault.parse(text) for text in fault]
-    trace = read_log(log, columns).trace
+    trace = tg.read_log(log, columns).trace
     packets = Packets.of(trace)
     for one in faults:
         expect(f"--fault {one.name}@", one.start, 0, packets.t[-1] - packets.t[0])
@@ -41,7 +40,7 @@ def command(
     with UrServer(packets, port) as server:
         print(
             f"{log}: {trace.t[-1] - trace.t[0]:.1f} s at {1 / trace.dt:.0f} Hz on "
-            f"{HOST}:{server.port}, from the first client on (Ctrl-C ends)",
+            f"{server.host}:{server.port}, from the first client on (Ctrl-C ends)",
             flush=True,
         )
         while not server.wait(0.2):

@@ -1,0 +1,51 @@
+"""Public names, for type checkers."""
+
+from tauguard import benchmark as benchmark
+from tauguard import cloth as cloth
+from tauguard import contacts as contacts
+from tauguard import datasets as datasets
+from tauguard import detectors as detectors
+from tauguard import environments as environments
+from tauguard import envs as envs
+from tauguard import geometry as geometry
+from tauguard import hard_cases as hard_cases
+from tauguard import live as live
+from tauguard import models as models
+from tauguard import replay as replay
+from tauguard import report as report
+from tauguard import rigid as rigid
+from tauguard import traces as traces
+from tauguard import twin as twin
+from tauguard.datasets.arm_logs import read_log as read_log
+from tauguard.datasets.arm_logs import read_logs as read_logs
+from tauguard.datasets.arm_logs import simulated as simulated
+from tauguard.detectors.arm_calibration import Calibration as Calibration
+from tauguard.detectors.arm_calibration import calibrate as calibrate
+from tauguard.detectors.calibration.nominal import residual as residual
+from tauguard.detectors.detection import LogDetection as LogDetection
+from tauguard.detectors.detector import Detector as Detector
+from tauguard.detectors.detector import load_detector as load_detector
+from tauguard.detectors.evaluating import Evaluation as Evaluation
+from tauguard.detectors.evaluating import evaluate as evaluate
+from tauguard.detectors.training import detect_after_quiet as detect_after_quiet
+from tauguard.detectors.training import train as train
+from tauguard.findings import ArgumentError as ArgumentError
+from tauguard.findings import FileError as FileError
+from tauguard.findings import Finding as Finding
+from tauguard.findings import Findings as Findings
+from tauguard.findings import LogError as LogError
+from tauguard.findings import MismatchError as MismatchError
+from tauguard.findings import ModelFileError as ModelFileError
+from tauguard.findings import RefusedError as RefusedError
+from tauguard.findings import TauguardError as TauguardError
+from tauguard.live.listening import Listening as Listening
+from tauguard.live.listening import listen as listen
+from tauguard.replay.plot import plot as plot
+from tauguard.speed.limits import speed_limits as speed_limits
+from tauguard.traces.loads import Load as Load
+from tauguard.traces.logs import Log as Log
+from tauguard.traces.logs import Logs as Logs
+from tauguard.twin.of_logs import TwinOfLogs as TwinOfLogs
+from tauguard.twin.of_logs import identify_twin as identify_twin
+
+__version__: str
