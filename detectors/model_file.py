@@ -24,9 +24,9 @@ import numpy as np
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors import model_archive
 from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.self_check import check_alarms, check_ranges
 from tauguard.detectors.codec import Arrays, decode, encode, type_name
 from tauguard.detectors.registry import FILE_TYPES, file_type
-from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.findings import ModelFileError
 from tauguard.models.stored_robot import StoredRobot
 from tauguard.untrusted_input import check_no_device

@@ -145,7 +145,6 @@ BELOW, ABOVE = (
         "evaluating",
         "model_file",
         "registry",
-        "self_check",
         "training",
     },
 )

@@ -15,6 +15,7 @@ import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
+from tauguard.detectors.alarms.self_check import check_alarms, check_ranges
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.detectors.calibration.recording import (
@@ -131,7 +132,28 @@ def train_and_score(
     text = traces[0].attachments.get("arm.xml")
     robot = None if text is None else StoredRobot.of_text("arm.xml", text)
     usual = UsualInput.of(traces, alarm.detector.arm)
-    return replace(alarm, inputs=usual, robot=robot), scores
+    alarm = replace(alarm, inputs=usual, robot=robot)
+    _check_usable(alarm, traces)
+    return alarm, scores
+
+
+def _check_usable(alarm: CollisionAlarm, traces: Sequence[Trace]) -> None:
+    """Refuse a detector that no model file would be read with.
+
+    Raises:
+        ArgumentError: says how much motion it was trained on, and how much is needed.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            check_ranges(alarm)
+            check_alarms(alarm)
+    except ArgumentError as error:
+        free = [float(t.t[-1] - t.t[0]) for t in traces if not _collisions(t)]
+        raise ArgumentError(
+            f"the trained detector cannot be used: {error}; it was trained on {len(traces)} "
+            f"recordings, {len(free)} of them without collisions ({sum(free):.0f} s): give two or "
+            "more without collisions, better some minutes of such motion"
+        ) from None
 
 
 def train_beside(

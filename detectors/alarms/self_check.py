@@ -1,4 +1,4 @@
-"""Test of a detector from a file: no alarm while an arm stands, an alarm when it is hit.
+"""Test of a trained detector: no alarm while an arm stands, an alarm when it is hit.
 
 A detector whose numbers are all in range can still raise no alarm at all, or one all the time. The
 test refuses both. It does not measure the quality of a detector.
