@@ -3,7 +3,8 @@
 import pytest
 
 from tauguard.datasets import free_episodes, struck_episodes
-from tauguard.detectors import make_detector, train
+from tauguard.detectors import make_detector
+from tauguard.detectors.alarms.training import train
 from tauguard.envs import simulate
 from tauguard.findings import ArgumentError
 from tauguard.models import Mismatch
