@@ -29,12 +29,16 @@ class Adapter(Protocol):
         convex_overlap(a, b) -> bool                          corners, shapes (n, 3) and (m, 3)
         convex_sweep(a, b, displacement) -> time or None      b moves, a rests; touching counts
         convex_motion(a, b, motion_a, motion_b) -> time or None   see below
+        mesh_distance(vertices_a, faces_a, vertices_b, faces_b) -> float     of closed meshes
+        point_in_mesh(vertices, faces, point) -> bool         a point on the surface is inside
+        mesh_ray(vertices, faces, origin, direction) -> multiple of the direction, or None
         scene(mjcf, seconds) -> float                         last value of the sensor "answer"
         observer(mjcf, t, q, qd, tau, gain) -> float          last residual of the first joint
 
-    Times are in [0, 1] of the step. A motion is a dictionary: ``position`` [m] and ``rotation``
-    (a rotation vector [rad]) of the body's frame at the start, ``linear`` [m] and ``angular``
-    [rad] over the step, at constant rates. A scene starts from its first keyframe, if it has one.
+    Times are in [0, 1] of the step. A distance is negative where meshes overlap. A motion is a
+    dictionary: ``position`` [m] and ``rotation`` (a rotation vector [rad]) of the body's frame at
+    the start, ``linear`` [m] and ``angular`` [rad] over the step, at constant rates. A scene starts
+    from its first keyframe, if it has one.
     """
 
     name: str

@@ -18,6 +18,9 @@ KINDS = (
     "convex_overlap",
     "convex_sweep",
     "convex_motion",
+    "mesh_distance",
+    "point_in_mesh",
+    "mesh_ray",
     "scene",
     "observer",
 )
@@ -133,6 +136,6 @@ def answer_text(answer: Any) -> str:
 @cache
 def load_cases() -> tuple[Case, ...]:
     """Every case of the folder ``cases``, in the order of its files."""
-    files = ("queries", "convex", "scenes", "observer")
+    files = ("queries", "convex", "meshes", "scenes", "observer")
     texts = ((FOLDER / f"{name}.json").read_text("utf-8") for name in files)
     return tuple(Case(**entry) for text in texts for entry in json.loads(text))

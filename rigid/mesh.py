@@ -103,6 +103,8 @@ class MeshTree:
             raise ArgumentError(f"faces: {len(triangles)} rows, at most {2**28 - 1} fit")
         if np.abs(points).max() > 1e30:
             raise ArgumentError("vertices: a coordinate beyond 1e30; scale the mesh down")
+        if 0 < np.abs(points).max() < 1e-40:
+            raise ArgumentError("vertices: all coordinates are below 1e-40; scale the mesh up")
         if volume not in self.volumes:
             raise ArgumentError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
         self._vertices, self._faces, self._volume = points, triangles, volume

@@ -56,7 +56,7 @@ def mesh_distance(
     out, faces = np.empty((count, 10)), np.empty((count, 2), dtype=np.int32)
     a._mesh.distance(b._mesh, relative, out, faces, thread_count(threads))
     if a.closed and b.closed:
-        for row in range(count):
+        for row in np.flatnonzero(_may_overlap(a, b, relative, out[:, 0] == 0, threads)):
             _sign(a, b, relative[row], out[row], faces[row], threads)
     if pose_a is not None:
         for k in (1, 4):
@@ -78,17 +78,26 @@ def _moved(pose: Array, points: Array) -> Array:
     return np.asarray((pose[:, :3, :3] @ points[:, :, None])[:, :, 0] + pose[:, :3, 3])
 
 
+def _may_overlap(
+    a: MeshTree, b: MeshTree, relative: Array, met: NDArray[np.bool_], threads: int
+) -> NDArray[np.bool_]:
+    """Rows whose surfaces meet, or in which a part of one mesh is in the other. Shape (N,)."""
+    overlap = met.copy()
+    for mesh, other, place in ((a, b, relative), (b, a, _inverse(relative))):
+        for corner in other.part_corners:
+            points = place[:, :3, :3] @ corner + place[:, :3, 3]
+            near = ((points >= mesh.low) & (points <= mesh.high)).all(axis=1) & ~overlap
+            if near.any():
+                overlap[near] = mesh.contains(np.ascontiguousarray(points[near]), threads)
+    return overlap
+
+
 def _sign(
     a: MeshTree, b: MeshTree, pose: Array, out: Array, faces: NDArray[np.int32], threads: int
 ) -> None:
-    """Replace the row by that of the deepest point, if the meshes overlap."""
+    """Replace the row by that of the deepest point."""
     there, back = pose[None], _inverse(pose[None])
     met = out[0] == 0
-    if not met and not (
-        a.contains(_moved(there, b.part_corners)).any()
-        or b.contains(_moved(back, a.part_corners)).any()
-    ):
-        return
     corners = _moved(there, b.used_corners), _moved(back, a.used_corners)
     deepest = _deepest(a, corners[0], threads), _deepest(b, corners[1], threads)
     if met and deepest[0][0] == deepest[1][0] == 0:

@@ -1,4 +1,4 @@
-"""coal's GJK on convex hulls."""
+"""coal's GJK on convex hulls, and its distance of meshes."""
 
 from typing import Any
 
@@ -16,6 +16,26 @@ class Coal:
         request, result = coal.CollisionRequest(), coal.CollisionResult()
         still = coal.Transform3s.Identity()
         return bool(coal.collide(_hull(a), still, _hull(b), still, request, result))
+
+    def mesh_distance(self, vertices_a: Any, faces_a: Any, vertices_b: Any, faces_b: Any) -> float:
+        """Distance of two OBBRSS trees."""
+        a, b = _mesh(vertices_a, faces_a), _mesh(vertices_b, faces_b)
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        still = coal.Transform3s.Identity()
+        return float(coal.distance(a, still, b, still, request, result))
+
+
+def _mesh(vertices: Any, faces: Any) -> Any:
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in vertices:
+        points.append(np.array(point, dtype=np.float64))
+    for face in faces:
+        triangles.append(coal.Triangle(*face))
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    model.addSubModel(points, triangles)
+    model.endModel()
+    return model
 
 
 def _hull(points: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.cloth import edge_edge, vertex_face
-from tauguard.rigid import Hulls, Motion, overlap, sweep, time_of_impact
+from tauguard.rigid import Hulls, MeshTree, Motion, distance, overlap, sweep, time_of_impact
 
 
 class Ours:
@@ -33,6 +33,20 @@ class Ours:
         """Convex hulls at constant linear and angular velocity."""
         found = time_of_impact(_hull(a), _hull(b), _motion(motion_a), _motion(motion_b))
         return _first(found.time_of_impact)
+
+    def mesh_distance(self, vertices_a: Any, faces_a: Any, vertices_b: Any, faces_b: Any) -> float:
+        """Signed distance of two trees."""
+        a, b = MeshTree(vertices_a, faces_a), MeshTree(vertices_b, faces_b)
+        return float(distance(a, b).distance[0])
+
+    def point_in_mesh(self, vertices: Any, faces: Any, point: Any) -> bool:
+        """Containment in a tree."""
+        return bool(MeshTree(vertices, faces).contains([point])[0])
+
+    def mesh_ray(self, vertices: Any, faces: Any, origin: Any, direction: Any) -> float | None:
+        """The first face of a tree."""
+        length = MeshTree(vertices, faces).cast(origin, direction).distance
+        return _first(length / np.linalg.norm(direction))
 
     def scene(self, mjcf: str, seconds: float) -> float:
         """Steps of :class:`~tauguard.contacts.GuardedStepper`."""

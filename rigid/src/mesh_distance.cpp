@@ -1,4 +1,4 @@
-// Branch and bound over pairs of boxes, nearest first. Boxes further apart than the nearest
+// Branch and bound over pairs of boxes, the nearest first (a heap). Boxes further apart than the nearest
 // triangles so far are left out: by the separating axes of the overlap test, whose pad grows by
 // this distance, and by the direction between the nearest points so far, which prunes most pairs.
 #include "mesh_distance.hpp"
@@ -24,7 +24,7 @@ TAUGUARD_CLONES void lower_bounds(const ObbNode& node, const FloatObb& box, floa
   const Float8* e = reinterpret_cast<const Float8*>(node.extent);
   const Float8 d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],
                d2 = box.centre[2] - centre[2];
-  const Float8 square = d0 * d0 + d1 * d1 + d2 * d2 + 1e-37f;
+  const Float8 square = d0 * d0 + d1 * d1 + d2 * d2;
   Float8 d[3], s[3][3], most = (Float8){}, both = (Float8){}, across[3] = {};
   for (int i = 0; i < 3; ++i) {
     const Float8* n = reinterpret_cast<const Float8*>(node.axis[i]);
@@ -46,11 +46,11 @@ TAUGUARD_CLONES void lower_bounds(const ObbNode& node, const FloatObb& box, floa
     most = gap > most ? gap : most;
     both += box.extent[j] * abs(across[j]);
   }
-  // (|d|^2 - both) / |d|, with the root by Newton's step from below: divide by |d| from above.
+  // (|d|^2 - both) / |d|; not where the squares may underflow.
   const Float8 excess = square - both;
   Float8 length;
   for (int k = 0; k < width; ++k) length[k] = std::sqrt(square[k]);
-  const Float8 gap = excess / length;
+  const Float8 gap = square > 1e-30f ? excess / length : (Float8){};
   most = gap > most ? gap : most;
   most = e[0] < 0.0f ? (Float8){} + INFINITY : most;
   std::memcpy(out, &most, sizeof most);
@@ -67,9 +67,10 @@ class Search {
     float key[width];
     while (!stack.empty()) {
       geometry::poll_interrupt();
+      std::pop_heap(stack.begin(), stack.end(), further);
       const Open top = stack.back();
       stack.pop_back();
-      if (top.lower > limit_) continue;
+      if (top.lower > limit_) return;
       const SlotPair& pair = top.pair;
       const Child ca = pair.a.child(a_.tree), cb = pair.b.child(b_.tree);
       if (is_leaf(ca) && is_leaf(cb)) {
@@ -82,13 +83,11 @@ class Search {
         lower_bounds(oriented(a_, ca, scratch), placed(y, at_.b_in_a), key);
       else
         lower_bounds(oriented(b_, cb, scratch), placed(x, at_.a_in_b), key);
-      const std::size_t base = stack.size();
-      for (int s = 0; s < width; ++s)
-        if (key[s] <= limit_)
-          stack.push_back({open_a ? SlotPair{{ca, s}, pair.b} : SlotPair{pair.a, {cb, s}}, key[s]});
-      for (std::size_t i = base + 1; i < stack.size(); ++i)
-        for (std::size_t j = i; j > base && stack[j].lower > stack[j - 1].lower; --j)
-          std::swap(stack[j], stack[j - 1]);
+      for (int s = 0; s < width; ++s) {
+        if (!(key[s] <= limit_)) continue;
+        stack.push_back({open_a ? SlotPair{{ca, s}, pair.b} : SlotPair{pair.a, {cb, s}}, key[s]});
+        std::push_heap(stack.begin(), stack.end(), further);
+      }
     }
   }
 
@@ -100,6 +99,7 @@ class Search {
     SlotPair pair;
     float lower;  // bound of the distance
   };
+  static bool further(const Open& x, const Open& y) { return x.lower > y.lower; }
 
   void leaves(Child ca, Child cb) {
     const Vec3 origin = load(a_.tree.centre);

@@ -36,6 +36,7 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
   }
   out.pad = static_cast<float>((std::sqrt(square) * chord.turn + chord.sagitta) * (1 + 0x1p-20)) +
             chord.float_rounding;
+  out.pad = std::max(out.pad, 0x1p-120f);  // the reciprocal of a smaller one would be infinite
   return out;
 }
 

@@ -23,6 +23,9 @@ STUDY = Study(
             "rigid.motion", "time of impact of rotating bodies: computing time and error"
         ),
         "distance": Part("rigid.distance", "signed distance: computing time and error"),
+        "surfaces": Part(
+            "rigid.surfaces", "distances of meshes, points and rays; broad phase of many bodies"
+        ),
     },
 )
 #: Methods of Table 2.1: the columns of their times and wrong answers, and their role.

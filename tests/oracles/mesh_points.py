@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Long = NDArray[np.longdouble]
 
 
 def _exact(x: Array) -> list[Fraction]:
@@ -72,12 +73,13 @@ def solid_angle_winding(points: Array, triangles: Array) -> Array:
     x, y, z = np.moveaxis(length, 2, 0)
     det = np.einsum("nmj,nmj->nm", a, np.cross(b, c))
     dots = [np.einsum("nmj,nmj->nm", p, q) for p, q in ((a, b), (b, c), (c, a))]
-    return np.arctan2(det, x * y * z + dots[0] * z + dots[1] * x + dots[2] * y).sum(1) / (2 * np.pi)
+    below = x * y * z + dots[0] * z + dots[1] * x + dots[2] * y
+    return np.asarray(np.arctan2(det, below).sum(axis=1) / (2 * np.pi))
 
 
-def distance_of_triangles(a: Array, b: Array) -> float:
+def distance_of_triangles(one: Array, other: Array) -> float:
     """The distance of two triangles that are apart, by dense candidates in long double."""
-    a, b = a.astype(np.longdouble), b.astype(np.longdouble)
+    a, b = one.astype(np.longdouble), other.astype(np.longdouble)
     best = min(_point_triangle(p, b) for p in a)
     best = min(best, min(_point_triangle(p, a) for p in b))
     for i, j in product(range(3), range(3)):
@@ -85,7 +87,7 @@ def distance_of_triangles(a: Array, b: Array) -> float:
     return float(best)
 
 
-def _point_triangle(p: NDArray, t: NDArray) -> np.longdouble:
+def _point_triangle(p: Long, t: Long) -> np.longdouble:
     e, f, g = t[1] - t[0], t[2] - t[0], p - t[0]
     n = np.cross(e, f)
     nn = n @ n
@@ -97,14 +99,14 @@ def _point_triangle(p: NDArray, t: NDArray) -> np.longdouble:
     return best
 
 
-def _point_segment(p: NDArray, a: NDArray, b: NDArray) -> np.longdouble:
+def _point_segment(p: Long, a: Long, b: Long) -> np.longdouble:
     e = b - a
     s = np.clip((p - a) @ e / (e @ e), 0, 1) if e @ e > 0 else np.longdouble(0)
     g = p - a - s * e
-    return np.sqrt(g @ g)
+    return np.longdouble(np.sqrt(g @ g))
 
 
-def _segments(a: NDArray, b: NDArray, c: NDArray, d: NDArray) -> np.longdouble:
+def _segments(a: Long, b: Long, c: Long, d: Long) -> np.longdouble:
     ends = [(a, c, d), (b, c, d), (c, a, b), (d, a, b)]
     best = min(_point_segment(*end) for end in ends)
     u, v, r = b - a, d - c, a - c

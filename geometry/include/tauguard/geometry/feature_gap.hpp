@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "tauguard/geometry/vec3.hpp"
 
@@ -10,6 +12,14 @@ namespace tauguard::geometry {
 
 // The power of two that brings x into [1, 2), for 2^-1000 < x < 2^1000; 1 for x = 0.
 inline double unit_scale(double x) {
+  if (x > 0x1p-1000 && x < 0x1p1000) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    bits = (std::uint64_t{0x7fe} << 52) - (bits & std::uint64_t{0x7ff} << 52);
+    double scale;
+    std::memcpy(&scale, &bits, sizeof scale);
+    return scale;
+  }
   return x > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(x), -1000, 1000)) : 1;
 }
 
