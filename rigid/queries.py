@@ -17,6 +17,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
 from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
@@ -27,6 +28,7 @@ from tauguard.rigid.shapes import (
     SHARP,
     Bodies,
     Boxes,
+    Core,
     Hulls,
     Parallelepipeds,
     Polygons,
@@ -60,7 +62,7 @@ def sharp_overlap(
         if method == "sat":
             refuse_hulls(a, b)
         out = np.empty(rows(a, b, pose_a, pose_b), dtype=np.uint8)
-        first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+        first, second = posed_pair(a, b, SHARP, SHARP, pose_a, pose_b)
         _rigid.overlap_posed(first, second, _METHODS[method], thread_count(threads), out)
         hit = out.view(np.bool_)
     return Overlap(hit, lambda: find_witness(a, b, hit, threads, pose_a, pose_b))
@@ -149,7 +151,7 @@ def _posed_sweep(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:  # fmt: skip
     moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
     hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))
-    first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+    first, second = posed_pair(a, b, SHARP, SHARP, pose_a, pose_b)
     workers = thread_count(threads)
     _rigid.sweep_posed(first, second, moves, _METHODS[method], workers, hit, out)
     return hit.view(np.bool_), out
@@ -193,7 +195,7 @@ def find_witness(
 ) -> Witness:
     """A common point or a separating plane of each row, up to rounding."""
     out = np.empty((len(hit), 7))
-    first, second = a.grown(SHARP, pose_a), b.grown(SHARP, pose_b)
+    first, second = posed_pair(a, b, SHARP, SHARP, pose_a, pose_b)
     _rigid.witnesses(first, second, thread_count(threads), hit.view(np.uint8), out)
     return Witness(out[:, :3], out[:, 3:6], out[:, 6])
 
@@ -225,6 +227,14 @@ def row_count(a: Sized, b: Sized, pose_a: Poses, pose_b: Poses, others: int = 1)
     lengths = {"pose_a": pose_a, "pose_b": pose_b}
     given = {name: len(poses) for name, poses in lengths.items() if poses is not None}
     return common_length({"a, b": count} | given | {"displacement": others})
+
+
+def posed_pair(
+    a: Core, b: Core, radius_a: Array, radius_b: Array, pose_a: Poses, pose_b: Poses
+) -> tuple[_rigid.Batch, _rigid.Batch]:
+    """The native forms of both sides."""
+    moving = pose_a is not None or pose_b is not None
+    return a.grown(radius_a, pose_a, moving), b.grown(radius_b, pose_b, moving)
 
 
 def _no_polytopes(bodies: object) -> str:

@@ -115,13 +115,25 @@ class Core(Shape):
     kind: ClassVar[int]
 
     def grown(
-        self, radius: NDArray[np.float64], poses: NDArray[np.float64] | None = None
+        self,
+        radius: NDArray[np.float64],
+        poses: NDArray[np.float64] | None = None,
+        moving: bool = False,
     ) -> _rigid.Batch:
-        """The native form of the bodies grown by balls, with one radius per body or one for all."""
-        if radius is SHARP and poses is None:
+        """The native form of the bodies grown by balls, with one radius per body or one for all.
+
+        ``moving``: the bodies of this or the other side have poses.
+        """
+        if radius is SHARP and not moving:
             return self.native
         offsets = getattr(self, "offsets", _NO_OFFSETS)
-        return _rigid.Batch(self.kind, self.packed, offsets, radius, poses)
+        index = self.index if moving else None
+        return _rigid.Batch(self.kind, self.packed, offsets, radius, poses, index)
+
+    @property
+    def index(self) -> _rigid.HullIndex | None:
+        """For fast queries at many poses; only of a batch of one hull."""
+        return None
 
     @cached_property
     def native(self) -> _rigid.Batch:
@@ -316,6 +328,13 @@ class Hulls(PointSets):
     """
 
     kind, dimensions = 3, 3
+
+    @cached_property
+    def index(self) -> _rigid.HullIndex | None:
+        """See :class:`Core`. Hulls of fewer points are faster without."""
+        if len(self) > 1 or len(self.vertices) <= 32:
+            return None
+        return _rigid.HullIndex(self.vertices)
 
 
 class Polygons(PointSets):

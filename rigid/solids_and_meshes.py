@@ -14,7 +14,7 @@ from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
 from tauguard.rigid.mesh_distance import MeshPairDistances, mesh_distance
 from tauguard.rigid.motion import Motion, bounded, common_length, optional_poses
-from tauguard.rigid.queries import Poses, check_method, row_count, sharp_overlap
+from tauguard.rigid.queries import Poses, check_method, posed_pair, row_count, sharp_overlap
 from tauguard.rigid.results import (
     Distances,
     Impacts,
@@ -299,7 +299,7 @@ def _both(
     if isinstance(core_a, HalfSpaces) and isinstance(core_b, HalfSpaces):
         raise ArgumentError("a, b: two HalfSpaces always overlap unless they are parallel")
     count = row_count(core_a, core_b, pose_a, pose_b)
-    return count, core_a.grown(radius_a, pose_a), core_b.grown(radius_b, pose_b)
+    return count, *posed_pair(core_a, core_b, radius_a, radius_b, pose_a, pose_b)
 
 
 def _mesh_beside(
@@ -332,7 +332,7 @@ def _mesh_beside(
             "vertices are vertices @ normal - offset"
         )
     count = row_count(core, core, pose, None)
-    return mesh, core.grown(radius, pose), count, swapped
+    return mesh, core.grown(radius, pose, pose is not None), count, swapped
 
 
 def _faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:

@@ -8,7 +8,9 @@
 #include <optional>
 
 #include "first_touch.hpp"
+#include "hull_index.hpp"
 #include "posed_body.hpp"
+#include "signed_distance.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
@@ -37,14 +39,18 @@ inline void store(const FirstTouch& t, double* row) {
 // A batch of bodies, each grown by a ball: one radius for each row, or one for all. Poses, if any,
 // move them: one for all bodies, or one per row. It keeps the Python arrays alive.
 struct Batch : Bodies {
-  Batch(int kind, Packed data, Offsets offsets, Radii radii, std::optional<Poses> poses)
+  Batch(int kind, Packed data, Offsets offsets, Radii radii, std::optional<Poses> poses,
+        const HullIndex* index)
       : Bodies{static_cast<Kind>(kind), data.data(), offsets.data(),
                is_cloud(static_cast<Kind>(kind)) ? offsets.shape(0) - 1 : data.shape(0)},
         data_(data),
         offsets_(offsets),
         radii_(radii),
-        poses_(poses) {}
+        poses_(poses),
+        index_(index) {}
   double radius(std::size_t i) const { return radii_.data()[radii_.shape(0) == 1 ? 0 : i]; }
+  const HullIndex* index() const { return index_; }
+  bool in_place() const { return !poses_; }
   // The pose of row i; null without poses.
   const double* pose(std::size_t i) const {
     return poses_ ? poses_->data() + 16 * (poses_->shape(0) == 1 ? 0 : i) : nullptr;
@@ -55,12 +61,14 @@ struct Batch : Bodies {
   Offsets offsets_;
   Radii radii_;
   std::optional<Poses> poses_;
+  const HullIndex* index_;
 };
 
 // The bodies of a batch at their poses, row by row.
 class Posed {
  public:
   explicit Posed(const Batch& batch) : batch_(batch) {}
+  PosedRow row(std::size_t i) const { return {batch_, i, batch_.pose(i), batch_.index()}; }
   // Bodies whose row i is the body; valid until the next call.
   const Bodies& at(std::size_t i) {
     const double* pose = batch_.pose(i);
@@ -72,13 +80,13 @@ class Posed {
   PosedBody body_;
 };
 
-// Calls body(i, x, y) for all rows, with bodies whose row i is a pair. `grain`: rows a task.
+// Calls body(i, x, y) for all rows, with both sides at their poses. `grain`: rows a task.
 template <class Body>
 void each_pair(const Batch& a, const Batch& b, std::size_t rows, int threads, std::size_t grain,
                const Body& body) {
   geometry::interruptible_for(rows, threads, grain, [&](auto begin, auto end, auto) {
     Posed x(a), y(b);
-    for (auto i = begin; i < end; ++i) body(i, x.at(i), y.at(i));
+    for (auto i = begin; i < end; ++i) body(i, x, y);
   });
 }
 

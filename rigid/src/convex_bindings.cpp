@@ -19,9 +19,14 @@ using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 }  // namespace
 
 void bind_convex(nb::module_& m) {
+  nb::class_<HullIndex>(m, "HullIndex")
+      .def(
+          "__init__", [](HullIndex* self, Packed v) { new (self) HullIndex(v.data(), v.shape(0)); },
+          "vertices"_a, nb::keep_alive<1, 2>());
   nb::class_<Batch>(m, "Batch")
-      .def(nb::init<int, Packed, Offsets, Radii, std::optional<Poses>>(), "kind"_a, "packed"_a,
-           "offsets"_a, "radii"_a, "poses"_a = nb::none())
+      .def(nb::init<int, Packed, Offsets, Radii, std::optional<Poses>, const HullIndex*>(),
+           "kind"_a, "packed"_a, "offsets"_a, "radii"_a, "poses"_a = nb::none(),
+           "index"_a = nb::none(), nb::keep_alive<1, 7>())
       .def_prop_ro("curved", [](const Batch& b) { return !is_polytope(b.kind); });
   m.def("has_avx2", [] { return use_avx2(); });
   m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; }, "allowed"_a);
@@ -37,8 +42,12 @@ void bind_convex(nb::module_& m) {
       [](const Batch& a, const Batch& b, int method, int threads, Hits hit) {
         const LongCall call;
         const RowMethod decide = row_method(a.kind, b.kind, static_cast<Method>(method));
-        each_pair(a, b, hit.shape(0), threads, 256,
-                  [&](auto i, const Bodies& x, const Bodies& y) { decide(x, y, i, hit.data()); });
+        each_pair(a, b, hit.shape(0), threads, 256, [&](auto i, Posed& x, Posed& y) {
+          if (const auto known = posed_meet(x.row(i), y.row(i), 0, 0))
+            hit.data()[i] = *known;
+          else
+            decide(x.at(i), y.at(i), i, hit.data());
+        });
       },
       "a"_a, "b"_a, "method"_a, "threads"_a, "hit"_a);
   m.def(
@@ -46,9 +55,9 @@ void bind_convex(nb::module_& m) {
       [](const Batch& a, const Batch& b, Packed displacement, int method, int threads, Hits hit,
          Rows out) {
         const LongCall call;
-        each_pair(a, b, hit.shape(0), threads, 256, [&](auto i, const Bodies& x, const Bodies& y) {
+        each_pair(a, b, hit.shape(0), threads, 256, [&](auto i, Posed& x, Posed& y) {
           std::int64_t ox[2], oy[2];
-          sweep(row_of(x, i, ox), row_of(y, i, oy), displacement.data() + 3 * i, 1,
+          sweep(row_of(x.at(i), i, ox), row_of(y.at(i), i, oy), displacement.data() + 3 * i, 1,
                 static_cast<Method>(method), 1, true, hit.data() + i, out.data() + 7 * i);
         });
       },
@@ -97,8 +106,8 @@ void bind_convex(nb::module_& m) {
       "witnesses",
       [](const Batch& a, const Batch& b, int threads, Hits hit, Rows out) {
         const LongCall call;
-        each_pair(a, b, out.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
-          witness(x, y, i, hit.data()[i], out.data() + 7 * i);
+        each_pair(a, b, out.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
+          witness(x.at(i), y.at(i), i, hit.data()[i], out.data() + 7 * i);
         });
       },
       "a"_a, "b"_a, "threads"_a, "hit"_a, "out"_a);

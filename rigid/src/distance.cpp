@@ -1,46 +1,13 @@
 #include "tauguard/rigid/distance.hpp"
 
-#include "gjk.hpp"
-
-// The descent is inlined, so that it is compiled for the vector unit of each clone.
-#define TAUGUARD_FLAT TAUGUARD_CLONES __attribute__((flatten))
+#include "hull_descent.hpp"
 
 namespace tauguard::rigid {
 namespace {
 
-using Rows = std::array<std::size_t, 2>;
 struct SourcePoints {
   Vec3 a, b;
 };
-
-// The row of the point that is furthest along n; the first one if there are several.
-std::size_t extreme(const PointList& points, const Vec3& n) {
-  std::size_t best = 0;
-  double most = dot(n, points[0]);
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const double x = dot(n, points[i]);
-    if (most < x) most = x, best = i;
-  }
-  return best;
-}
-
-// Ends the descent when no point of b - a is nearer to the origin by more than rounding errors.
-struct ToRounding {
-  void visit(const Simplex<Rows>&) {}
-  bool enough(const Vec3& v, const Vec3& next) const {
-    return dot(v, v) - dot(v, next) <= 1e-14 * dot(v, v);
-  }
-  void stuck(const Simplex<Rows>&, const Vec3&) {}
-};
-
-template <class Watch>
-Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch) {
-  const auto support = [&](const Vec3& v) {
-    const std::size_t i = extreme(a, v), j = extreme(b, -1.0 * v);
-    return Corner<Rows>{b[j] - a[i], {i, j}, 0};
-  };
-  return descend(Corner<Rows>{b[0] - a[0], {0, 0}, 1.0}, support, watch, 0.0);
-}
 
 // Keeps the direction of the largest separation. Close to contact, cancellation makes the nearest
 // point useless as a direction, so the normals of the simplex's triangles are tried, too.
@@ -115,18 +82,7 @@ TAUGUARD_FLAT bool separating_direction(const PointList& a, const PointList& b, 
   return *separation > 0;
 }
 
-TAUGUARD_FLAT Nearest nearest(const PointList& a, const PointList& b) {
-  ToRounding watch;
-  const Simplex<Rows> s = descend_hulls(a, b, watch);
-  Nearest out{{}, {}, s.size(), {}};
-  for (int i = 0; i < s.size(); ++i) {
-    const Corner<Rows>& c = s.corner(i);
-    out.a = out.a + c.weight * a[c.from[0]];
-    out.b = out.b + c.weight * b[c.from[1]];
-    out.corner[i] = c.from;
-  }
-  return out;
-}
+TAUGUARD_FLAT Nearest nearest(const PointList& a, const PointList& b) { return nearest_of(a, b); }
 
 TAUGUARD_FLAT Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec3& guess,
                                    double needed) {

@@ -26,24 +26,38 @@ void store(const SignedDistance& g, double* row) {
 
 void distances(const Batch& a, const Batch& b, DistanceRows out, int threads) {
   const LongCall call;
-  each_pair(a, b, out.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
-    store(signed_distance(x, y, i, a.radius(i), b.radius(i)), out.data() + 10 * i);
+  if (a.in_place() && b.in_place())
+    return interruptible_for(out.shape(0), threads, 64, [&](auto begin, auto end, auto) {
+      for (auto i = begin; i < end; ++i)
+        store(signed_distance(a, b, i, a.radius(i), b.radius(i)), out.data() + 10 * i);
+    });
+  each_pair(a, b, out.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
+    SignedDistance g;
+    if (!posed_distance(x.row(i), y.row(i), a.radius(i), b.radius(i), &g))
+      g = signed_distance(x.at(i), y.at(i), i, a.radius(i), b.radius(i));
+    store(g, out.data() + 10 * i);
   });
 }
 
 void meets(const Batch& a, const Batch& b, Hits hit, int threads) {
   const LongCall call;
-  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
-    hit.data()[i] = meet(x, y, i, a.radius(i), b.radius(i));
+  if (a.in_place() && b.in_place())
+    return interruptible_for(hit.shape(0), threads, 64, [&](auto begin, auto end, auto) {
+      for (auto i = begin; i < end; ++i)
+        hit.data()[i] = meet(a, b, i, a.radius(i), b.radius(i));
+    });
+  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
+    const auto known = posed_meet(x.row(i), y.row(i), a.radius(i), b.radius(i));
+    hit.data()[i] = known ? *known : meet(x.at(i), y.at(i), i, a.radius(i), b.radius(i));
   });
 }
 
 // A common point of each row that is a hit; other rows stay as they are.
 void common_points(const Batch& a, const Batch& b, Hits hit, Vectors3 out, int threads) {
   const LongCall call;
-  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, const Bodies& x, const Bodies& y) {
+  each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
     if (!hit.data()[i]) return;
-    const Vec3 p = support_common_point(x, y, i, a.radius(i), b.radius(i));
+    const Vec3 p = support_common_point(x.at(i), y.at(i), i, a.radius(i), b.radius(i));
     std::copy(p.begin(), p.end(), out.data() + 3 * i);
   });
 }

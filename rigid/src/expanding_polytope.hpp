@@ -31,12 +31,48 @@ bool is_zero(const Vector3<Number>& x) {
 inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
-// Whether the sign of `side` may be wrong because of rounding (step 1 of depth_bound.hpp). `spread`
-// is the largest difference of the face's corners along its normal. Also true if a square is too
-// small or too large for a double.
-inline bool side_is_rounding(double side, double spread, double square, double size) {
+// Whether the sign of `side`, of a face with corners y, may be wrong because of rounding (step 1 of
+// depth_bound.hpp). Also true if a square is too small or too large for a double.
+inline bool side_is_rounding(double side, const Vec3& normal, const std::array<const Vec3*, 3>& y,
+                             double square, double size) {
+  // The largest difference of the corners along the normal.
+  const double x = dot(normal, *y[0]), spread = std::max(std::fabs(dot(normal, *y[1]) - x),
+                                                         std::fabs(dot(normal, *y[2]) - x));
   const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
   return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);
+}
+
+// Finds four differences that span space, as PointDifferences::span, from support points. `small`:
+// a length that counts as zero.
+template <class Set>
+bool span_by_supports(const Set& set, double small, std::array<Vec3, 4>* y,
+                      std::array<typename Set::Source, 4>* from, Vec3* normal) {
+  const auto take = [&](int k, const Vec3& d) {
+    (*y)[k] = set.at((*from)[k] = set.farthest(-1.0 * d));
+  };
+  const auto edge = [&](int k) { return (*y)[k] - (*y)[0]; };
+  for (int axis = 0; axis < 3 && (axis == 0 || !(norm(edge(1)) > small)); ++axis) {
+    Vec3 d{};
+    d[axis] = 1;
+    take(0, d), take(1, -1.0 * d);
+  }
+  const auto add_off = [&](int k, const Vec3& d, const auto& off) {
+    for (const double sign : {1.0, -1.0}) {
+      take(k, sign * d);
+      if (off(edge(k))) return true;
+    }
+    return false;
+  };
+  const Vec3 e = edge(1);
+  Vec3 side{};
+  side[geometry::smallest_axis(e)] = 1;
+  const Vec3 u = cross(e, side), w = cross(e, u);
+  *normal = u;
+  const auto off_line = [&](const Vec3& x) { return norm(cross(e, x)) > small * norm(e); };
+  if (!add_off(2, u, off_line) && !add_off(2, w, off_line)) return false;
+  const Vec3 n = cross(e, edge(2));
+  *normal = n;
+  return add_off(3, n, [&](const Vec3& x) { return std::fabs(dot(n, x)) > small * norm(n); });
 }
 
 // The differences b_j - a_i of two lists of points.
@@ -112,11 +148,8 @@ class PointDifferences {
   // Whether the sign of `side`, four times a height above a triangle, may be wrong.
   bool unsure(const Number& side, const Vector3<Number>& normal, const Number& square,
               const std::array<const Vector3<Number>*, 3>& y) const {
-    if constexpr (std::is_same_v<Number, double>) {
-      const double x = dot(normal, *y[0]), spread = std::max(std::fabs(dot(normal, *y[1]) - x),
-                                                             std::fabs(dot(normal, *y[2]) - x));
-      return side_is_rounding(side, spread, square, size_);
-    }
+    if constexpr (std::is_same_v<Number, double>)
+      return side_is_rounding(side, normal, y, square, size_);
     return false;
   }
 
@@ -203,12 +236,15 @@ class ExpandingPolytope {
   // Replaces the faces that are visible from w by the cone from w over their rim. False if rounding
   // makes the rim something else than one or more closed curves.
   bool grow(const Vector3<Number>& w, std::size_t seen) {
-    std::vector<std::pair<int, int>> edges;
-    std::vector<Face> rest;
+    auto& edges = edges_;
+    auto& degree = degree_;
+    edges.clear();
+    std::size_t rest = 0;
     for (std::size_t f = 0; f < faces_.size(); ++f) {
       const Face& face = faces_[f];
       if (f != seen && !differences_.sees(dot(face.normal, w) - face.offset, face.square)) {
-        rest.push_back(face);
+        if (rest != f) faces_[rest] = face;
+        ++rest;
         continue;
       }
       for (int k = 0; k < 3; ++k)
@@ -216,9 +252,9 @@ class ExpandingPolytope {
     }
     const int apex = static_cast<int>(points_.size());
     points_.push_back(w);
-    faces_ = std::move(rest);
+    faces_.resize(rest);
     std::sort(edges.begin(), edges.end());
-    std::vector<int> degree(points_.size(), 0);
+    degree.assign(points_.size(), 0);
     int rim = 0;
     for (std::size_t i = 0, count; i < edges.size(); i += count) {
       for (count = 1; i + count < edges.size() && edges[i + count] == edges[i];) ++count;
@@ -236,6 +272,8 @@ class ExpandingPolytope {
   std::vector<Vector3<Number>> points_;
   std::vector<Source> sources_;
   std::vector<Face> faces_;
+  std::vector<std::pair<int, int>> edges_;
+  std::vector<int> degree_;
   Vector3<Number> inside4_{};
   bool broken_ = false;
 };

@@ -18,31 +18,7 @@ class ShapeDifferences {
   Source farthest(const Vec3& n) const { return {a_.support(-1.0 * n), b_.support(n)}; }
 
   bool span(std::array<Vec3, 4>* y, std::array<Source, 4>* from, Vec3* normal, bool*) const {
-    const double small = 1e-9 * size_;
-    const auto take = [&](int k, const Vec3& d) { (*y)[k] = at((*from)[k] = farthest(-1.0 * d)); };
-    const auto edge = [&](int k) { return (*y)[k] - (*y)[0]; };
-    for (int axis = 0; axis < 3 && (axis == 0 || !(norm(edge(1)) > small)); ++axis) {
-      Vec3 d{};
-      d[axis] = 1;
-      take(0, d), take(1, -1.0 * d);
-    }
-    const auto add_off = [&](int k, const Vec3& d, const auto& off) {
-      for (const double sign : {1.0, -1.0}) {
-        take(k, sign * d);
-        if (off(edge(k))) return true;
-      }
-      return false;
-    };
-    const Vec3 e = edge(1);
-    Vec3 side{};
-    side[geometry::smallest_axis(e)] = 1;
-    const Vec3 u = cross(e, side), w = cross(e, u);
-    *normal = u;
-    const auto off_line = [&](const Vec3& x) { return norm(cross(e, x)) > small * norm(e); };
-    if (!add_off(2, u, off_line) && !add_off(2, w, off_line)) return false;
-    const Vec3 n = cross(e, edge(2));
-    *normal = n;
-    return add_off(3, n, [&](const Vec3& x) { return std::fabs(dot(n, x)) > small * norm(n); });
+    return span_by_supports(*this, 1e-9 * size_, y, from, normal);
   }
 
   bool is_final(double excess, double square, const Source&) const {

@@ -10,6 +10,13 @@ namespace tauguard::rigid {
 
 class PosedBody {
  public:
+  // R x + share t
+  static void point(const double* pose, const double* x, double share, double* out) {
+    for (int i = 0; i < 3; ++i)
+      out[i] = (pose[4 * i] * x[0] + pose[4 * i + 1] * x[1] + pose[4 * i + 2] * x[2]) +
+               share * pose[4 * i + 3];
+  }
+
   // The body of row r at `pose` (homogeneous, 16 doubles by rows), as a batch of one.
   const Bodies& place(const Bodies& bodies, std::size_t r, const double* pose) {
     const double* p = bodies.row(r);
@@ -46,13 +53,6 @@ class PosedBody {
   }
 
  private:
-  // R x + share t
-  static void point(const double* pose, const double* x, double share, double* out) {
-    for (int i = 0; i < 3; ++i)
-      out[i] = (pose[4 * i] * x[0] + pose[4 * i + 1] * x[1] + pose[4 * i + 2] * x[2]) +
-               share * pose[4 * i + 3];
-  }
-
   std::vector<double> out_;
   std::int64_t offsets_[2] = {0, 0};
   Bodies view_{};

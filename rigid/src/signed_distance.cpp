@@ -11,23 +11,15 @@
 #include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
-namespace {
 
-// A result in double precision is accepted if its upper and lower bound of the distance differ by
-// at most this fraction of the size (the largest coordinate). Its error is then below 2^-45 of the
-// size, or 256 unit roundoffs, which have these parts:
-//   128    difference of the bounds,
-//   18     rounding of the vertices,
-//   21     rounding of the upper bound,
-//   69     rounding of the lower bound: at most 18 if the bodies are apart, 39 in least_depth, and
-//          21 + 48 in FacetDepth (48 for the facets that it leaves out).
-constexpr double certain = 0x1p-46;
-// Distances below this fraction of the size need exact arithmetic, for the sign.
-constexpr double near = 1e-10;
-// Inside this range products of four lengths neither overflow nor underflow.
-bool in_range(double size) { return size > 1e-40 && size < 1e40; }
+double size_of(const Points<double>& a, const Points<double>& b) {
+  double size = 0;
+  for (const auto* points : {&a, &b})
+    for (const auto& p : *points)
+      for (const double x : p) size = std::max(size, std::isfinite(x) ? std::fabs(x) : HUGE_VAL);
+  return size;
+}
 
-// Vertices relative to `origin`. Each subtraction is rounded once: a relative error of u.
 void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Points<double>* out) {
   const double* p = bodies.row(row);
   out->resize(bodies.vertex_count(row));
@@ -45,13 +37,22 @@ void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Poi
   for (std::size_t i = 0; i < out->size(); ++i) (*out)[i] = geometry::load(p + 3 * i) - origin;
 }
 
-double size_of(const Points<double>& a, const Points<double>& b) {
-  double size = 0;
-  for (const auto* points : {&a, &b})
-    for (const auto& p : *points)
-      for (const double x : p) size = std::max(size, std::isfinite(x) ? std::fabs(x) : HUGE_VAL);
-  return size;
+SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
+  const Vec3 between = point_b - point_a;
+  const double distance = norm(between);
+  return {distance, point_a, point_b, (1 / distance) * between};
 }
+
+SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
+                        double depth, double size) {
+  geometry::Scratch<Points<double>> moved;
+  moved->clear();
+  for (const Vec3& p : b) moved->push_back(p + depth * n);
+  const Vec3 point = contact_point(a, *moved, n, 1e-11 * size);
+  return {-depth, point, point - depth * n, n};
+}
+
+namespace {
 
 // The vertices of a pair relative to a point of its first body, and their size.
 struct LocalPair {
@@ -71,22 +72,6 @@ double top(const Points<double>& points, const Vec3& n) {
   return m;
 }
 double bottom(const Points<double>& points, const Vec3& n) { return -top(points, -1.0 * n); }
-
-SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
-  const Vec3 between = point_b - point_a;
-  const double distance = norm(between);
-  return {distance, point_a, point_b, (1 / distance) * between};
-}
-
-// The result for overlapping bodies, which touch after b is moved by `depth` along n.
-SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec3& n,
-                        double depth, double size) {
-  geometry::Scratch<Points<double>> moved;
-  moved->clear();
-  for (const Vec3& p : b) moved->push_back(p + depth * n);
-  const Vec3 point = contact_point(a, *moved, n, 1e-11 * size);
-  return {-depth, point, point - depth * n, n};
-}
 
 // The distance of two bodies that are close at parallel features. The segment between the nearest
 // points is then so short that rounding changes its direction. The normal of the triangle of
