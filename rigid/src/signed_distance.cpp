@@ -12,7 +12,10 @@
 
 namespace tauguard::rigid {
 
-double size_of(const Points<double>& a, const Points<double>& b) {
+namespace {
+
+// Inlined below; the functions of signed_distance.hpp call them.
+TAUGUARD_INLINE double size_here(const Points<double>& a, const Points<double>& b) {
   double size = 0;
   for (const auto* points : {&a, &b})
     for (const auto& p : *points)
@@ -20,7 +23,8 @@ double size_of(const Points<double>& a, const Points<double>& b) {
   return size;
 }
 
-void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Points<double>* out) {
+TAUGUARD_INLINE void points_here(const Bodies& bodies, std::size_t row, const Vec3& origin,
+                                 Points<double>* out) {
   const double* p = bodies.row(row);
   out->resize(bodies.vertex_count(row));
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
@@ -35,6 +39,13 @@ void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Poi
     return;
   }
   for (std::size_t i = 0; i < out->size(); ++i) (*out)[i] = geometry::load(p + 3 * i) - origin;
+}
+
+}  // namespace
+
+double size_of(const Points<double>& a, const Points<double>& b) { return size_here(a, b); }
+void local_points(const Bodies& bodies, std::size_t row, const Vec3& origin, Points<double>* out) {
+  points_here(bodies, row, origin, out);
 }
 
 SignedDistance apart(const Vec3& point_a, const Vec3& point_b) {
@@ -61,8 +72,8 @@ struct LocalPair {
   double size;
   void set(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
     origin = geometry::load(bodies_a.row(row));
-    local_points(bodies_a, row, origin, &a), local_points(bodies_b, row, origin, &b);
-    size = size_of(a, b);
+    points_here(bodies_a, row, origin, &a), points_here(bodies_b, row, origin, &b);
+    size = size_here(a, b);
   }
 };
 
