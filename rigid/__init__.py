@@ -1,5 +1,6 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.convex_parts import convex_parts
 from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.mesh_distance import MeshPairDistances
@@ -17,5 +18,5 @@ __all__ = [
     "Impacts", "MeshContacts", "MeshDistances", "MeshImpacts", "MeshOverlap",
     "MeshPairDistances", "MeshTree", "Motion", "Overlap", "Parallelepipeds", "PlaneCache",
     "PointDistances", "Polygons", "RayHits", "Rounded", "Shape", "Spheres", "Tetrahedra",
-    "Witness", "distance", "near_pairs", "overlap", "sweep", "time_of_impact",
+    "Witness", "convex_parts", "distance", "near_pairs", "overlap", "sweep", "time_of_impact",
 ]  # fmt: skip
