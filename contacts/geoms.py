@@ -9,6 +9,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
 from tauguard.contacts.checker import geom_kinds
+from tauguard.contacts.frames import frame_on_mover
 from tauguard.findings import ArgumentError
 from tauguard.rigid.imports import hull_rows
 
@@ -63,8 +64,7 @@ def hull_vertices(model: Any, geom: int) -> Array:
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
     size = model.geom_size[geom].astype(np.float64)
     radius = float(size[0]) if kind in ("sphere", "capsule") else 0.0
-    mat = np.zeros(9)
-    mujoco.mju_quat2Mat(mat, model.geom_quat[geom])
+    mover, pos, mat = frame_on_mover(model, geom)
     vertices = normals = edges = _NONE
     if kind == "mesh":
         vertices = np.ascontiguousarray(hull_vertices(model, geom))
@@ -74,8 +74,8 @@ def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
         NATIVE_KINDS[kind],
         size,
         radius,
-        int(model.geom_bodyid[geom]),
-        np.ascontiguousarray(model.geom_pos[geom], dtype=np.float64),
+        mover,
+        pos,
         mat,
         vertices,
         normals,

@@ -114,10 +114,21 @@ def _dynamic(model: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         related = (weld[i] == parent[j]) | (weld[j] == parent[i])
         allowed &= ~(related & (weld[i] != 0) & (weld[j] != 0))
     low, high = np.minimum(body[i], body[j]), np.maximum(body[i], body[j])
-    allowed &= ~np.isin((low << 16) + high, model.exclude_signature)
+    allowed &= ~np.isin((low << 16) + high, _excluded(model))
     contype, conaffinity = model.geom_contype, model.geom_conaffinity
     allowed &= ((contype[i] & conaffinity[j]) | (contype[j] & conaffinity[i])) != 0
     return i[allowed], j[allowed]
+
+
+def _excluded(model: Any) -> NDArray[np.int64]:
+    """Signatures that MuJoCo excludes: of an unsorted list, those above all before them.
+
+    MuJoCo reads the list once, beside its sorted pairs of bodies, and stops at the first signature
+    that is not below that of the pair.
+    """
+    listed = model.exclude_signature.astype(np.int64)
+    before = np.maximum.accumulate(np.r_[-1, listed])[:-1]
+    return np.asarray(listed[listed > before])
 
 
 def _ordered(model: Any, a: int, b: int) -> tuple[int, int]:

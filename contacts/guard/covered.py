@@ -92,7 +92,7 @@ class Covered:
             levels = np.array([self._eroded.add(geom, layer) for layer in layers], dtype=np.int32)
             self._guard.flex_pair(levels, np.array(radii), simplices, hangs)
             self.pairs.append(own)
-            rows.append(_row(own, own[0], len(LEVELS)))
+            rows.append(_row(own, own[1], len(LEVELS)))
         self._add_rows(rows)
 
     def _add_sheets(self, wanted: bool) -> list[tuple[int, int]]:

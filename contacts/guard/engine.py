@@ -89,6 +89,8 @@ _RESETS = (
     int(mujoco.mjtWarning.mjWARN_BADQVEL),
     int(mujoco.mjtWarning.mjWARN_BADQACC),
 )
+#: Warnings of too little memory for contacts and for constraints.
+_FULL = (int(mujoco.mjtWarning.mjWARN_CONTACTFULL), int(mujoco.mjtWarning.mjWARN_CNSTRFULL))
 _NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "npair", "nflex", "nflexvert", "ntendon")
 #: mjLOG_ERROR of mjtLogLevel, which the Python binding does not show.
 _LOG_ERROR = 3
@@ -132,6 +134,9 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     for k, kind in enumerate(_RESETS):
         at = kind * ctypes.sizeof(warning) + int(warning.number.offset)
         out[f"resets[{k}]"] = base + int(fields.warning.offset) + at
+    for k, kind in enumerate(_FULL):
+        at = kind * ctypes.sizeof(warning) + int(warning.number.offset)
+        out[f"full[{k}]"] = base + int(fields.warning.offset) + at
     names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame", "surfacevel")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     out["at_friction_of"] = int(contact.friction.offset)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
+from tauguard.contacts.frames import frame_on_mover
 from tauguard.contacts.geoms import NATIVE_KINDS, hull_vertices
 
 _NONE = np.zeros((0, 3))
@@ -56,37 +56,14 @@ class ErodedShapes:
             size = np.maximum(size - layer, 0)
         elif kind == "mesh":
             vertices = self._hull(geom).core(layer)
-        place, mat = frame_on_body(model, geom)
-        body = int(model.geom_bodyid[geom])
-        return self._guard.add(NATIVE_KINDS[kind], size, radius, body, place, mat, vertices)
+        mover, place, mat = frame_on_mover(model, geom)
+        return self._guard.add(NATIVE_KINDS[kind], size, radius, mover, place, mat, vertices)
 
     def _hull(self, geom: int) -> _Hull:
         mesh = int(self._model.geom_dataid[geom])
         if mesh not in self._hulls:
             self._hulls[mesh] = _Hull(hull_vertices(self._model, geom))
         return self._hulls[mesh]
-
-
-def frame_on_body(model: Any, geom: int) -> tuple[Array, Array]:
-    """Position (3,) [m] and rotation (9,) of a geom relative to its body, as MuJoCo uses them.
-
-    If the compiled geom has the frame of its body or of the body's inertia (``geom_sameframe``),
-    MuJoCo ignores ``geom_pos`` and ``geom_quat``.
-    """
-    kinds, own = mujoco.mjtSameFrame, int(model.geom_sameframe[geom])
-    body = int(model.geom_bodyid[geom])
-    place, quat = model.geom_pos[geom], model.geom_quat[geom]
-    if own == kinds.mjSAMEFRAME_BODY:
-        place = np.zeros(3)
-    elif own == kinds.mjSAMEFRAME_INERTIA:
-        place = model.body_ipos[body]
-    if own in (kinds.mjSAMEFRAME_BODY, kinds.mjSAMEFRAME_BODYROT):
-        quat = np.array([1.0, 0, 0, 0])
-    elif own in (kinds.mjSAMEFRAME_INERTIA, kinds.mjSAMEFRAME_INERTIAROT):
-        quat = model.body_iquat[body]
-    mat = np.zeros(9)
-    mujoco.mju_quat2Mat(mat, quat)
-    return np.ascontiguousarray(place, dtype=np.float64), mat
 
 
 class _Hull:

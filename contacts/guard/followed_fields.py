@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import geom_kinds
+from tauguard.contacts.frames import movers
 from tauguard.contacts.guard.engine import PHYSICS
 from tauguard.findings import ArgumentError
 from tauguard.rigid.imports import hull_rows
@@ -69,9 +70,13 @@ def followed_fields(model: Any, options: Regions) -> Regions:
         array = getattr(model, name)
         if array.size:
             out.append((array.ctypes.data, array.nbytes))
-    vertices = model.mesh_vert
-    for row in _hull_rows(model).tolist():
-        out.append((vertices[row].ctypes.data, vertices[row].nbytes))
+    carried = np.flatnonzero(movers(model) != np.arange(model.nbody))
+    for array, rows in (
+        (model.mesh_vert, _hull_rows(model)),
+        (model.body_pos, carried),
+        (model.body_quat, carried),
+    ):
+        out += [(array[row].ctypes.data, array[row].nbytes) for row in rows.tolist()]
     return out
 
 
@@ -167,7 +172,7 @@ def refuse_values(model: Any) -> None:
     for name, least, end in _targets(model):
         outside = partial(_outside, least=least, end=end)
         _refuse_rows(model, name, outside, "no such object")
-    for name in ("geom_quat", "body_iquat"):
+    for name in ("geom_quat", "body_iquat", "body_quat"):
         _refuse_rows(model, name, _not_unit, "not of unit length")
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     _refuse_rows(model, "geom_size", lambda rows: (rows < 0) & ~plane[:, None], "negative")

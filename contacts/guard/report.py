@@ -48,6 +48,11 @@ class StepReport:
         cuts: Sub-steps that were rolled back, in their order.
         passed: Pairs that may have passed through each other.
         impact_zones: Pairs that moved rigidly together in a sub-step.
+        unaided: Whether the solver could not help in some sub-step, because MuJoCo has too little
+            memory (``<size memory="..."/>``) for the contacts that this needs. Pairs were then
+            stopped by impact zones.
+        standstill: Duration for which all bodies except mocap bodies stood still, whatever forces
+            act, because nothing else kept pairs from passing through or energy from rising [s].
         energy_added: Sum of the energy gains of accepted sub-steps [J]. The gain of a sub-step is
             the change of kinetic, potential and elastic energy minus the work of drives, mocap
             bodies, moving surfaces and applied forces. Sub-steps that lose energy count as 0,
@@ -60,6 +65,8 @@ class StepReport:
     cuts: tuple[Cut, ...] = ()
     passed: tuple[Pair, ...] = ()
     impact_zones: tuple[Pair, ...] = ()
+    unaided: bool = False
+    standstill: float = 0.0
     energy_added: float = 0.0
     _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 

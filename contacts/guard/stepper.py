@@ -248,13 +248,15 @@ class GuardedStepper:
         return tuple(sorted([self._pairs[k] for k in numbers])) if numbers else ()
 
     def _report(self) -> StepReport:
-        steps, contacts, cuts, passed, zones, added, states = self._guard.report()
+        steps, contacts, cuts, passed, zones, unaided, still, added, states = self._guard.report()
         return StepReport(
             steps,
             contacts,
             tuple([Cut(time, self._pairs[pair]) for time, pair in cuts]),
             self._named(passed),
             self._named(zones),
+            unaided,
+            still,
             added,
             None if states is None else functools.partial(self._balance, states),
         )

@@ -77,6 +77,7 @@ struct Engine {
   int *const *efc_type, *const *efc_id;
 
   int* resets[3];  // MuJoCo's counts of warnings of bad positions, velocities and accelerations
+  int* full[2];    // and of too little memory for contacts and for constraints
 
   // Fields of `end`.
   double *end_qvel, *end_energy;
@@ -109,8 +110,8 @@ struct Engine {
                   nefc, contact, contact_size, at_dist, at_dim, at_geom, at_flex, at_efc_address,
                   at_pos, at_frame, at_friction_of, at_surfacevel, efc_aref, efc_margin, efc_vel,
                   efc_pos, efc_force, efc_diagA, efc_type, efc_id, resets[0], resets[1], resets[2],
-                  end_qvel, end_energy, end_xpos, end_xmat, end_flexvert_xpos, end_cvel,
-                  other_energy, other_mocap_pos, other_mocap_quat, other_xpos, other_xmat,
+                  full[0], full[1], end_qvel, end_energy, end_xpos, end_xmat, end_flexvert_xpos,
+                  end_cvel, other_energy, other_mocap_pos, other_mocap_quat, other_xpos, other_xmat,
                   other_flexvert_xpos, discrete, runge_kutta, pyramidal, elliptic, refsafe, newton,
                   equality, override_flag, refused, contact_filter, callbacks[0], callbacks[1],
                   callbacks[2], callbacks[3], callbacks[4], callbacks[5], callbacks[6], at_pstack,
@@ -140,6 +141,29 @@ struct Engine {
     return false;
   }
   bool is_discrete() const { return *integrator == discrete; }
+};
+
+// MuJoCo's stack pointers, which an error does not reset.
+class Stacks {
+ public:
+  explicit Stacks(const Engine& engine) : e_(engine) {
+    for (int k = 0; k < 3; ++k)
+      std::memcpy(&stack_[k], at(k, e_.at_pstack), sizeof stack_[k]),
+          std::memcpy(&frames_[k], at(k, e_.at_pbase), sizeof frames_[k]);
+  }
+  void put_back() const {
+    for (int k = 0; k < 3; ++k)
+      std::memcpy(at(k, e_.at_pstack), &stack_[k], sizeof stack_[k]),
+          std::memcpy(at(k, e_.at_pbase), &frames_[k], sizeof frames_[k]);
+  }
+
+ private:
+  char* at(int k, std::size_t offset) const {
+    void* const all[3] = {e_.data, e_.end, e_.other};
+    return static_cast<char*>(all[k]) + offset;
+  }
+  const Engine& e_;
+  std::size_t stack_[3], frames_[3];
 };
 
 // Detects whether MuJoCo resets the data while this object lives, because numbers are not finite or

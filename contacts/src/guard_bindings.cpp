@@ -94,6 +94,10 @@ class Guard {
     Stepper::TunnellingEvents find;
     if (sheets) find = [this](std::vector<PairHit>* hits) { add_tunnelling(hits); };
     stepper_->set_tunnelling(std::move(find));
+    stepper_->set_interrupted([] {
+      const nb::gil_scoped_acquire acquire;
+      return PyErr_Occurred() != nullptr;
+    });
   }
 
   // One step. Returns the number of contacts, or -1 if there is more to report. `owner` owns this
@@ -148,7 +152,8 @@ class Guard {
   // The fields of StepReport; if the step was rolled back, the last item has the states at its
   // start and its end, one after the other.
   using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int>>;
-  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, double, std::optional<nb::bytes>>
+  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, bool, double, double,
+            std::optional<nb::bytes>>
   report() const {
     const Report& r = stepper_->report();
     const auto ids = [](const std::vector<int>& values) {
@@ -158,8 +163,8 @@ class Guard {
     };
     nb::list cuts;
     for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair));
-    return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.passed), ids(r.impact_zones), r.added,
-                          r.rolled_back ? states() : nb::none());
+    return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.passed), ids(r.impact_zones), r.unaided,
+                          r.standstill, r.added, r.rolled_back ? states() : nb::none());
   }
 
   Integers sunk() const {
@@ -192,26 +197,6 @@ class Guard {
           "this guard is in a step, called by another thread or around this callback: wait until "
           "the step ends, or use one guard and one MjData per thread");
   }
-
-  // Saves MuJoCo's stack pointers and restores them after an error, which does not reset them.
-  struct Stacks {
-    explicit Stacks(const Engine& engine) : e(engine) {
-      for (int k = 0; k < 3; ++k)
-        std::memcpy(&stack[k], at(k, e.at_pstack), sizeof stack[k]),
-            std::memcpy(&frames[k], at(k, e.at_pbase), sizeof frames[k]);
-    }
-    void put_back() const {
-      for (int k = 0; k < 3; ++k)
-        std::memcpy(at(k, e.at_pstack), &stack[k], sizeof stack[k]),
-            std::memcpy(at(k, e.at_pbase), &frames[k], sizeof frames[k]);
-    }
-    char* at(int k, std::size_t offset) const {
-      void* const all[3] = {e.data, e.end, e.other};
-      return static_cast<char*>(all[k]) + offset;
-    }
-    const Engine& e;
-    std::size_t stack[3], frames[3];
-  };
 
   void undo(const Stacks& stacks) {
     stacks.put_back();

@@ -1,5 +1,6 @@
 // Rolls back a step that was not accepted, and repeats it in sub-steps.
 #include <algorithm>
+#include <cmath>
 
 #include "stepper.hpp"
 
@@ -15,6 +16,15 @@ constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 // unless more than `watched` steps were accepted between them.
 constexpr double longer = 4, longest = 0.25;
 
+// Speed at which overlaps are pushed out, divided by the depth [1/s]: the largest at which a
+// critically damped contact with the time constant 0.02 s, released at rest, separates. Mocap
+// bodies push out faster: the fraction `pushed` of the depth in each step.
+const double recovery = 1 / (0.02 * M_E);
+constexpr double pushed = 0.2;
+
+// A sub-step may have `more` times the contacts of the plain step, and `few` in addition.
+constexpr int more = 4, few = 1000;
+
 // Largest number of attempts to find all pairs of an impact zone.
 constexpr int rounds = 8;
 
@@ -26,10 +36,12 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   std::fill(in_zone_.begin(), in_zone_.end(), 0);
   speeds_.clear();
   rows_.begin();
+  contacts_allowed_ = more * *e_.ncon + few;
   e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
   if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
-  // No hits: contacts added too much energy.
+  // No hits: contacts added too much energy, so nothing is pushed out.
+  push_ = hits.empty() ? 0 : mocap_.moves() ? std::max(pushed / whole_, recovery) : recovery;
   for (std::size_t i = 0; hits.empty() && i < guarded_.size(); ++i)
     if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
   const bool stuck = !fresh && stops_ > 0;
@@ -62,12 +74,16 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
   std::copy_n(e_.qpos, e_.nq, qpos_.begin());
   const double begin = *e_.time;
   EnergyChange change{};
+  rows_.unite(false);
   for (;;) {
     mocap_.sub_step(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
     const ResetWatch watch(e_);
-    length_ = length;
-    rows_.step(saved_.data(), length, held(length));
     ++report_.steps;
+    if (!advance(length)) {
+      e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+      length *= 0.25;
+      continue;
+    }
     if (watch.happened() || *e_.time != begin + length || !finite()) {
       note_reset();
       break;
@@ -80,17 +96,45 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
     const bool fails = !tolerable(hits, length);
     if (!fails && !budget_.exceeded(change)) break;
     if (length <= least_ * whole_ || report_.steps >= s_.most) {
+      if (fails && !e_.nflex && rows_.unite(true)) {
+        e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+        continue;
+      }
       change = last_resort(length, hits, change);
       break;
     }
     e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
-    length = fails ? shorter(hits, length) : 0.5 * length;
+    if (fails)
+      length = shorter(hits, length);
+    else if (push_ > 0)
+      push_ = 0;
+    else
+      length *= 0.5;
   }
   report_.contacts = std::max(report_.contacts, *e_.ncon);
   budget_.record(change);
   report_.added += std::max(change.gain, 0.0);
   if (each) each();
   return length;
+}
+
+// One attempt of a sub-step. False if the contacts of held pairs need too much memory and a shorter
+// attempt may need less; the shortest one is made without them.
+bool Stepper::advance(double length) {
+  length_ = length;
+  const Stacks stacks(e_);
+  try {
+    if (rows_.step(saved_.data(), length, held(length), contacts_allowed_, push_)) return true;
+  } catch (const MujocoError&) {
+    if (interrupted_ && interrupted_()) throw;
+    stacks.put_back();
+  }
+  if (length > least_ * whole_ && report_.steps < s_.most) return false;
+  report_.unaided = true;
+  e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+  rows_.begin();
+  rows_.step(saved_.data(), length, {}, 0, 0);
+  return true;
 }
 
 std::vector<Held> Stepper::held(double length) const {
@@ -136,6 +180,7 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     if (!budget_.exceeded(change)) break;
     for (const auto& [pair, speed] : speeds_) in_zone_[pair] = 1;
     go(share);
+    if (share == 0) report_.standstill += length;
     if (passes() && share > 0) continue;
     again();
   }
@@ -179,6 +224,7 @@ double Stepper::join(const std::vector<PairHit>& through, double length) {
   }
   std::fill(e_.qvel, e_.qvel + e_.nv, 0.0);
   std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
+  report_.standstill += length;
   return 0;
 }
 

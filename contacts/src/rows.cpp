@@ -24,7 +24,7 @@ constexpr double least_friction = 1e-5;  // MuJoCo's smallest coefficient (mjMIN
 void Rows::hold(const Held& held) {
   const Partners& p = pairs_[held.pair];
   const Place at = p.carrier;
-  const double solref[] = {e_.is_discrete() ? discrete_time : time, 1.0};
+  const double solref[] = {is_discrete() ? discrete_time : time, 1.0};
   double& margin = copy_.margin(at.kind)[at.number];
   margin = std::max(margin, held.margin);
   std::copy_n(solref, 2, copy_.solref(at.kind) + 2 * at.number);
@@ -50,29 +50,35 @@ void Rows::hold(const Held& held) {
   std::copy_n(impedance, 5, &copy_.option(e_.o_solimp));
 }
 
-void Rows::step(const double* start, double length, const std::vector<Held>& held) {
+bool Rows::step(const double* start, double length, const std::vector<Held>& held, int most,
+                double push) {
+  push_ = push;
   copy_.option(e_.timestep) = length;
+  copy_.option(e_.integrator) = united_ ? e_.discrete : *e_.integrator;
   // Solvers other than Newton do not converge on stiff rows, so pairs would pass through.
   copy_.option(e_.solver) = e_.newton;
   copy_.option(e_.iterations) = std::max(*e_.iterations, least_iterations);
-  if (e_.is_discrete()) copy_.option(e_.disableflags) |= e_.refsafe;
+  copy_.option(e_.disableflags) = *e_.disableflags | (is_discrete() ? e_.refsafe : 0);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) hold(h);
+  const int full = *e_.full[0] + *e_.full[1];
   e_.step1(copy_.get(), e_.data);
+  if (!held.empty() && (*e_.ncon > most || *e_.full[0] + *e_.full[1] > full)) return false;
   choose();
-  if (chosen_.empty()) return e_.step2(copy_.get(), e_.data);
+  if (chosen_.empty()) return e_.step2(copy_.get(), e_.data), true;
   const std::vector<double> velocity(e_.qvel, e_.qvel + e_.nv);
   solve(length, std::vector<double>(*e_.efc_vel, *e_.efc_vel + *e_.nefc));
   SlidingFriction friction(e_, copy_.get(), chosen_, velocity, length);
-  if (!friction.acts()) return;
+  if (!friction.acts()) return true;
   e_.set_state(e_.model, e_.data, start, e_.signature.integration);
   solve(length, friction.slowed());
+  return true;
 }
 
 // Completes the step with the targets of `aim`. The integrator `discrete` takes no targets of the
 // tangential rows of elliptic cones, except by the velocities of surfaces.
 void Rows::solve(double length, const std::vector<double>& tangents) {
-  if (!(e_.is_discrete() && *e_.cone == e_.elliptic)) {
+  if (!(is_discrete() && *e_.cone == e_.elliptic)) {
     aim(length, tangents);
     return e_.step2(copy_.get(), e_.data);
   }
@@ -114,14 +120,16 @@ void Rows::aim(double length, const std::vector<double>& tangents) {
     // With a pyramidal cone the normal velocity is the mean of two opposite edges.
     const double normal =
         count > 1 ? 0.5 * (tangents[first] + tangents[first + 1]) : tangents[first];
-    const double speed = -(std::max(contact.distance, 0.0) + mocap_.separation(contact)) / length;
+    const double out = push_ * std::max(-contact.distance, 0.0);
+    const double speed =
+        out - (std::max(contact.distance, 0.0) + mocap_.separation(contact)) / length;
     const int rows = count > 1 ? count : contact.dim;
     for (int row = first; row < first + rows; ++row) {
       const double target = tangents[row] + (row < first + count ? speed - normal : 0.0);
       const int tangent = row - first - count;
-      if (e_.is_discrete() && tangent >= 0) {
+      if (is_discrete() && tangent >= 0) {
         if (tangent < 3) contact.surface[tangent] -= target;
-      } else if (e_.is_discrete())
+      } else if (is_discrete())
         (*e_.efc_margin)[row] = (*e_.efc_pos)[row] + length * target;
       else
         (*e_.efc_aref)[row] = (target - now[row]) / length;

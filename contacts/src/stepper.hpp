@@ -40,8 +40,9 @@ struct Report {
   int steps = 1, contacts = 0;
   std::vector<Cut> cuts;
   std::vector<int> passed, impact_zones;
-  double added = 0;
+  double added = 0, standstill = 0;
   bool rolled_back = false;
+  bool unaided = false;  // memory was too small for the contacts of a sub-step
 };
 
 // SETTINGS and GuardedStepper in contacts/guard/stepper.py explain the fields.
@@ -74,6 +75,8 @@ class Stepper {
   const Report& report() const { return report_; }
   const std::vector<double>& first() const { return first_; }
   const std::vector<double>& vertices() const { return x_t1_; }
+  // Whether an error of MuJoCo comes from a user's callback, and not from MuJoCo.
+  void set_interrupted(std::function<bool()> asked) { interrupted_ = std::move(asked); }
   void set_tunnelling(TunnellingEvents tunnelling) { tunnelling_ = std::move(tunnelling); }
   // Advances by one timestep; `each` is called after every sub-step. Returns true if the number of
   // contacts is all that the report contains.
@@ -102,6 +105,7 @@ class Stepper {
   bool finite() const;
   void number_pairs();
   void roll_back(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each);
+  bool advance(double length);
   double sub_step(double length, const std::function<void()>& each);
   EnergyChange last_resort(double length, const std::vector<PairHit>& hits, EnergyChange change);
   double join(const std::vector<PairHit>& through, double length);
@@ -129,6 +133,7 @@ class Stepper {
   EnergyBudget budget_;
   Rows rows_;
   TunnellingEvents tunnelling_;
+  std::function<bool()> interrupted_;
   std::unordered_map<std::uint64_t, int> number_;  // the number of a pair, by its partners
   std::vector<int> spins_;                         // rotational degrees of freedom
 
@@ -140,6 +145,8 @@ class Stepper {
   // State of a step while it is repeated in sub-steps.
   Report report_;
   double whole_ = 0, rest_ = 0;   // whole and remaining time [s]
+  double push_ = 0;               // rate at which overlaps are pushed out [1/s]
+  int contacts_allowed_ = 0;      // in a sub-step
   double length_ = 0;             // duration of the present attempt [s]
   double least_ = 0;              // smallest sub-step, as a fraction of the step
   int stops_ = 0;                 // number of impact zones in the last step that was rolled back

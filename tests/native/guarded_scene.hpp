@@ -121,6 +121,8 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   e.at_surfacevel = offsetof(mjContact, surfacevel);
   e.efc_diagA = &d->efc_diagA;
   e.efc_type = &d->efc_type, e.efc_id = &d->efc_id;
+  e.full[0] = &d->warning[mjWARN_CONTACTFULL].number;
+  e.full[1] = &d->warning[mjWARN_CNSTRFULL].number;
   e.end_qvel = end->qvel, e.end_energy = end->energy, e.end_xpos = end->xpos;
   e.end_xmat = end->xmat, e.end_flexvert_xpos = end->flexvert_xpos, e.end_cvel = end->cvel;
   e.other_energy = other->energy, e.other_xpos = other->xpos, e.other_xmat = other->xmat;

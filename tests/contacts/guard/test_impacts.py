@@ -118,3 +118,27 @@ def test_a_part_that_is_dropped_on_a_belt_takes_its_speed_and_stays_on_it(cone, 
     assert up < 0.1
     np.testing.assert_allclose(scene[1].qvel[:2], [3, 0], atol=0.05)
     np.testing.assert_allclose(scene[1].qvel[3:], 0, atol=1.0)
+
+
+@pytest.mark.parametrize("density", [1e-5, 1e-2])
+@pytest.mark.parametrize(("gear", "least"), [(2, 1.5), (30, 20.0)])
+def test_a_light_body_on_a_damped_joint_does_not_stop_an_arm(density, gear, least):
+    """A puck of 8 ng or 8 mg; without it the arm reaches 1.9 and 30 rad/s."""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>
+      <option timestep="0.01" gravity="0 0 0"/>
+      <default><geom density="300" margin=".002" condim="1"/></default><worldbody>
+      <body><joint name="j" axis="0 0 1" damping="1" armature=".04"/>
+      <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02"/></body>
+      <body pos=".25 .15 0"><joint type="slide" axis="1 0 0" damping=".5"/>
+      <joint type="slide" axis="0 1 0" damping=".5"/>
+      <geom type="cylinder" size=".05 .05" density="{density}"/></body></worldbody>
+      <actuator><motor joint="j" gear="{gear}"/></actuator></mujoco>""")
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 1
+    guard, still = GuardedStepper(model, data), 0.0
+    for _ in range(100):
+        report = guard.step()
+        still += report.standstill
+        assert not report.exhausted
+    assert still < 0.01
+    assert data.qvel[0] > least
