@@ -77,10 +77,13 @@ def geom_pairs(model: Any) -> Pairs:
 
 def geom_flex_pairs(model: Any) -> Pairs:
     """Pairs of a geom (``first``) and a flex (``second``)."""
-    rows = []
+    rows, listed = [], _listed(model)
     for f in range(0 if _disabled(model) else model.nflex):
-        for g in range(model.ngeom):
-            if _masks(model.geom_contype, model.geom_conaffinity, g, model, f):
+        for g in np.flatnonzero(listed).tolist():
+            body = int(model.geom_bodyid[g])
+            if _masks(model.geom_contype, model.geom_conaffinity, g, model, f) and _masks(
+                model.body_contype, model.body_conaffinity, body, model, f
+            ):
                 margin = float(model.geom_margin[g] + model.flex_margin[f])
                 rows.append((g, f, margin, float(model.geom_gap[g] + model.flex_gap[f])))
     return _pairs(model, rows)
@@ -115,9 +118,26 @@ def _dynamic(model: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         allowed &= ~(related & (weld[i] != 0) & (weld[j] != 0))
     low, high = np.minimum(body[i], body[j]), np.maximum(body[i], body[j])
     allowed &= ~np.isin((low << 16) + high, _excluded(model))
-    contype, conaffinity = model.geom_contype, model.geom_conaffinity
-    allowed &= ((contype[i] & conaffinity[j]) | (contype[j] & conaffinity[i])) != 0
+    # MuJoCo first compares the masks of bodies: at compilation, those of their geoms together.
+    for contype, conaffinity, a, b in (
+        (model.geom_contype, model.geom_conaffinity, i, j),
+        (model.body_contype, model.body_conaffinity, body[i], body[j]),
+    ):
+        allowed &= ((contype[a] & conaffinity[b]) | (contype[b] & conaffinity[a])) != 0
+    listed = _listed(model)
+    allowed &= listed[i] & listed[j]
     return i[allowed], j[allowed]
+
+
+def _listed(model: Any) -> NDArray[np.bool_]:
+    """Whether MuJoCo tests the geom: its trees of bodies lack geoms compiled with both masks 0."""
+    out = np.ones(model.ngeom, dtype=bool)
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_MIDPHASE:
+        out[model.body_geomnum[model.geom_bodyid] > 1] = False
+        for begin, count in zip(model.body_bvhadr, model.body_bvhnum, strict=True):
+            nodes = model.bvh_nodeid[begin : begin + count]
+            out[nodes[nodes >= 0]] = True
+    return out
 
 
 def _excluded(model: Any) -> NDArray[np.int64]:

@@ -48,6 +48,7 @@ def warn_of_sparse_newton(model: Any) -> None:
         warnings.warn(
             f"MuJoCo {mujoco.__version__}: its Newton solver can give wrong accelerations with a "
             f"sparse Jacobian, which this model has ({model.nv} degrees of freedom); set "
-            "model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE, or use MuJoCo 4.0.1 or later",
+            "model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE, or install the mended library: "
+            "pip install --no-deps mujoco-core==4.0.1 (the package mujoco 4.0.0 pins 4.0.0)",
             stacklevel=3,
         )

@@ -22,18 +22,19 @@ from tauguard.findings import ArgumentError
 from tauguard.rigid.imports import hull_rows
 
 #: Fields that determine the pairs.
-_PAIRS = (
+PAIRS = (
     *("geom_type", "geom_contype", "geom_conaffinity", "geom_dataid"),
-    *("flex_contype", "flex_conaffinity", "flex_selfcollide", "flex_rigid", "flex_dim"),
+    *("body_contype", "body_conaffinity"),
+    *("flex_contype", "flex_conaffinity", "flex_selfcollide", "flex_dim"),
     *("exclude_signature", "pair_geom1", "pair_geom2"),
 )
 #: Fields that determine shapes and their poses on bodies.
-_SHAPES = (
+SHAPES = (
     *("geom_size", "geom_pos", "geom_quat", "geom_sameframe", "body_ipos", "body_iquat"),
     *("flex_radius", "flex_elem"),
 )
 #: Stiffness and rest lengths of elastic flexes, and the objects of equality constraints.
-_MOTION = (
+MOTION = (
     *("flex_stiffness", "flexedge_length0", "eq_type", "eq_objtype", "eq_obj1id", "eq_obj2id"),
 )
 #: Fields of the model's structure; if they are edited, MuJoCo reads and writes beyond its arrays.
@@ -41,9 +42,9 @@ _STRUCTURE = re.compile(
     "(body|jnt|dof|tree|geom|site|flex|tendon|wrap|actuator|sensor|mesh|hfield)_.*(adr|num|id|row)$"
     "|(jnt|wrap)_type$"
 )
-_NOT_STRUCTURE = re.compile("geom_dataid|.*matid")
+_NOT_STRUCTURE = re.compile("geom_dataid|.*matid|geom_fluid")
 #: Fields with the number of contact dimensions.
-_DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
+DIMENSIONS = ("geom_condim", "pair_dim", "flex_condim")
 #: Allowed numbers of contact dimensions.
 _CONDIM = (1, 3, 4, 6)
 #: Fields whose numbers must be valid, by the rules of followed_fields.hpp.
@@ -66,7 +67,7 @@ def followed_fields(model: Any, options: Regions) -> Regions:
         options: Addresses and sizes in bytes of the options that are followed.
     """
     out = list(options)
-    for name in (*_PAIRS, *_SHAPES, *_MOTION, *_DIMENSIONS, *_structure()):
+    for name in (*PAIRS, *SHAPES, *MOTION, *DIMENSIONS, *structure_fields()):
         array = getattr(model, name)
         if array.size:
             out.append((array.ctypes.data, array.nbytes))
@@ -89,14 +90,15 @@ def _fields() -> dict[str, NDArray[Any]]:
 
 
 @functools.cache
-def _structure() -> tuple[str, ...]:
+def structure_fields() -> tuple[str, ...]:
+    """Names of the fields of the model's structure."""
     names = filter(_STRUCTURE.match, _fields())
     return tuple(name for name in names if not _NOT_STRUCTURE.match(name))
 
 
 def structure(model: Any) -> dict[str, NDArray[np.int32]]:
     """Copies of the fields of the model's structure, by name."""
-    return {name: getattr(model, name).copy() for name in _structure()}
+    return {name: getattr(model, name).copy() for name in structure_fields()}
 
 
 def refuse_structure(model: Any, built: dict[str, NDArray[np.int32]]) -> None:
@@ -165,7 +167,7 @@ def refuse_values(model: Any) -> None:
             raise ArgumentError(f"opt.{name}: {np.array(value).tolist()}, not finite")
     for name in _MASSES:
         _refuse_rows(model, name, lambda rows: rows < 0, "negative")
-    for name in _DIMENSIONS:
+    for name in DIMENSIONS:
         _refuse_rows(model, name, lambda rows: ~np.isin(rows, _CONDIM), "not 1, 3, 4 or 6")
     kinds = [int(kind) for kind in mujoco.mjtGeom.__members__.values()]
     _refuse_rows(model, "geom_type", lambda rows: ~np.isin(rows, kinds), "an unknown type")
