@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from tauguard.traces.resample import averaged
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import check_no_device
 
+if TYPE_CHECKING:
+    from tauguard.detectors.detector import Detector
+
 #: A column map, the name of a preset, "auto", or the path of a map's JSON file.
 Columns = ColumnMap | str | Path | None
 
@@ -50,7 +53,7 @@ def read_log(
     source: Any,
     columns: Columns = None,
     *,
-    robot: str | Path | None = None,
+    robot: str | Path | Detector | None = None,
     joint_names: Sequence[str] | None = None,
     payload: LoadLike = 0.0,
     torque: bool = False,
@@ -70,8 +73,8 @@ def read_log(
         columns: columns of a CSV file: a :class:`ColumnMap`, the path of a JSON file with its
             fields, the name of a preset (see ``PRESETS``), or "auto" to recognise columns by names
             and values. By default the header line must be that of a preset.
-        robot: URDF or MJCF file of the arm, or a name in ``models.ROBOTS``. With ``columns="auto"``
-            it finds columns that are named after its joints.
+        robot: URDF or MJCF file of the arm, a name in ``models.ROBOTS``, or a detector of the arm.
+            With ``columns="auto"`` it finds columns that are named after its joints.
         joint_names: names of the joints in the order of the columns (default: the map's names, the
             messages' names, or joint_1, joint_2, ...). For MCAP they also select the joints.
         payload: the load that the arm carried, see :data:`LoadLike`.
@@ -93,10 +96,14 @@ def read_log(
     """
     from tauguard.models.robot import bodies_file
 
-    file = None if robot is None else bodies_file(Path(robot))
     if isinstance(source, str | Path):
         check_no_device(source)
-    numbers = None if file is None else robot_numbers(file)
+    file, numbers = None, None
+    if isinstance(robot, str | Path):
+        file = bodies_file(Path(robot))
+        numbers = robot_numbers(file)
+    elif robot is not None:
+        numbers = robot.arm.robot
     options = _options(columns, mend, torque, numbers, joint_names)
     log = _read(source, name, options, resample)
     return dataclasses.replace(log, load=load_of(payload), robot=file, numbers=numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +19,7 @@ from tauguard.detectors.diagnosis.severity import ContactTorque
 from tauguard.detectors.evaluation.card_page import printed_from, rate_text
 from tauguard.detectors.evaluation.labelled_log import compare_with_labels, labels_text
 from tauguard.findings import Findings, note
-from tauguard.models.stored_robot import StoredRobot
+from tauguard.models.stored_robot import StoredRobot, robot_file
 from tauguard.report import poisson_rate
 from tauguard.results import Result, Row, finding_rows
 from tauguard.traces.logs import Log
@@ -154,6 +155,10 @@ class LogDetection(Result):
         if self.alarm.robot is not None or text is None:
             return self.alarm.robot
         return StoredRobot.of_text("arm.xml", text)
+
+    def robot_file(self) -> AbstractContextManager[Path | None]:
+        """The robot's file while the context lasts: the given one, else that of the model file."""
+        return robot_file(self.robot, self.alarm.robot)
 
     def rows(self) -> list[Row]:
         """One row per alarm: start, end [s], joint, and its diagnosis.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee
 from tauguard.findings import ArgumentError, Finding, Findings, MismatchError, TauguardError, cause
 from tauguard.models.robot import bodies_file
+from tauguard.models.stored_robot import robot_file
 from tauguard.report import two_digits
 from tauguard.results import Result, Row, finding_rows
 from tauguard.traces.loads import Load, LoadLike, load_of
@@ -162,6 +164,10 @@ class Detector(Result):
         """
         model_file.save_model(self.alarm, path, self.robot)
         return Path(path)
+
+    def robot_file(self) -> AbstractContextManager[Path | None]:
+        """The robot's file while the context lasts: the given one, else that of the model file."""
+        return robot_file(self.robot, self.alarm.robot)
 
     def rows(self) -> list[Row]:
         """One row: method, joints, rate, threshold, confirmation and settling time."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +26,11 @@ class StoredRobot:
     surface: LinkSurface | None = None  #: None: unknown, see ``doubt``
     sticks: tuple[str, ...] = ()  #: links without a shape, for which thin capsules stand
     doubt: str = ""  #: why there is no surface
+
+    def __post_init__(self) -> None:
+        """Check the name: ``FileError`` if it is not that of a file alone."""
+        if Path(self.name).name != self.name or not self.name:
+            raise FileError(f"name {self.name!r:.100}: expected a file's name without a folder")
 
     @classmethod
     def of(cls, robot: str | Path, joints: tuple[str, ...]) -> StoredRobot:
@@ -51,3 +59,18 @@ class StoredRobot:
             return cls(name, text, link_surface(text))
         except FileError as error:
             return cls(name, text, doubt=str(error))
+
+
+@contextlib.contextmanager
+def robot_file(path: Path | None, stored: StoredRobot | None) -> Iterator[Path | None]:
+    """The robot file while the context lasts: ``path``, else the stored text in a temporary folder.
+
+    None if there is neither.
+    """
+    if path is not None or stored is None:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / stored.name
+        file.write_text(stored.text, encoding="utf-8")
+        yield file

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tauguard.detectors import RobotNumbers
+from tauguard.detectors.dynamics.same_arm import arm_difference
 from tauguard.findings import ArgumentError, Findings, MismatchError
-from tauguard.models import BODY_REGIONS, BodyRegion, Robot
+from tauguard.models import BODY_REGIONS, BodyRegion, Robot, pin_model
 from tauguard.results import Result, Row, finding_rows
 from tauguard.speed.arm_states import ContactArm
 from tauguard.speed.detection_delay import DelayModel
@@ -182,7 +184,7 @@ def speed_limits(
     search = Search(
         motion, arm, face, stop or Stop(), soft, known, chosen, person_speed, margin, settings,
         float("inf") if delay is None else delay,
-        None if detector is None else _delay_model(detector, motion),
+        None if detector is None else _delay_model(detector, motion, arm),
     )  # fmt: skip
     limits, segments = search.run()
     if check and limits:
@@ -227,12 +229,15 @@ def _in_order(program: Program, arm: ContactArm) -> Program:
     return replace(program, joint_names=wanted, q=program.q[:, order], qd=program.qd[:, order])
 
 
-def _delay_model(detector: Any, program: Program) -> DelayModel:
+def _delay_model(detector: Any, program: Program, robot: ContactArm) -> DelayModel:
     alarm = getattr(detector, "alarm", detector)
     if program.trace is None:
         raise ArgumentError(
             "`detector=` needs a log with motor currents; for waypoints give `delay=`"
         )
+    numbers = RobotNumbers.from_pin(pin_model(robot.scene.arm_model))
+    if difference := arm_difference(numbers, alarm.detector.arm.robot):
+        raise MismatchError(f"the detector was trained on another arm: {difference}")
     arm, trace = alarm.detector.arm, program.trace
     names, order = arm.robot.joint_names, range(len(trace.joint_names))
     if set(names) == set(trace.joint_names):

@@ -24,6 +24,7 @@ from tauguard.live.listening import check_stream
 from tauguard.live.packets import Fault, Packets
 from tauguard.live.session import BINS, Session, listen
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+from tauguard.traces import write_mcap
 from tauguard.traces.trace import Trace
 from tests.live.peer import Peer
 
@@ -348,9 +349,22 @@ def test_what_reading_a_played_log_mended_is_said(alarm, struck, tmp_path, capsy
     rows[[20, 21]] = rows[[21, 20]]
     names = ["t", *(f"{what}_{i}" for what in ("q", "qd", "current") for i in range(1, 7))]
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(names), comments="")
-    (tmp_path / "arm.xml").write_text(cura6.arm_xml())
-    read_played(tmp_path / "a.csv", "auto", Detector(alarm), tmp_path / "arm.xml")
+    read_played(tmp_path / "a.csv", "auto", Detector(alarm))
     assert "note: a.csv: rows sorted by time; 1 were out of order" in capsys.readouterr().out
+
+
+def test_the_robot_in_the_model_file_is_enough(alarm, files, struck, tmp_path, capsys):
+    signals = (x[:200] for x in (struck.t, struck.q, struck.qd, struck.current))
+    log, shown = tmp_path / "a.mcap", tmp_path / "a.rrd"
+    write_mcap(log, Trace(struck.joint_names, *signals))
+    save_model(alarm, tmp_path / "whole.tauguard", robot=files / "arm.xml")
+    flags = ["--play", str(log), "--rerun", str(shown)]
+    main(["listen", "--model", str(tmp_path / "whole.tauguard"), *flags])
+    assert "free" in capsys.readouterr().out
+    assert shown.stat().st_size > 10_000
+    with pytest.raises(SystemExit):
+        main(["listen", "--model", str(files / "model.tauguard"), *flags])
+    assert "--rerun needs --robot: the model file has no robot" in capsys.readouterr().err
 
 
 @pytest.mark.slow

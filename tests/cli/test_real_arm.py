@@ -23,7 +23,7 @@ def test_calibrate_train_detect(folder, tmp_path, capsys):
     names = ["20_01_31-unload", "20_02_06-20sec_10harm", "20_02_12-40sec_12harm"]
     logs = [str(folder / "free" / f"ur-{name}.csv") for name in names]
     logs.append(str(folder / "jointwise" / "ur-20_01_22-joint_3.csv"))
-    robot, model = tmp_path / "ur10e.calibrated.urdf", tmp_path / "model.skops"
+    robot, model = tmp_path / "ur10e.calibrated.urdf", tmp_path / "model.tauguard"
     common = ["--columns", "ur10e"]
     given = ["--robot", str(folder / "ur10e.urdf"), "--out", str(robot)]
     main(["calibrate", *logs, *given, *common, "--json", str(tmp_path / "calibrate.json")])

@@ -159,7 +159,7 @@ def recordings():
         for k, path in enumerate(sorted(Path(folder).iterdir())):
             path.rename(f"{folder}/{k}.mcap")
     Path("nothing").mkdir()
-    Path("damaged.skops").write_bytes(b"PK\x03\x04 not a model")
+    Path("damaged.tauguard").write_bytes(b"PK\x03\x04 not a model")
 
 
 def write_all():

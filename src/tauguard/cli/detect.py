@@ -21,7 +21,7 @@ PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
 def command(
     log: Annotated[Path, tyro.conf.Positional],
     /,
-    robot: Path,
+    robot: Path | None = None,
     columns: str | None = None,
     model: Path | None = None,
     payload: str | None = None,
@@ -50,7 +50,7 @@ def command(
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone, a name that `tauguard robot` lists, or the TOML
-            file of `tauguard twin`.
+            file of `tauguard twin` (default: the robot in the model file).
         columns: columns of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, libfranka,
             doosan, lbr), auto to find them from names and values, or a JSON file with the fields
             of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"],
@@ -83,10 +83,14 @@ def command(
             "--quiet and --gains cannot be combined with --model: they are for training"
         )
     carried = None if payload is None else load(payload)
-    read = read_one(log, robot, columns, torque, reading)
     if model is not None:
-        found = tg.load_detector(model).detect(read, payload=carried, at_tool=at_tool)
+        detector = tg.load_detector(model)
+        read = read_one(log, robot or detector, columns, torque, reading)
+        found = detector.detect(read, payload=carried, at_tool=at_tool)
+    elif robot is None:
+        raise ArgumentError("give --robot, or a --model, which has its robot in it")
     else:
+        read = read_one(log, robot, columns, torque, reading)
         seconds = 20.0 if quiet is None else quiet
         found = tg.detect_after_quiet(
             read, quiet=seconds, gains=gains, payload=carried, at_tool=at_tool
@@ -105,11 +109,12 @@ def write_results(out: Path, found: LogDetection) -> None:
     from tauguard.report import write_json
     from tauguard.traces import write_mcap
 
-    robot = found.robot
-    assert robot is not None
     out.mkdir(parents=True, exist_ok=True)
-    trace = dataclasses.replace(found.trace, attachments={robot.name: robot.read_text()})
     write_json(out / "events.json", found.to_dict())
-    write_mcap(out / "detect.mcap", trace, found.detection)
-    write_rrd(out / "detect.rrd", trace, found.detection, robot)
+    with found.robot_file() as robot:
+        if robot is None:
+            raise ArgumentError("--out needs --robot: the model file has no robot in it")
+        trace = dataclasses.replace(found.trace, attachments={robot.name: robot.read_text()})
+        write_mcap(out / "detect.mcap", trace, found.detection)
+        write_rrd(out / "detect.rrd", trace, found.detection, robot)
     print(f"{out}: events.json, detect.mcap, detect.rrd (show it with: rerun {out}/detect.rrd)")

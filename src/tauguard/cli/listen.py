@@ -21,7 +21,7 @@ DISCLAIMER = "tauguard listens only: it stops nothing and certifies nothing"
 
 def command(
     model: Path,
-    robot: Path,
+    robot: Path | None = None,
     ur: str | None = None,
     port: int = 30004,
     play: Path | None = None,
@@ -45,7 +45,8 @@ def command(
 
     Args:
         model: a model file of `tauguard train` for this arm and sample rate.
-        robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists.
+        robot: URDF or MJCF file of the arm alone, or a name that `tauguard robot` lists (default:
+            the robot in the model file).
         ur: host of a Universal Robots controller, read by RTDE.
         port: port of RTDE.
         play: a log (CSV or MCAP) to play in real time instead.
@@ -90,10 +91,10 @@ def command(
         if play is None:
             source = stack.enter_context(opened(ur, port, stdin, ros, reconnect, detector))
         else:
-            source = read_log(play, columns, detector, robot)
+            source = read_log(play, columns, detector)
         views = [stack.enter_context(BackgroundDisplay(Terminal(detector.threshold).show))]
         if rerun is not None:
-            show = charts(detector, robot, shown)
+            show = charts(detector, shown)
             views.append(stack.enter_context(BackgroundDisplay(show)))
 
         def put(sample: Sample, answer: Answer) -> None:
@@ -133,12 +134,12 @@ def opened(
     return LineStream(sys.stdin, names, rate)
 
 
-def read_log(play: Path, columns: str | None, detector: Detector, robot: Path) -> Log:
+def read_log(play: Path, columns: str | None, detector: Detector) -> Log:
     """A log to play in real time; prints what was found in it."""
     import tauguard as tg
     from tauguard.cli.output import print_findings
 
-    robot = detector.robot or robot
+    robot = detector.robot or detector
     log = tg.read_log(play, columns, robot=robot, joint_names=detector.joints)
     print_findings(log.findings)
     return log
@@ -183,11 +184,14 @@ def why_text(answer: Answer, threshold: float) -> str:
     return f": {'; '.join(parts)}" if parts else ""
 
 
-def charts(detector: Detector, robot: Path, save: Path | None) -> Callable[[Sample, Answer], None]:
+def charts(detector: Detector, save: Path | None) -> Callable[[Sample, Answer], None]:
     """A function that shows arm, score and state in rerun's viewer, or records them in a file."""
     from tauguard.replay import StateView
 
-    view = StateView(detector.robot or robot, detector.joints, detector.threshold, save)
+    with detector.robot_file() as robot:
+        if robot is None:
+            raise ArgumentError("--rerun needs --robot: the model file has no robot in it")
+        view = StateView(robot, detector.joints, detector.threshold, save)
     return lambda sample, answer: view.show(sample.t, sample.q, answer.state, answer.score)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard import Log, Logs
+    from tauguard import Detector, Log, Logs
     from tauguard.datasets import Reading
 
 
@@ -37,7 +37,9 @@ def read_free(
     return free
 
 
-def read_one(log: Path, robot: Path, columns: str | None, torque: bool, reading: Reading) -> Log:
+def read_one(
+    log: Path, robot: Path | Detector | None, columns: str | None, torque: bool, reading: Reading
+) -> Log:
     """One log of a real arm."""
     import tauguard as tg
     from tauguard.cli.output import print_findings

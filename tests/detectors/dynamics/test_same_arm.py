@@ -48,6 +48,23 @@ def test_another_frame_or_mass_is_no_other_arm():
     assert arm_difference(other, arm) == ""
 
 
+def placed(model, pose):
+    """The arm on a base that is moved and turned."""
+    for joint in range(1, model.njoints):
+        if model.parents[joint] == 0:
+            model.jointPlacements[joint] = pose * model.jointPlacements[joint]
+    return RobotNumbers.from_pin(model)
+
+
+@pytest.mark.parametrize("xml", [XML, cura6.arm_xml()], ids=["three joints", "cura6"])
+def test_the_base_may_stand_elsewhere_and_turned_about_the_vertical_but_not_tilted(xml):
+    shift = np.array([0.3, -2.0, 1.0])
+    yaw = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 2.0), shift)
+    assert arm_difference(placed(pin_model(xml), yaw), numbers(xml)) == ""
+    tilt = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.0, 0.0), shift)
+    assert "5.73 deg from" in arm_difference(placed(pin_model(xml), tilt), numbers(xml))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
