@@ -125,7 +125,7 @@ class SpeedLimits(Result):
 
 def speed_limits(
     program: Program | Trace | Any,
-    robot: str | Robot,
+    robot: str | Path | Robot | None = None,
     *,
     tool: Tool | str = "flat:1.0",
     stop: Stop | None = None,
@@ -148,7 +148,8 @@ def speed_limits(
 
     Args:
         program: a :class:`Program`, a trace or a log.
-        robot: name, file or description of the arm, see :func:`tauguard.models.load_arm`.
+        robot: name, file or description of the arm, see :func:`tauguard.models.load_arm` (default:
+            the log's).
         tool: the face that touches, see :meth:`Tool.parse`.
         stop: the reaction (default: ``Stop()``, category 2 along the set point at 10 rad/s2).
         delay: from the first touch to the reaction [s]. None: the detector's, or no reaction.
@@ -174,12 +175,16 @@ def speed_limits(
         raise ArgumentError(f"margin {margin}: expected 1 or more")
     if not 0 <= person_speed <= 10:
         raise ArgumentError(f"person_speed {person_speed} m/s: expected 0 to 10")
+    chain = getattr(program, "robot", None) if robot is None else robot
+    if chain is None:
+        raise ArgumentError("`robot=` is missing: give the name or the file of the arm")
+    source = chain if isinstance(chain, Robot) else str(chain)
     face = Tool.parse(tool) if isinstance(tool, str) else tool
     soft = Cover.parse(cover) if isinstance(cover, str) else cover
     known = dict(BODY_REGIONS if regions is None else regions)
     chosen = _chosen(contact or {}, known)
     motion = program if isinstance(program, Program) else _program(program)
-    arm = ContactArm.of(robot, face, points=settings.points)
+    arm = ContactArm.of(source, face, points=settings.points)
     motion = _in_order(motion, arm)
     search = Search(
         motion, arm, face, stop or Stop(), soft, known, chosen, person_speed, margin, settings,
@@ -190,7 +195,7 @@ def speed_limits(
     if check and limits:
         limits = search.simulated(limits)
     return SpeedLimits(
-        motion, robot if isinstance(robot, str) else robot.file, face, search.stop, tuple(limits),
+        motion, source if isinstance(source, str) else source.file, face, search.stop, tuple(limits),
         tuple(segments), search.detection, margin, search.findings(),
     )  # fmt: skip
 
