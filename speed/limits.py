@@ -195,8 +195,8 @@ def speed_limits(
     if check and limits:
         limits = search.simulated(limits)
     return SpeedLimits(
-        motion, source if isinstance(source, str) else source.file, face, search.stop, tuple(limits),
-        tuple(segments), search.detection, margin, search.findings(),
+        motion, source if isinstance(source, str) else source.file, face, search.stop,
+        tuple(limits), tuple(segments), search.detection, margin, search.findings(),
     )  # fmt: skip
 
 
