@@ -11,7 +11,7 @@ __getattr__, __dir__, __all__ = on_demand(
         "configuration": "Configuration Split load_configuration",
         "generation": "generate_dataset",
         "plans": "DemoPlan SPEEDS TRAINING_PAYLOADS collision_plans demo_plan free_episodes "
-        "struck_episodes",
+        "struck_episodes torque_scale",
         "reader": "episodes_of_splits read",
         "recordings": "simulate_all write_dataset",
         "twin_episodes": "TwinEpisodes twin_contacts",

@@ -19,6 +19,7 @@ from tauguard.datasets.plans import collision_plans as collision_plans
 from tauguard.datasets.plans import demo_plan as demo_plan
 from tauguard.datasets.plans import free_episodes as free_episodes
 from tauguard.datasets.plans import struck_episodes as struck_episodes
+from tauguard.datasets.plans import torque_scale as torque_scale
 from tauguard.datasets.reader import episodes_of_splits as episodes_of_splits
 from tauguard.datasets.reader import read as read
 from tauguard.datasets.recordings import simulate_all as simulate_all

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.evaluation.diagnosis_metrics import diagnosis_metrics, judge_recording
 from tauguard.detectors.evaluation.matching import Matching, detection_metrics
-from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
+from tauguard.detectors.evaluation.metrics_page import diagnosis_text, figure, text
 from tauguard.findings import Findings
-from tauguard.results import Result, Row, finding_rows
+from tauguard.results import Result, Row, finding_rows, save_figure
 from tauguard.traces.logs import Log, Logs
 from tauguard.traces.trace import Detection, Trace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Called with the name of a recording, its matching, and its trace and detection.
 Visitor = Callable[[str, Matching, tuple[Trace, Detection]], None]
@@ -67,8 +70,12 @@ class Evaluation(Result):
         )
 
     def draw(self, path: str | Path) -> None:
-        """Draw sensitivity and delay over severity, and the confusion matrix (PNG)."""
-        draw(Path(path), self.metrics, self.matchings)
+        """Draw :meth:`figure` (PNG)."""
+        save_figure(self.figure(), path, 110)
+
+    def figure(self) -> Figure:
+        """Sensitivity and delay over severity, and the confusion matrix."""
+        return figure(self.metrics, self.matchings)
 
 
 def evaluate(

@@ -15,8 +15,8 @@ from tauguard.envs.plant import Gains
 
 __all__ = [
     "CollisionPlan", "Episode", "Gains", "Motion", "PayloadPick", "Rollout", "Simulation",
-    "SimulationDiverged", "SimulationLoop", "Workspace", "point_to_point", "random_motion",
-    "simulate",
+    "SimulationDiverged", "SimulationLoop", "Workspace", "first_picture", "point_to_point",
+    "random_motion", "simulate", "try_arm",
 ]  # fmt: skip
 
 #: Modules that are loaded at their first use.
@@ -24,7 +24,9 @@ _MODULES = ("controllers", "policies", "wrappers")
 
 
 def __getattr__(name: str) -> Any:
-    """Load one of ``_MODULES``."""
+    """Load one of ``_MODULES``, or a name of the trial of an arm."""
+    if name in ("first_picture", "try_arm"):
+        return getattr(importlib.import_module(f"{__name__}.gym.trial"), name)
     if name in _MODULES:
         return importlib.import_module(f"{__name__}.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -32,4 +34,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """All public names, loaded or not."""
-    return sorted({*globals(), *_MODULES} - {"Any", "importlib"})
+    return sorted({*globals(), *_MODULES, *__all__} - {"Any", "importlib"})

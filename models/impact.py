@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
+from tauguard.models.body_regions import BODY_REGIONS
+from tauguard.models.derive import largest_energy
 from tauguard.models.scene import Scene
 
 
@@ -63,6 +65,17 @@ def standard_mass(scene: Scene, payload: float = 0.0) -> float:
     """
     bodies = [int(body) for body in scene.link_bodies]
     return float(scene.model.body_mass[bodies].sum()) / 2 + payload
+
+
+def largest_force(scene: Scene, region: str = "skull") -> float:
+    """The largest force that the arm without a load can exert on a body region [N].
+
+    It is sqrt(2 k E), with the region's stiffness k and the largest energy E of motion and drives.
+    """
+    facts = scene.facts
+    limit = facts.drive.torque_limit
+    energies = largest_energy(scene.model, facts.joints, facts.max_speed, limit)
+    return float((2 * BODY_REGIONS[region].stiffness * sum(energies)) ** 0.5)
 
 
 def _along(

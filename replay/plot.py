@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
-from tauguard.traces import Detection, Trace
+from tauguard.traces import Detection, Log, Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,23 +18,44 @@ if TYPE_CHECKING:
 SCORE_TOP = 8.0
 
 
-def plot(trace: Trace, detection: Detection | None = None) -> Figure:
-    """The recording as a matplotlib figure; collisions are shaded, alarms are lines.
+def plot(result: Any, detection: Detection | None = None) -> Figure:
+    """A recording or a result as a matplotlib figure.
 
     Args:
-        trace: the recording.
-        detection: a detector's output for it.
+        result: a trace, a log, or the alarms in one (``LogDetection``), whose collisions and
+            labelled contacts are shaded and whose alarms are lines; or a result with a method
+            ``figure``: ``Evaluation``, ``ThresholdCard``, ``TwinOfLogs``.
+        detection: a detector's output for a trace or log.
 
     Raises:
-        ArgumentError: a detection of another recording.
+        ArgumentError: a detection of another recording, or a result without a figure.
     """
+    if isinstance(result, Trace):
+        return recording(result, detection)
+    if isinstance(result, Log):
+        return recording(result.trace, detection, result.labels or ())
+    from tauguard.detectors import LogDetection  # here, as it takes long to import
+
+    if isinstance(result, LogDetection):
+        return recording(result.trace, result.detection, result.log.labels or ())
+    if hasattr(result, "figure"):
+        figure: Figure = result.figure()
+        return figure
+    raise ArgumentError(f"plot: a {type(result).__name__} has no figure")
+
+
+def recording(
+    trace: Trace, detection: Detection | None, labels: Sequence[tuple[float, float]] = ()
+) -> Figure:
+    """The signals of a recording; collisions and labels [s] are shaded, alarms are lines."""
     from matplotlib.figure import Figure
 
     if detection is not None and len(detection.t) != len(trace.t):
         raise ArgumentError(f"detection: {len(detection.t)} samples, the trace has {len(trace.t)}")
+    torques = trace.meta.get("effort") == "torque"
     rows: list[tuple[str, Array]] = [
         ("position [rad]", trace.q),
-        ("current [A]", trace.current),
+        ("torque [N m]" if torques else "current [A]", trace.current),
     ]
     if trace.truth is not None:
         rows.append(("external torque, truth [N m]", trace.truth.tau_ext))
@@ -49,6 +71,8 @@ def plot(trace: Trace, detection: Detection | None = None) -> Figure:
         panel.set_ylabel(name)
         for hit in trace.truth.collisions if trace.truth is not None else ():
             panel.axvspan(hit.onset, hit.end, color="tab:red", alpha=0.15, linewidth=0)
+        for start, end in labels:
+            panel.axvspan(start, end, color="tab:red", alpha=0.15, linewidth=0)
         for alarm in detection.alarms if detection is not None else ():
             panel.axvline(alarm.start, color="black", linewidth=0.8, linestyle="--")
     if detection is not None:

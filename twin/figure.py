@@ -1,17 +1,21 @@
 """A figure that compares a twin with its arm."""
 
-from pathlib import Path
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tauguard.twin.judge import Likeness
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
-    """Draw the verdict, residuals of the first held-out log, and spectra of all logs.
+
+def figure_of(joints: tuple[str, ...], likeness: Likeness) -> Figure:
+    """The verdict, residuals of the first held-out log, and spectra of all logs.
 
     Args:
-        path: PNG.
         joints: names.
         likeness: from :func:`tauguard.twin.compare`.
     """
@@ -37,7 +41,7 @@ def draw(path: Path, joints: tuple[str, ...], likeness: Likeness) -> None:
     axes[-1, 1].set_xlabel("frequency [Hz]")
     axes[0, 1].set_title("power of the residual [(N m)$^2$/Hz]", fontsize=8)
     figure.suptitle(verdict(likeness), fontsize=9)
-    figure.savefig(path, dpi=90)
+    return figure
 
 
 def verdict(likeness: Likeness) -> str:

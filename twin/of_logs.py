@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel
@@ -26,14 +26,17 @@ from tauguard.findings import (
 )
 from tauguard.models import load_arm
 from tauguard.report import table
-from tauguard.results import Result, Row, finding_rows
+from tauguard.results import Result, Row, finding_rows, save_figure
 from tauguard.traces.logs import Logs, Recording
 from tauguard.traces.trace import Trace
 from tauguard.twin.description import write_twin
-from tauguard.twin.figure import draw
+from tauguard.twin.figure import figure_of
 from tauguard.twin.identify import Twin, fit_twin, with_intervals
 from tauguard.twin.judge import Likeness, compare, with_alarms
 from tauguard.twin.sorting import odd_logs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Half width of a 95 % interval in standard deviations.
 HALF_WIDTH = 1.96
@@ -138,14 +141,22 @@ class TwinOfLogs(Result):
         return [path, *write_twin(twin, self.robot, path, list(self.logs), self.scale)]
 
     def draw(self, path: str | Path) -> None:
-        """Draw real and simulated residuals with the results (PNG).
+        """Draw :meth:`figure` (PNG).
+
+        Raises:
+            ArgumentError: there is no likeness.
+        """
+        save_figure(self.figure(), path, 90)
+
+    def figure(self) -> Figure:
+        """Real and simulated residuals with the results.
 
         Raises:
             ArgumentError: there is no likeness.
         """
         if self.likeness is None:
             raise ArgumentError("the twin was not judged: there is nothing to draw")
-        draw(Path(path), self.twin.arm.robot.joint_names, self.likeness)
+        return figure_of(self.twin.arm.robot.joint_names, self.likeness)
 
 
 #: Findings that a twin's file repeats.

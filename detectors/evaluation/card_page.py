@@ -5,18 +5,20 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.atomic_write import atomic_file
 from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
 from tauguard.detectors.features.free_bound import ANYWHERE
 from tauguard.detectors.features.motion_regimes import SEEN, unseen_text
 from tauguard.findings import Findings
 from tauguard.report import table
-from tauguard.results import Result, Row
+from tauguard.results import Result, Row, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHORTEST = 300.0  # least length of logs for which an alarm rate is printed [s]
 SHORT = 1800.0  # length of logs below which the text asks for longer ones [s]
@@ -111,8 +113,12 @@ class ThresholdCard(Result):
         )
 
     def draw(self, path: str | Path) -> None:
-        """Draw the card (PNG)."""
-        draw(Path(path), self)
+        """Draw :meth:`figure` (PNG)."""
+        save_figure(self.figure(), path, 130)
+
+    def figure(self) -> Figure:
+        """The card as a picture."""
+        return figure_of(self)
 
     @property
     def franka(self) -> dict[str, list[float]]:
@@ -314,8 +320,8 @@ def times(log: CrossValidatedLog) -> str:
     return f"{len(starts)} alarm{'' if len(starts) == 1 else 's'} at {shown} s{after}"
 
 
-def draw(target: Path, card: ThresholdCard) -> None:
-    """The card as a picture (PNG)."""
+def figure_of(card: ThresholdCard) -> Figure:
+    """The card as a picture."""
     from matplotlib.figure import Figure
 
     lines = [line for part in _lines(card) for line in _wrapped(part)]
@@ -337,5 +343,4 @@ def draw(target: Path, card: ThresholdCard) -> None:
     bars.set_title("Threshold card: what the free-motion detector finds", loc="left")
     words.axis("off")
     words.text(0, 1, "\n".join(lines), va="top", fontsize=8.5, family="monospace")
-    with atomic_file(target) as stream:
-        figure.savefig(stream, dpi=130, format=target.suffix[1:] or "png")
+    return figure

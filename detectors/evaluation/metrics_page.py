@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from tauguard.atomic_write import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from tauguard.detectors.evaluation.matching import Matching
 
@@ -61,15 +59,6 @@ def text(summary: Mapping[str, Any]) -> str:
     for name, figure in summary["strata"].items():
         lines.append(f"  {name:>8}               {rate(figure['sensitivity'])}")
     lines += ["", *LEGEND]
-    if "timing" in summary:
-        t = summary["timing"]
-        lines += [
-            "",
-            f"  {summary['simulated_seconds']:.0f} s simulated, {t['real_time_factor']:.0f} times "
-            f"real time; per sample: simulation {t['simulation_us_per_sample']:.1f} us, "
-            f"observer {t['observer_us_per_sample']:.1f} us, "
-            f"detector {t['detector_us_per_sample']:.1f} us",
-        ]
     return "\n".join(lines)
 
 
@@ -102,17 +91,16 @@ def diagnosis_text(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) -> None:
+def figure(summary: Mapping[str, Any], matchings: Sequence[Matching]) -> Figure:
     """Sensitivity and delay over severity, the confusion matrix, and delays by kind."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14, 4.6), layout="constrained")
-    axes = figure.subplots(1, 3)
+    page = Figure(figsize=(14, 4.6), layout="constrained")
+    axes = page.subplots(1, 3)
     _draw_strata(axes[0], summary["strata"])
     _draw_confusion(axes[1], summary["confusion"], summary["false_alarms_per_hour"])
     _draw_delays(axes[2], matchings)
-    with atomic_file(path) as stream:
-        figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
+    return page
 
 
 def _draw_strata(axes: Axes, strata: Mapping[str, Any]) -> None:

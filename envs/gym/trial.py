@@ -90,7 +90,7 @@ def _inside(env: Any) -> bool:
     return bool((data.contact.dist[touching] < 0).any())
 
 
-def picture(name: str, robot: str | Robot, seed: int = 0) -> NDArray[np.uint8]:
+def first_picture(name: str, robot: str | Robot, seed: int = 0) -> NDArray[np.uint8]:
     """The beginning of an episode, shape (480, 640, 3).
 
     Raises:

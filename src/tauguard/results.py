@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 import html
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tauguard.atomic_write import atomic_file
 from tauguard.findings import Findings
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
 
@@ -44,6 +47,13 @@ class Result:
         return f"<p>{html.escape(repr(self))}</p>{html_table(self.rows())}" + (
             f"<ul>{notes}</ul>" if notes else ""
         )
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int) -> None:
+    """Write a figure in the format of the file's extension, PNG without one."""
+    path = Path(path)
+    with atomic_file(path) as stream:
+        figure.savefig(stream, dpi=dpi, format=path.suffix[1:] or "png")
 
 
 def finding_lines(findings: Findings) -> list[str]:

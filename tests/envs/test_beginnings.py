@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tauguard.environments import ENVIRONMENTS
+from tauguard.envs import try_arm
 from tauguard.envs.gym.placing import StartsInContact
-from tauguard.envs.gym.trial import try_arm
 from tauguard.models import BodyProxy, Person, SceneObject, Shape, Table
 from tests.models.arms import random_arm
 

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from tauguard.cli import main
-from tauguard.replay import write_rrd
+from tauguard.detectors import Evaluation, match_detection
+from tauguard.findings import ArgumentError
+from tauguard.replay import plot, write_rrd
 from tauguard.replay.robot import bodies, load_model, motion
 from tauguard.replay.rrd import extremes, thin
 from tauguard.replay.story import cut, first_moment, page
-from tauguard.traces import Alarm, write_mcap
+from tauguard.traces import Alarm, Log, write_mcap
 
 spec = spec_from_file_location("arm", Path(__file__).with_name("arm.py"))
 arm = module_from_spec(spec)
@@ -250,3 +252,17 @@ def test_command_line(tmp_path, capsys):
     assert error.count("\n") == 1
     assert "b.mcap" in error
     assert not (tmp_path / "b.rrd").exists()
+
+
+def test_results_have_figures_of_their_own(recording):
+    _, trace, detection = recording
+    log = Log(trace, labels=((1.0, 1.5),))
+    marked = plot(log, detection)
+    assert len(marked.axes) == len(plot(trace, detection).axes)
+    shaded = [len(panel.patches) for panel in marked.axes]
+    plain = [len(panel.patches) for panel in plot(trace, detection).axes]
+    assert [a - b for a, b in zip(shaded, plain, strict=True)] == [1] * len(plain)
+    evaluation = Evaluation.of(["a"], [match_detection(detection, trace, 0.5)])
+    assert len(plot(evaluation).axes) == 3
+    with pytest.raises(ArgumentError, match="plot: a int has no figure"):
+        plot(3)

@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tauguard.detectors import CollisionAlarm, Matching
-    from tauguard.detectors.thresholds.free_scores import FreeScores
+    from tauguard import Detector, Evaluation
+    from tauguard.detectors import CollisionAlarm
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
@@ -48,11 +46,9 @@ def command(
     expect("--seed", seed, 0)
     out.mkdir(parents=True, exist_ok=True)
 
+    import tauguard as tg
     from tauguard.datasets import demo_plan, simulate_all
-    from tauguard.detectors import SrqSvr, match_detection
-    from tauguard.detectors.alarms.training import train_and_score
-    from tauguard.detectors.calibration.nominal import nominal_arm
-    from tauguard.detectors.evaluation.metrics_page import draw
+    from tauguard.detectors import match_detection
     from tauguard.envs import simulate
     from tauguard.models import load_arm
     from tauguard.report import write_json
@@ -65,61 +61,49 @@ def command(
         "detector: this takes one to three minutes",
         flush=True,
     )
-    training = list(simulate_all(plan.train, workers, "simulate training"))
+    training = tg.simulated(simulate_all(plan.train, workers, "simulate training"))
     judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
     simulated = time.perf_counter()
-    arm = nominal_arm(training)
-    detector, scores = train_and_score(SrqSvr(), training, arm, FALSE_ALARMS_PER_HOUR)
+    detector = tg.train(training, method="srq-svr", false_alarms_per_hour=FALSE_ALARMS_PER_HOUR)
     fitted = time.perf_counter()
-    detections = [detector.detect(trace) for trace in judged]
+    alarm = detector.alarm
+    detections = [alarm.detect(trace) for trace in judged]
     detected = time.perf_counter()
     pairs = zip(detections, judged, strict=True)
-    matchings = [match_detection(found, trace, detector.settle) for found, trace in pairs]
+    matchings = [match_detection(found, trace, alarm.settle) for found, trace in pairs]
+    evaluation = tg.Evaluation.of([str(k) for k in range(len(judged))], matchings)
     summary: dict[str, Any] = {
         "seed": seed,
         "simulated_seconds": plan.seconds,
-        **judged_figures(detector, judged, matchings),
-        "asked": requested(detector, scores),
+        "judged_seconds": sum(m.free_seconds for m in matchings),
+        "not_judged_seconds": alarm.settle * len(judged),
+        "collisions_by_kind": count(judged, lambda c: c.kind),
+        "collisions_by_link": count(judged, lambda c: str(c.link)),
+        "threshold": alarm.threshold,
+        **evaluation.metrics,
+        "asked": requested(detector),
         "timing": {
             "simulate_s": simulated - started,
             "train_s": fitted - simulated,
             "detect_s": detected - fitted,
             "real_time_factor": plan.seconds / (simulated - started),
             "simulation_us_per_sample": simulation_timing(plan.judge_free[0]),
-            **detector_timing(detector, judged, detected - fitted),
+            **detector_timing(alarm, judged, detected - fitted),
         },
     }
     write_results(out, simulate(plan.showcase), detector)
-    draw(out / "summary.png", summary, matchings)
+    evaluation.draw(out / "summary.png")
     summary["timing"]["total_s"] = time.perf_counter() - started
     for path in filter(None, (out / "summary.json", json)):
         write_json(path, summary)
-    closing(out, summary)
+    closing(out, evaluation, summary)
 
 
-def judged_figures(
-    detector: CollisionAlarm, judged: list[Trace], matchings: list[Matching]
-) -> dict[str, Any]:
-    """Duration and collisions of the test motion, and the detector's metrics on it."""
-    from tauguard.detectors import detection_metrics
-
-    return {
-        "judged_seconds": sum(m.free_seconds for m in matchings),
-        "not_judged_seconds": detector.settle * len(judged),
-        "collisions_by_kind": count(judged, lambda c: c.kind),
-        "collisions_by_link": count(judged, lambda c: str(c.link)),
-        "threshold": detector.threshold,
-        **detection_metrics(matchings),
-    }
-
-
-def requested(detector: CollisionAlarm, scores: Sequence[FreeScores]) -> dict[str, float]:
+def requested(detector: Detector) -> dict[str, float]:
     """Requested rate of false alarms, and 95 % interval of the rate on training motion [1/h]."""
-    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
-
-    expected = ExpectedRate.of(scores)
-    low, high = expected.interval(detector.threshold)
-    return {"per_hour": FALSE_ALARMS_PER_HOUR, "low": low, "high": high, "hours": expected.hours}
+    rate = detector.to_dict()["false_alarms_per_hour"]
+    hours = sum(score.seconds for score in detector.scores) / 3600
+    return {"per_hour": rate["requested"], "low": rate["low"], "high": rate["high"], "hours": hours}
 
 
 def false_alarm_text(summary: dict[str, Any]) -> str:
@@ -138,11 +122,17 @@ def false_alarm_text(summary: dict[str, Any]) -> str:
     )
 
 
-def closing(out: Path, summary: dict[str, Any]) -> None:
+def closing(out: Path, evaluation: Evaluation, summary: dict[str, Any]) -> None:
     """Print the results, the files in the folder, and how to open the recording."""
-    from tauguard.detectors.evaluation.metrics_page import text
-
-    print(text(summary))
+    timing = summary["timing"]
+    print(evaluation)
+    print(
+        f"\n  {summary['simulated_seconds']:.0f} s simulated, "
+        f"{timing['real_time_factor']:.0f} times real time; "
+        f"per sample: simulation {timing['simulation_us_per_sample']:.1f} us, "
+        f"observer {timing['observer_us_per_sample']:.1f} us, "
+        f"detector {timing['detector_us_per_sample']:.1f} us"
+    )
     print(false_alarm_text(summary))
     print(f"\n{out}/: demo.mcap  demo.rrd  model.tauguard  summary.json  summary.png")
     recording = out / "demo.rrd"
@@ -151,17 +141,17 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     print(f"in rerun's own window:  {run}rerun {recording}")
 
 
-def write_results(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
+def write_results(out: Path, showcase: Trace, detector: Detector) -> None:
     """Write the recording, its replay and the detector into the folder."""
-    from tauguard.detectors import diagnose, save_model
+    from tauguard.detectors import diagnose
     from tauguard.replay import write_rrd
     from tauguard.traces import write_mcap
 
-    shown = detector.detect(showcase)
-    said = diagnose(detector, showcase, shown)
+    shown = detector.alarm.detect(showcase)
+    said = diagnose(detector.alarm, showcase, shown)
     write_mcap(out / "demo.mcap", showcase, shown)
     write_rrd(out / "demo.rrd", showcase, shown, explained=said)
-    save_model(detector, out / "model.tauguard")
+    detector.save(out / "model.tauguard")
 
 
 def count(traces: list[Trace], key: Any) -> dict[str, int]:

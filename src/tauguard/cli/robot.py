@@ -10,7 +10,8 @@ import tyro
 from tauguard.findings import ArgumentError
 
 if TYPE_CHECKING:
-    from tauguard.models import Facts, Scene
+    from tauguard.envs import Gains
+    from tauguard.models import Facts
 
 
 def command(
@@ -40,28 +41,18 @@ def command(
         pictures: with --try, write a PNG of the start of an episode in each environment.
     """
     from tauguard.cli import expect
-    from tauguard.envs.plant import Gains
-    from tauguard.models import ROBOTS, SceneSpec, compose
-    from tauguard.models.arm import NAMED
-    from tauguard.models.known_robots import menagerie_file
+    from tauguard.envs import Gains
+    from tauguard.models import SceneSpec, compose, download_arm, largest_force, named_arms
     from tauguard.report import write_json
 
     if robot is None:
-        print(names())
+        print(*(f"{name:<14} {source}" for name, source in named_arms().items()), sep="\n")
+        print("or an MJCF or URDF file, a TOML file, any arm of mujoco-menagerie by its name")
         return
     expect("--episodes", episodes, 1)
     expect("--seed", seed, 0)
     if download:
-        row = ROBOTS.get(robot)
-        model = row.menagerie if row is not None else robot
-        if robot in NAMED or model is None:
-            raise ArgumentError(f"--download: {robot} is not in mujoco-menagerie")
-        from tauguard.extras import extra
-
-        try:
-            menagerie_file(model, download=True)
-        except ModuleNotFoundError:
-            raise ArgumentError(f"--download needs mujoco-menagerie: {extra('arms')}") from None
+        download_arm(robot)
     robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     scene = compose(SceneSpec(arm=robot), visuals=False)
     gains = Gains.for_scene(scene)
@@ -74,17 +65,6 @@ def command(
         write_json(json, {"name": "robot", "robot": robot, "sources": sources, "rows": rows})
 
 
-def largest_force(scene: Scene) -> float:
-    """The largest force that the arm without a load can exert on a skull, a stiff region [N]."""
-    from tauguard.models import BODY_REGIONS, derive
-
-    facts = scene.facts
-    energies = derive.largest_energy(
-        scene.model, facts.joints, facts.max_speed, facts.drive.torque_limit
-    )
-    return float((2 * BODY_REGIONS["skull"].stiffness * sum(energies)) ** 0.5)
-
-
 def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> None:
     """Run the trial and print a line for each environment.
 
@@ -92,8 +72,8 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         ArgumentError: ``pictures`` need OpenGL, which is missing; raised before the trial.
         SystemExit: an environment does not pass.
     """
-    from tauguard.envs.gym.trial import picture, try_arm
-    from tauguard.models.picture import check_opengl
+    from tauguard.envs import first_picture, try_arm
+    from tauguard.models import check_opengl
     from tauguard.report import table as text_table
 
     if pictures is not None:
@@ -124,7 +104,7 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         import numpy as np
         from matplotlib.image import imsave
 
-        shown = [picture(row.environment, robot) for row in rows if not row.refused]
+        shown = [first_picture(row.environment, robot) for row in rows if not row.refused]
         if shown:
             imsave(pictures, np.concatenate(shown, axis=1))
             print(f"wrote {pictures}")
@@ -132,35 +112,8 @@ def run_trial(robot: str, episodes: int, seed: int, pictures: Path | None) -> No
         raise SystemExit(1)
 
 
-def names() -> str:
-    """The named arms, and the sources of their models."""
-    from tauguard.models import ROBOTS
-    from tauguard.models.arm import NAMED
-
-    lines = [f"{name:<14} part of tauguard" for name in NAMED]
-    rows = sorted(ROBOTS.items(), key=lambda item: item[1].own is None)
-    for name, row in rows:
-        if row.own is not None:
-            lines.append(f"{name:<14} part of tauguard: published numbers, light shapes")
-            continue
-        packages = [
-            package
-            for package, has in (
-                ("example-robot-data", row.urdf),
-                (f"mujoco-menagerie ({row.menagerie})", row.menagerie),
-            )
-            if has
-        ]
-        lines.append(f"{name:<14} from {' or '.join(packages)}")
-    lines.append("or an MJCF or URDF file, a TOML file, any arm of mujoco-menagerie by its name")
-    return "\n".join(lines)
-
-
-def table(facts: Facts, gains: object) -> list[dict[str, object]]:
+def table(facts: Facts, gains: Gains) -> list[dict[str, object]]:
     """A row for each joint, as plain numbers."""
-    from tauguard.envs.plant import Gains
-
-    assert isinstance(gains, Gains)
     drive, known = facts.drive, facts.nominal.friction
     return [
         {

@@ -61,8 +61,7 @@ def command(
         json: file for a summary of the simulated episodes, in JSON.
     """
     from tauguard.cli import expect
-    from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-    from tauguard.datasets.plans import torque_scale
+    from tauguard.datasets import free_episodes, struck_episodes, torque_scale, write_dataset
     from tauguard.models import Mismatch, load_objects
     from tauguard.report import write_json
 
