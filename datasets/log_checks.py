@@ -27,6 +27,8 @@ AMPERES = 100.0
 #: A current is saturated if its magnitude stays at the maximum for PLATEAU samples in a row, and
 #: the maximum is at least ABOVE times the magnitude's median.
 PLATEAU, ABOVE = 5, 3.0
+#: Largest motion between two samples at a jump of one turn [rad].
+WRAPPED = 0.5
 #: The clock was set back if time steps back fewer than FEW times, and more than FEW rows follow.
 FEW = 5
 #: If more than this fraction of the rows repeat a time, the time has too few digits.
@@ -70,6 +72,30 @@ def checked(trace: Trace, where: Where, earlier: Sequence[Finding] = ()) -> Find
         )
         doubts.append(note("saturated", text, name))
     return raise_errors(LogError, [*earlier, *doubts])
+
+
+def unwrapped(q: Array, names: Sequence[str], where: Where) -> tuple[Array, list[Finding]]:
+    """Positions without jumps of one turn [rad], shape (T, n), and a note on each joint with any.
+
+    A column is wrapped if its values stay within -pi to pi or 0 to 2 pi, and it jumps by a turn
+    from one sample to the next.
+    """
+    jumps = np.round(np.diff(q, axis=0) / (2 * np.pi))
+    left = np.abs(np.diff(q, axis=0) - 2 * np.pi * jumps)
+    turn = np.pi + 0.01
+    inside = (np.abs(q) <= turn).all(axis=0) | (np.abs(q - np.pi) <= turn).all(axis=0)
+    wrapped = inside & (jumps != 0).any(axis=0) & ~((jumps != 0) & (left > WRAPPED)).any(axis=0)
+    notes = []
+    for j in np.flatnonzero(wrapped).tolist():
+        rows = np.flatnonzero(jumps[:, j])
+        text = (
+            f"{where(int(rows[0]) + 1)}: the position of {names[j]} jumps by a turn"
+            f"{f', {len(rows)} times in all' if len(rows) > 1 else ''}: it was wrapped, and is "
+            "continued here"
+        )
+        notes.append(note("wrapped", text, names[j]))
+    turns = np.concatenate([np.zeros_like(jumps[:1]), np.cumsum(jumps, axis=0)])
+    return np.where(wrapped, q - 2 * np.pi * turns, q), notes
 
 
 def _timing(trace: Trace, where: Where) -> list[Finding]:

@@ -19,7 +19,14 @@ from tauguard.datasets.columns import (
     presets_of,
     presets_of_width,
 )
-from tauguard.datasets.log_checks import checked, fresh, increasing, labelled, refuse_set_back
+from tauguard.datasets.log_checks import (
+    checked,
+    fresh,
+    increasing,
+    labelled,
+    refuse_set_back,
+    unwrapped,
+)
 from tauguard.datasets.recognition import described, in_units_of, lacking, recognised
 from tauguard.findings import Finding, LogError, cause, note
 from tauguard.traces.logs import Log
@@ -160,12 +167,14 @@ def read_table(
         notes.insert(0, note("columns", f"read as {as_read}"))
     if columns.torque or torque:
         meta["effort"] = "torque"
+    names = named(joint_names or columns.joint_names, len(columns.q))
+    kept = lines[keep]
+    signals["q"], jumps = unwrapped(signals["q"], names, lambda row: f"{source.word} {kept[row]}")
+    notes += jumps
     if "qd" not in signals:
         signals["qd"], meta["velocities"] = differentiated(t[keep], signals["q"]), "differentiated"
         notes.append(note("no-velocities", DIFFERENTIATED))
-    names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
-    kept = lines[keep]
     labels = labelled(header, rows, kept, trace.t)
     findings = checked(trace, lambda row: f"{source.word} {kept[row]}", notes)
     return Log(trace, labels=labels, as_read=as_read, columns=columns, findings=findings)

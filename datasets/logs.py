@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.datasets.columns import PRESETS, SIGNALS, ColumnMap
-from tauguard.datasets.log_checks import checked
+from tauguard.datasets.log_checks import checked, unwrapped
 from tauguard.datasets.log_table import Options, Table, header_of, log_of
 from tauguard.findings import ArgumentError, LogError, cause
 from tauguard.traces.logs import Log
@@ -25,7 +25,9 @@ def read_source(source: Any, name: str, options: Options) -> Log:
     if isinstance(source, Trace):
         with reading(name, kind=LogError):
             trace = _of_effort(source, options.torque)
-            return Log(trace, name=name, findings=checked(trace, lambda row: f"row {row}"))
+            q, notes = unwrapped(trace.q, trace.joint_names, lambda row: f"row {row}")
+            trace = replace(trace, q=q) if notes else trace
+            return Log(trace, name=name, findings=checked(trace, lambda row: f"row {row}", notes))
     if isinstance(source, Mapping):
         return _of_arrays(source, name, options)
     if hasattr(source, "to_numpy") and hasattr(source, "columns"):

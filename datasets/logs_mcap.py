@@ -13,7 +13,7 @@ from mcap.exceptions import McapError
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.datasets.log_checks import checked
+from tauguard.datasets.log_checks import checked, unwrapped
 from tauguard.findings import LogError, note
 from tauguard.traces.logs import Log
 from tauguard.traces.mcap import decode
@@ -43,7 +43,9 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None, torque: boo
     topic, messages = _messages(contents)
     trace = _of_effort(assemble(topic, messages, joint_names), torque)
     meaning = "joint torque [N m]" if torque else "taken as current [A]"
-    notes = [note("effort", f"{topic}: effort is {meaning}")]
+    q, jumps = unwrapped(trace.q, trace.joint_names, lambda row: f"{topic}, message {row}")
+    trace = replace(trace, q=q) if jumps else trace
+    notes = [note("effort", f"{topic}: effort is {meaning}"), *jumps]
     findings = checked(trace, lambda row: f"{topic}, message {row}", notes)
     return Log(trace, as_read=f"{topic}, effort {meaning}", findings=findings)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -43,6 +43,7 @@ from tauguard.findings import (
     MismatchError,
     RefusedError,
     note,
+    preceded_by,
     raise_errors,
 )
 from tauguard.report import table
@@ -193,12 +194,20 @@ def accepted_words(accept: str | Collection[str]) -> frozenset[str]:
 def column_findings(arm: ArmModel, logs: Mapping[str, Recording]) -> Findings:
     """Errors ``"signs"`` and ``"order"``: columns that do not fit the arm.
 
-    If friction would push a joint in some logs, the order is checked in these logs.
+    If friction would push a joint in some logs, the order is checked in these logs, else in all of
+    them together, and then in each.
     """
     signs = sign_findings(arm, logs)
     named = {name for finding in signs for name in finding.where}
     strange = {name: log for name, log in logs.items() if name in named}
-    return Findings((*signs, *order_findings(arm, strange or logs)))
+    order = list(order_findings(arm, strange or logs))
+    if not order and len(logs) > 1:
+        for name, log in logs.items():
+            order += [
+                replace(finding, text=f"{name}: {finding.text}", where=(name, *finding.where))
+                for finding in order_findings(arm, {name: log})
+            ]
+    return Findings((*signs, *order))
 
 
 def calibrate(
@@ -232,6 +241,14 @@ def calibrate(
         MismatchError: no robot, or logs of different presets.
     """
     words = accepted_words(accept)
+    with preceded_by(logs.findings):
+        arm = _calibrate(logs, gains, scale, words)
+    return replace(arm, findings=Findings((*logs.findings, *arm.findings)))
+
+
+def _calibrate(
+    logs: Logs, gains: Sequence[float], scale: Scale, words: Collection[str]
+) -> Calibration:
     begin = beginning(logs, gains, scale, words)
     arm, used, source, numbers = begin.arm, begin.logs, begin.source, begin.numbers
     recordings, traces = list(used.values()), [log.trace for log in used.values()]

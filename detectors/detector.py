@@ -27,7 +27,7 @@ from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee
-from tauguard.findings import ArgumentError, Finding, Findings, MismatchError, TauguardError, cause
+from tauguard.findings import ArgumentError, Finding, Findings, MismatchError, cause, preceded_by
 from tauguard.models.robot import bodies_file
 from tauguard.models.stored_robot import robot_file
 from tauguard.report import two_digits
@@ -101,6 +101,11 @@ class Detector(Result):
             ArgumentError: a load for a detector that cannot be given one.
         """
         log = log if isinstance(log, Log) else Log(log, name=str(log.meta.get("log", "trace")))
+        with preceded_by(log.findings):
+            found = self._detect(log, payload, at_tool)
+        return replace(found, checks=Findings((*log.findings, *found.checks)))
+
+    def _detect(self, log: Log, payload: LoadLike, at_tool: bool) -> LogDetection:
         detector = self if payload is None else self.carrying(payload)
         arm, robot = detector.alarm.detector.arm, log.robot or self.robot
         if robot is not None:
@@ -264,10 +269,8 @@ def detected(
     load_known: bool,
 ) -> LogDetection:
     """The alarms of a log whose joints match; ``checks`` come before the findings of an error."""
-    try:
+    with preceded_by(checks):
         found = detect_in_log(alarm, trace, load_known)
-    except TauguardError as error:
-        raise type(error)(*checks, *error.findings) from None
     return LogDetection(log, trace, alarm, found, Findings(checks), robot, at_tool, load_known)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from tauguard.detectors.alarms import training
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
@@ -47,6 +45,7 @@ from tauguard.findings import (
     TauguardError,
     cause,
     note,
+    preceded_by,
     raise_errors,
 )
 from tauguard.traces.loads import Load, LoadLike, load_of, log_named
@@ -107,24 +106,40 @@ def train(
     words, gains = accepted_words(accept), tuple(gains)
     if arm is not None and gains:
         raise ArgumentError("`gains=`: the arm has gains; give one of the two")
-    if isinstance(settings, FreeMotion):
-        if calibration is not None or contacts is not None:
-            raise ArgumentError("free-motion takes neither `calibration=` nor `contacts=`")
-        return _train_free(settings, logs, arm, gains, false_alarms_per_hour, words, validate)
-    if words or gains:
-        raise ArgumentError(f"{settings.name} takes neither `accept=` nor `gains=`")
-    if contacts is not None:
-        return _train_beside(settings, logs, _model(arm), contacts, false_alarms_per_hour)
-    per_hour, free = false_alarms_per_hour, [] if calibration is None else calibration.traces
-    if calibration is not None:
-        check_guarantee([float(t.t[-1] - t.t[0]) for t in free], per_hour, confidence)
+    per_hour = false_alarms_per_hour
+    with preceded_by(logs.findings):
+        if isinstance(settings, FreeMotion):
+            if calibration is not None or contacts is not None:
+                raise ArgumentError("free-motion takes neither `calibration=` nor `contacts=`")
+            detector = _train_free(settings, logs, arm, gains, per_hour, words, validate)
+        elif words or gains:
+            raise ArgumentError(f"{settings.name} takes neither `accept=` nor `gains=`")
+        elif contacts is not None:
+            detector = _train_beside(settings, logs, _model(arm), contacts, per_hour)
+        else:
+            believed = _model(arm) or nominal_arm(logs.traces)
+            guarantee = None if calibration is None else (calibration, confidence)
+            detector = _train_labelled(settings, logs, believed, per_hour, folds, guarantee)
+    return replace(detector, findings=Findings((*logs.findings, *detector.findings)))
+
+
+def _train_labelled(
+    settings: Method,
+    logs: Logs,
+    arm: ArmModel,
+    per_hour: float,
+    folds: int,
+    asked: tuple[Logs, float] | None,
+) -> Detector:
+    """A method trained on recordings with truth; ``asked``: calibration logs and confidence."""
+    free = [] if asked is None else asked[0].traces
+    if asked is not None:
+        check_guarantee([float(t.t[-1] - t.t[0]) for t in free], per_hour, asked[1])
         folds = 1  # the calibration replaces the threshold
-    believed = _model(arm) or nominal_arm(logs.traces)
-    alarm, scores = training.train_and_score(settings, logs.traces, believed, per_hour, folds)
+    alarm, scores = training.train_and_score(settings, logs.traces, arm, per_hour, folds)
     guarantee = None
-    if calibration is not None:
-        alarm, guarantee = training.with_guarantee(alarm, free, per_hour, confidence)
-    _check_usable(alarm)
+    if asked is not None:
+        alarm, guarantee = training.with_guarantee(alarm, free, per_hour, asked[1])
     return Detector(
         alarm,
         logs.robot,
@@ -137,16 +152,6 @@ def train(
 
 def _model(arm: Calibration | ArmModel | None) -> ArmModel | None:
     return arm.arm if isinstance(arm, Calibration) else arm
-
-
-def _check_usable(alarm: CollisionAlarm) -> None:
-    """Refuse a threshold that no score exceeds, because there was hardly any motion."""
-    if not np.isfinite(alarm.threshold):
-        text = (
-            "too little collision-free motion to set a threshold: give a minute or more in all, in "
-            "several recordings"
-        )
-        raise RefusedError(cause("too-short", text))
 
 
 def _believed(
@@ -310,25 +315,28 @@ def detect_after_quiet(
             f"the first {quiet:g} s (`quiet=`), on which the detector is trained; give a shorter "
             "`quiet=`, or a `model=`"
         )
-        raise RefusedError(cause("labelled-contact", text, log.name))
+        raise RefusedError(*log.findings, cause("labelled-contact", text, log.name))
     if not 0 < quiet < length:
-        raise ArgumentError(
+        text = (
             f"`quiet={quiet:g}`: expected above 0 and below the log's {length:.1f} s; or train a "
             "detector on logs of free motion and give `model=`"
         )
+        raise ArgumentError(*log.findings, cause("argument", text))
     load = load_of(payload) or Load()
     joints = one_log(log)
     log = joints[log.name]
     beginning = replace(joints, logs={log.name: replace(log.until(quiet), load=load)})
+    before = (*log.findings, *joints.findings)
+    beginning = replace(beginning, findings=Findings())
     try:
         detector = train(beginning, gains=gains, validate=False)
     except TauguardError as error:
-        raise type(error)(*joints.findings, *_of_beginning(error, log, quiet)) from None
+        raise type(error)(*before, *_of_beginning(error, log, quiet)) from None
     source = detector.findings.of("gains")[0].text
     trained = note("gains", f"trained on the first {quiet:g} s; {source}")
     alarm = (detector if payload is None else detector.carrying(load)).alarm
     alarm = replace(alarm, detector=replace(alarm.detector, settle=quiet))  # type: ignore[type-var]
-    checks = (*joints.findings, *detector.findings.without("gains"), trained)
+    checks = (*before, *detector.findings.without("gains"), trained)
     found = detected(alarm, log, log.trace, checks, log.robot, at_tool, payload is not None)
     return found
 

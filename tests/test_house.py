@@ -136,7 +136,7 @@ LAYERS = (
 )
 #: Modules of detectors below all layers, and above them.
 BELOW, ABOVE = (
-    {"codec", "events", "frozen", "model_archive", "samples"},
+    {"codec", "events", "frozen", "model_archive", "one_thread", "samples"},
     {
         "__init__",
         "arm_calibration",

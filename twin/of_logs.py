@@ -22,6 +22,7 @@ from tauguard.findings import (
     RefusedError,
     TauguardError,
     note,
+    preceded_by,
     raise_errors,
 )
 from tauguard.models import load_arm
@@ -198,7 +199,19 @@ def identify_twin(
     """
     if logs.robot is None:
         raise ArgumentError("logs: a twin needs logs of a real arm, with a robot file")
-    words = accepted_words(accept)
+    read = (*logs.findings, *(() if judge is None else judge.findings))
+    with preceded_by(read):
+        twin = _identify(logs, logs.robot, gains, accepted_words(accept), judge)
+    return replace(twin, findings=Findings((*read, *twin.findings)))
+
+
+def _identify(
+    logs: Logs,
+    robot: Path,
+    gains: Sequence[float],
+    words: Collection[str],
+    judge: Logs | None,
+) -> TwinOfLogs:
     begin = beginning(logs, gains, "auto", words)
     signs = sign_findings(begin.arm, begin.logs)
     if signs:
@@ -208,7 +221,7 @@ def identify_twin(
     order = order_findings(begin.arm, begin.logs)
     findings = raise_errors(RefusedError, (*findings, *left, *order), words)
     recordings = list(begin.logs.values())
-    limit = load_arm(str(logs.robot)).torque_limit
+    limit = load_arm(str(robot)).torque_limit
     twin = _twin_from(begin, recordings, limit)
     apart: list[Array] = []
     if each_can_be_left_out(recordings):
@@ -225,7 +238,7 @@ def identify_twin(
         tuple(reasons),
         begin.source,
         tuple(begin.logs),
-        logs.robot,
+        robot,
         Findings((*findings, *notes)),
     )
 

@@ -30,6 +30,7 @@ from tauguard.detectors.codec import check_storable
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
+from tauguard.detectors.one_thread import one_thread
 from tauguard.detectors.scores.free_motion import CONFIRMATION as FREE_CONFIRMATION
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.detectors.scores.method import FittedMethod, Method
@@ -121,14 +122,15 @@ def train_and_score(
         raise ArgumentError(f"per_hour {per_hour}, folds {folds}: expected above 0, and 1 or more")
     check_storable(detector)
     free = sum(not _collisions(trace) for trace in traces)
-    if min(folds, free) < 2:
-        own, rest = held_out(traces)
-        fitted = detector.fit(own, arm)
-        found = _free_scores(fitted, rest)
-    else:
-        found = _cross_fitted(detector, traces, arm, left_out(traces, min(folds, free)))
-        fitted = detector.fit(traces, arm)
-    alarm, scores = _with_rate(fitted, found, per_hour)
+    with one_thread():
+        if min(folds, free) < 2:
+            own, rest = held_out(traces)
+            fitted = detector.fit(own, arm)
+            found = _free_scores(fitted, rest)
+        else:
+            found = _cross_fitted(detector, traces, arm, left_out(traces, min(folds, free)))
+            fitted = detector.fit(traces, arm)
+        alarm, scores = _with_rate(fitted, found, per_hour)
     text = traces[0].attachments.get("arm.xml")
     robot = None if text is None else StoredRobot.of_text("arm.xml", text)
     usual = UsualInput.of(traces, alarm.detector.arm)
@@ -190,21 +192,22 @@ def train_beside(
     moving = [k for k, part in enumerate(parts) if moves(part.trace)]
     calibrated = Subsets(arm, [parts[k] for k in moving])
     found, notes = list[FreeScores](), list[Finding]()
-    for fold in range(min(FOLDS, len(parts))):
-        rest, without = [k for k in range(len(parts)) if k % FOLDS != fold], arm
-        if (seconds := motion_length([parts[k] for k in rest])) >= LEAST:
-            without = calibrated([place for place, k in enumerate(moving) if k in rest])
-        else:
-            text = (
-                f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "
-                f"because the rest has {seconds:.1f} s of motion, expected {LEAST:g} s or more"
-            )
-            notes.append(note("too-short", text, *names[fold::FOLDS]))
-        fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
-        found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]])
-    found = [replace(scores, floor=None) for scores in found]
-    whole = detector.fit([*struck, *logs.values()], arm)
-    alarm, scores = _with_rate(whole, found, per_hour)
+    with one_thread():
+        for fold in range(min(FOLDS, len(parts))):
+            rest, without = [k for k in range(len(parts)) if k % FOLDS != fold], arm
+            if (seconds := motion_length([parts[k] for k in rest])) >= LEAST:
+                without = calibrated([place for place, k in enumerate(moving) if k in rest])
+            else:
+                text = (
+                    f"{', '.join(names[fold::FOLDS])}: scored by the arm model calibrated with it, "
+                    f"because the rest has {seconds:.1f} s of motion, expected {LEAST:g} s or more"
+                )
+                notes.append(note("too-short", text, *names[fold::FOLDS]))
+            fitted = detector.fit([*struck, *(parts[k].trace for k in rest)], without)
+            found += _free_scores(fitted, [part.trace for part in parts[fold::FOLDS]])
+        found = [replace(scores, floor=None) for scores in found]
+        whole = detector.fit([*struck, *logs.values()], arm)
+        alarm, scores = _with_rate(whole, found, per_hour)
     beyond = max(1.0, 1 / (UNLIKE * (len(scores) + 1)))
     least = beyond * max(one.peak for one in scores)
     if least > alarm.threshold:

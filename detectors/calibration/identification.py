@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import (
@@ -36,6 +35,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.physical_consistency import solve_physically_consistent
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers, mass_matrix
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.one_thread import one_thread
 from tauguard.findings import ArgumentError, Findings, note
 
 #: Friction columns of a real geared joint: presliding of several lengths, Stribeck friction,
@@ -184,8 +184,7 @@ def identify(
     """
     _check(recordings, arm.robot, scale)
     check_length(recordings, least)
-    # With a hundred unknowns, threads of the linear algebra cost more time than they save.
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         if scale == "gains":
             return _fit(arm, recordings, scale, friction, data, 2)[0]
         return _identify_scale(arm, recordings, scale, friction)

@@ -8,9 +8,10 @@ in backquotes, such as ```mend="deg"```; :func:`as_flags` writes them as flags o
 from __future__ import annotations
 
 import ast
+import contextlib
 import dataclasses
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -163,6 +164,15 @@ def raise_errors(
     if any(finding.severity == "error" for finding in judged):
         raise kind(*judged)
     return judged
+
+
+@contextlib.contextmanager
+def preceded_by(findings: Iterable[Finding]) -> Iterator[None]:
+    """Errors of the block get these findings before their own."""
+    try:
+        yield
+    except TauguardError as error:
+        raise type(error)(*findings, *error.findings) from error.__cause__
 
 
 # -- arguments in texts, as flags ------------------------------------------------------------------

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tauguard.cli import main
@@ -70,3 +71,29 @@ def test_exchanged_joints_of_real_logs_are_named(data_dir, name, columns, alike)
                 assert not order_findings(arm, mixed)
                 continue
             assert order_findings(arm, mixed)[0].where == names
+
+
+def test_a_stranger_s_log_with_three_kinds_of_wrong_columns(data_dir):
+    """Currents of two joints exchanged, one wrapped position, one joint's current negated."""
+    import tauguard as tg
+
+    robot = data_dir / "ur5" / "ur5.urdf"
+    free = tg.read_logs(data_dir / "ur5" / "free", "ur5", robot=robot)
+    traces = {}
+    for name, log in free.items():
+        trace = log.trace
+        q, current = trace.q.copy(), trace.current[:, [0, 2, 1, 3, 4, 5]]
+        current[:, 3] *= -1
+        about = np.median(q[:, 0])  # of a vertical axis, whose zero is anywhere
+        q[:, 0] = np.mod(q[:, 0] - about, 2 * np.pi) - np.pi
+        traces[name] = replace(trace, q=q, current=current)
+    logs = tg.read_logs(traces, robot=robot)
+    with pytest.raises(tg.findings.RefusedError) as stop:
+        tg.calibrate(logs)
+    names = free.joint_names
+    findings = stop.value.findings
+    assert all(names[0] in finding.where for finding in findings.of("wrapped"))
+    assert findings.of("wrapped")
+    where = {finding.where for finding in findings.of("order")}
+    assert {(names[1], names[2]), (names[3],)} <= where
+    assert any(names[3] in finding.where for finding in findings.of("signs"))

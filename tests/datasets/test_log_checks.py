@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.datasets import read_log
-from tauguard.datasets.log_checks import checked, saturated
+from tauguard.datasets.log_checks import checked, saturated, unwrapped
 from tauguard.traces import Trace, write_mcap
 
 
@@ -23,6 +23,27 @@ def log(rows=600, dt=0.01, seed=0):
 
 def line(row):
     return f"line {row + 1}"
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 99), st.floats(-3, 3), st.sampled_from([-np.pi, 0.0]))
+def test_a_wrapped_position_is_continued_and_named(seed, shift, low):
+    trace = log(seed=seed)
+    moved = trace.q + shift
+    wrapped = moved.copy()
+    wrapped[:, 1] = np.mod(moved[:, 1] - low, 2 * np.pi) + low
+    q, notes = unwrapped(wrapped, trace.joint_names, line)
+    jumps = np.flatnonzero(np.abs(np.diff(wrapped[:, 1])) > 3)
+    np.testing.assert_array_equal(q[:, [0, 2]], moved[:, [0, 2]])
+    np.testing.assert_allclose(np.diff(q[:, 1]), np.diff(moved[:, 1]), atol=1e-12)
+    assert [one.where for one in notes] == ([("b",)] if len(jumps) else [])
+    assert all(f"line {jumps[0] + 2}: the position of b jumps" in one.text for one in notes)
+
+
+def test_positions_beyond_a_turn_are_not_wrapped_ones():
+    q = np.array([[0.0], [4.0], [10.5], [4.2]])
+    assert unwrapped(q, ("a",), line)[1] == []
+    np.testing.assert_array_equal(unwrapped(q, ("a",), line)[0], q)
 
 
 def test_a_good_log_says_nothing():

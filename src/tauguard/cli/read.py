@@ -1,4 +1,4 @@
-"""Read logs as the flags of commands say, and print what was found."""
+"""Read logs as the flags of commands say."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ def read_free(
 ) -> Logs:
     """The logs of a real arm."""
     import tauguard as tg
-    from tauguard.cli.output import print_findings
     from tauguard.cli.payload import loads
 
-    free = tg.read_logs(
+    return tg.read_logs(
         logs,
         columns,
         robot=robot,
@@ -33,8 +32,6 @@ def read_free(
         mend=reading.mend,
         resample=reading.resample,
     )
-    print_findings(free.findings)
-    return free
 
 
 def read_one(
@@ -42,10 +39,7 @@ def read_one(
 ) -> Log:
     """One log of a real arm."""
     import tauguard as tg
-    from tauguard.cli.output import print_findings
 
-    read = tg.read_log(
+    return tg.read_log(
         log, columns, robot=robot, torque=torque, mend=reading.mend, resample=reading.resample
     )
-    print_findings(read.findings)
-    return read
