@@ -18,6 +18,11 @@ STUDY = Study(
             ("keep",),
             alias="guard",
         ),
+        "handling": Part(
+            "contacts.handling",
+            "a bin, belts and a gripper: guarded steps beside plain and fine steps",
+            alias="handling",
+        ),
     },
 )
 #: Methods whose names begin with one of these are peers.

@@ -246,11 +246,18 @@ def may_touch(model: Any, followed: bool = True) -> Any:
     chosen = np.zeros((model.ngeom, model.ngeom), dtype=bool)
     weld, kinds = model.body_weldid, mujoco.mjtGeom
     filtered = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
-    excluded = {divmod(int(signature), 1 << 16) for signature in model.exclude_signature}
+    excluded, highest = set(), -1
+    for signature in model.exclude_signature.tolist():  # read once, beside sorted pairs of bodies
+        if signature > highest:
+            excluded.add(divmod(signature, 1 << 16))
+        highest = max(highest, signature)
     for a in range(model.nbody):
         for b in range(a + 1, model.nbody):
             one, other = int(weld[a]), int(weld[b])
             still = model.body_dofnum[one] == 0 and model.body_dofnum[other] == 0
+            masks = model.body_contype[a] & model.body_conaffinity[b]
+            if not masks | (model.body_conaffinity[a] & model.body_contype[b]):
+                continue
             if one == other or still or (a, b) in excluded:
                 continue
             child = (
@@ -264,6 +271,8 @@ def may_touch(model: Any, followed: bool = True) -> Any:
             masks = model.geom_contype[first][:, None] & model.geom_conaffinity[second]
             back = model.geom_conaffinity[first][:, None] & model.geom_contype[second]
             chosen[np.ix_(first, second)] = (masks | back) != 0
+    tested = _in_trees(model)
+    chosen &= tested[:, None] & tested
     chosen[model.pair_geom1, model.pair_geom2] = True
     chosen |= chosen.T
     flat = np.isin(model.geom_type, [int(kinds.mjGEOM_PLANE), int(kinds.mjGEOM_HFIELD)])
@@ -278,10 +287,29 @@ def may_touch_flexes(model: Any) -> list[tuple[int, int]]:
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     if model.opt.disableflags & off:
         return []
-    masks = model.geom_contype[:, None] & model.flex_conaffinity
-    back = model.geom_conaffinity[:, None] & model.flex_contype
-    found = np.argwhere(((masks | back) != 0) & _followed(model)[:, None])
+    meets = np.ones((model.ngeom, model.nflex), dtype=bool)
+    of = model.geom_bodyid
+    for contype, conaffinity in (
+        (model.geom_contype, model.geom_conaffinity),
+        (model.body_contype[of], model.body_conaffinity[of]),
+    ):
+        masks = contype[:, None] & model.flex_conaffinity
+        meets &= (masks | (conaffinity[:, None] & model.flex_contype)) != 0
+    found = np.argwhere(meets & (_followed(model) & _in_trees(model))[:, None])
     return [(int(g), int(f)) for g, f in found]
+
+
+def _in_trees(model: Any) -> Any:
+    """Whether MuJoCo finds a geom: bodies of several geoms have trees of those with masks."""
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_MIDPHASE:
+        return np.ones(model.ngeom, dtype=bool)
+    leaves = {
+        int(node)
+        for body in range(model.nbody)
+        for node in model.bvh_nodeid[model.body_bvhadr[body] :][: model.body_bvhnum[body]]
+    }
+    alone = model.body_geomnum[model.geom_bodyid] == 1
+    return np.array([alone[g] or g in leaves for g in range(model.ngeom)], dtype=bool)
 
 
 def _radius(model: Any, geom: int) -> float:

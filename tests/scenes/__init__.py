@@ -12,6 +12,6 @@ FAMILIES = {
         *(rigid.squeeze, soft.needles, machines.gears, machines.screw, machines.tendons),
         *(machines.block, machines.sheets, machines.terrain, machines.distance_field),
         *(machines.crowd, machines.breaking, machines.hand, machines.belt, machines.wind),
-        machines.piston,
+        *(machines.piston, machines.tools, machines.gripper, machines.solids),
     )
 }

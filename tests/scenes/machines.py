@@ -314,3 +314,68 @@ def piston(rng: np.random.Generator) -> Drawn:
     scene = _loose(rng, spec, places, speed, h)
     scene.qvel[0] = min(speed, 20.0)
     return Drawn(spec, scene.qpos, scene.qvel, h, 0.15, np.ones(1))
+
+
+def tools(rng: np.random.Generator) -> Drawn:
+    """A rotor with thin tools on bodies without joints, on one another, among posts and bodies."""
+    spec, h, speed = world(rng, INTEGRATORS)
+    rotor = spec.worldbody.add_body(name="rotor")
+    rotor.add_joint(name="rotor", axis=[0, 0, 1], armature=1e-3)
+    solid(rotor, "hub", "sphere", [0.02, 0, 0], mass=1.0)
+    for k in range(int(rng.integers(1, 4))):
+        turn, link = 2 * np.pi * k / 3, rotor
+        quat = [np.cos(turn / 2), 0, 0, np.sin(turn / 2)]
+        for part in range(int(rng.integers(1, 4))):
+            link = link.add_body(pos=[0.06, 0, 0] if part else [0, 0, 0], quat=quat)
+            quat = list(any_way(rng)) if rng.random() < 0.3 else [1, 0, 0, 0]
+            size = [between(rng, 5e-4, 4e-3), 0.03, 0]
+            at = {"pos": [0.06, 0, 0], "quat": any_way(rng), "mass": 1e-3}
+            solid(link, f"tool{k}{part}", "capsule", size, **at)
+    for k, (x, y, _) in enumerate(_around(rng, 3)):
+        post = spec.worldbody.add_body(name=f"post{k}", pos=[0.6 * x, 0.6 * y, 0])
+        solid(post, f"post{k}", "capsule", [between(rng, 5e-4, 4e-3), 0.05, 0])
+    scene = _loose(rng, spec, _around(rng, int(rng.integers(1, 4))), speed, h)
+    scene.qvel[0] = between(rng, 5, 200)
+    return scene
+
+
+def gripper(rng: np.random.Generator) -> Drawn:
+    """Two fingers that a joint equality (mimic) or a tendon couples, driven onto loose bodies."""
+    spec, h, speed = world(rng, INTEGRATORS)
+    palm = spec.worldbody.add_body(name="palm", pos=[0, 0, -0.12])
+    palm.add_joint(name="palm", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1], damping=1)
+    slab(rng, palm, "palm", (0.1, 0.03, between(rng, 1e-3, 5e-3)), 0.3)
+    for name, side in (("left", -1), ("right", 1)):
+        finger = palm.add_body(name=name, pos=[0.1 * side, 0, 0.08])
+        finger.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[-side, 0, 0], damping=1)
+        solid(finger, name, "box", [between(rng, 5e-4, 4e-3), 0.03, 0.06], mass=0.05)
+        tip = finger.add_body(pos=[0, 0, 0.07])  # a pad without a joint
+        solid(tip, f"{name}_tip", "cylinder", [0.01, 0.01, 0], mass=0.01)
+    drive = spec.add_actuator(target="left", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    if rng.random() < 0.5:
+        equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="left", name2="right")
+        equality.objtype, equality.data[:2] = mujoco.mjtObj.mjOBJ_JOINT, [0, 1]
+    else:
+        tendon = spec.add_tendon(name="both")
+        tendon.wrap_joint("left", 0.5), tendon.wrap_joint("right", 0.5)
+        drive.target, drive.trntype = "both", mujoco.mjtTrn.mjTRN_TENDON
+    drive.gear[0] = between(rng, 1, 300)
+    places = [[0.03 * (k - 1), 0.0, 0.05 * k] for k in range(int(rng.integers(1, 4)))]
+    scene = _loose(rng, spec, places, min(speed, 10.0), h)
+    return Drawn(spec, scene.qpos, scene.qvel, h, 0.15, np.ones(1))
+
+
+def solids(rng: np.random.Generator) -> Drawn:
+    """A solid flex (of tetrahedra) between loose bodies, over a thin floor."""
+    spec, h, speed = world(rng, ("discrete",))
+    slab(
+        rng, spec.worldbody.add_body(name="floor"), "floor", (0.3, 0.3, between(rng, 1e-3, 5e-3)), 1
+    )
+    text = f"""<mujoco><worldbody><flexcomp name="jelly" type="grid" dim="3" count="3 3 3"
+      spacing=".03 .03 .03" pos="0 0 .06" radius="{between(rng, 5e-4, 3e-3)}" mass=".1">
+      <contact selfcollide="none"/><elasticity young="{between(rng, 1e4, 1e6)}" poisson=".2"
+      damping=".001"/></flexcomp></worldbody></mujoco>"""
+    spec.attach(mujoco.MjSpec.from_string(text), frame=spec.worldbody.add_frame())
+    places = np.c_[rng.uniform(-0.05, 0.05, (2, 2)), [0.15, 0.22]]
+    scene = _loose(rng, spec, places, min(speed, 20.0), h)
+    return Drawn(spec, scene.qpos, scene.qvel, h, 0.06)

@@ -22,7 +22,15 @@ from tauguard.contacts import GuardedStepper
 #: Most steps of a scene.
 MOST = 300
 #: Families of which a scene takes seconds: one scene for so many of the others.
-RARE = {"crowd": 20, "distance_field": 10, "cup": 4, "sheets": 4, "cloth": 2, "mill": 2}
+RARE = {
+    "crowd": 20,
+    "distance_field": 10,
+    "cup": 4,
+    "sheets": 4,
+    "cloth": 2,
+    "mill": 2,
+    "solids": 4,
+}
 #: How often something is edited: as a fraction of the steps.
 RATES = (0.0, 0.02, 0.1, 0.3)
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -117,9 +125,11 @@ class Run:
         """Go on with a copy, or with a model that was compiled again."""
         if self.guard is None or self.model.nplugin:
             return
-        how = int(self.rng.integers(3))
+        how = int(self.rng.integers(4))
         if how == 0:
             self.guard = copy.deepcopy(self.guard)
+        elif how == 3:
+            self._share()
         elif how == 1:
             self.guard = pickle.loads(pickle.dumps(self.guard))
         else:
@@ -131,6 +141,19 @@ class Run:
         self.counts["exchanged"] += 1
         self.model, self.data = self.guard.model, self.guard.data
         self.restart()
+
+    def _share(self) -> None:
+        """Another guard steps the same model for a while, from a state of its own."""
+        data = mujoco.MjData(self.model)
+        data.qpos[:], data.qvel[:] = self.scene.qpos, -2 * self.scene.qvel
+        try:
+            other = GuardedStepper(self.model, data)
+            for _ in range(10):
+                other.step()
+            other.close()
+        except (ValueError, mujoco.FatalError):
+            self.counts["refused"] += 1
+        self.counts["shared"] += 1
 
     def _bits(self) -> bytes:
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
