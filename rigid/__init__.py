@@ -2,6 +2,7 @@
 
 from tauguard.rigid.convex_parts import convex_parts
 from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces
+from tauguard.rigid.manifolds import Contacts, contacts
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.mesh_distance import MeshPairDistances
 from tauguard.rigid.motion import Motion
@@ -14,9 +15,10 @@ from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Shape
 from tauguard.rigid.solids_and_meshes import distance, overlap, time_of_impact
 
 __all__ = [
-    "Boxes", "Capsules", "Cones", "Cylinders", "Distances", "Ellipsoids", "HalfSpaces", "Hulls",
-    "Impacts", "MeshContacts", "MeshDistances", "MeshImpacts", "MeshOverlap",
+    "Boxes", "Capsules", "Cones", "Contacts", "Cylinders", "Distances", "Ellipsoids",
+    "HalfSpaces", "Hulls", "Impacts", "MeshContacts", "MeshDistances", "MeshImpacts", "MeshOverlap",
     "MeshPairDistances", "MeshTree", "Motion", "Overlap", "Parallelepipeds", "PlaneCache",
     "PointDistances", "Polygons", "RayHits", "Rounded", "Shape", "Spheres", "Tetrahedra",
-    "Witness", "convex_parts", "distance", "near_pairs", "overlap", "sweep", "time_of_impact",
+    "Witness", "contacts", "convex_parts", "distance", "near_pairs", "overlap", "sweep",
+    "time_of_impact",
 ]  # fmt: skip

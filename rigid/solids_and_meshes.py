@@ -109,7 +109,7 @@ def overlap(
         face = np.empty(count, dtype=np.int32)
         mesh._mesh.meets(bodies, face, thread_count(threads))
         return MeshOverlap(face >= 0, _faces_of(face, swapped))
-    count, first, second = _both(a, b, at_a, at_b)
+    count, first, second = native_pair(a, b, at_a, at_b)
     hit = np.empty(count, dtype=np.uint8)
     _rigid.meets(first, second, hit, thread_count(threads))
     met = hit.view(np.bool_)
@@ -206,7 +206,7 @@ def distance(
         if swapped:
             first, second, normal = second, first, -normal
         return MeshDistances(out[:, 0], first, second, normal, face)
-    count, one, other = _both(a, b, at_a, at_b)
+    count, one, other = native_pair(a, b, at_a, at_b)
     out = np.empty((count, 10))
     _rigid.distances(one, other, out, thread_count(threads))
     return Distances(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10])
@@ -282,14 +282,14 @@ def time_of_impact(
         normal = -out[:, 4:7] if swapped else out[:, 4:7]
         found = np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], normal
         return MeshImpacts(*found, _faces_of(face, swapped))
-    count, first, second = _both(a, b)
+    count, first, second = native_pair(a, b)
     out = np.empty((common_length({"bodies": count} | lengths), 7))
     moved = (*motion_a.packed, *motion_b.packed)
     _rigid.time_of_impact(first, second, *moved, out, thread_count(threads))
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
 
 
-def _both(
+def native_pair(
     a: Solid | MeshTree, b: Solid | MeshTree, pose_a: Poses = None, pose_b: Poses = None
 ) -> tuple[int, _rigid.Batch, _rigid.Batch]:
     """The number of rows, and the native forms of both sides."""

@@ -33,12 +33,24 @@ class ContactFeature {
   // The mean of the intersection's corners. If rounding leaves no intersection, the middle between
   // the means of the two polygons.
   static Point2 meet(const ContactFeature& a, const ContactFeature& b, double tolerance) {
-    if (a.polygon.size() == 1) return a.polygon[0];
-    if (b.polygon.size() == 1) return b.polygon[0];
+    geometry::Scratch<Polygon> rest;
+    intersect(a, b, tolerance, &*rest);
+    if (!rest->empty()) return mean(*rest);
+    const Point2 x = mean(a.polygon), y = mean(b.polygon);
+    return {0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1])};
+  }
+
+  // The intersection of two polygons, of which each may be a segment; a single point stays.
+  static void intersect(const ContactFeature& a, const ContactFeature& b, double tolerance,
+                        Polygon* out) {
+    Polygon& rest = *out;
+    rest.clear();
+    if (a.polygon.size() == 1) return void(rest = a.polygon);
+    if (b.polygon.size() == 1) return void(rest = b.polygon);
     const bool a_cuts = a.polygon.size() >= b.polygon.size();
     const Polygon& cutter = a_cuts ? a.polygon : b.polygon;
-    geometry::Scratch<std::array<Polygon, 2>> scratch;
-    Polygon &rest = (*scratch)[0], &before = (*scratch)[1];
+    geometry::Scratch<std::array<Polygon, 1>> scratch;
+    Polygon& before = (*scratch)[0];
     rest = a_cuts ? b.polygon : a.polygon;
     for (std::size_t i = 0; i < cutter.size() && !rest.empty(); ++i) {
       std::swap(rest, before);
@@ -50,15 +62,11 @@ class ContactFeature {
       std::swap(rest, before);
       cut(before, x, {x[0] + (y[1] - x[1]), x[1] - (y[0] - x[0])}, tolerance, &rest);
     }
-    if (!rest.empty()) return mean(rest);
-    const Point2 x = mean(a.polygon), y = mean(b.polygon);
-    return {0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1])};
   }
 
   double level = 0.0;
   Polygon polygon;
 
- private:
   static double turn(const Point2& o, const Point2& p, const Point2& q) {
     return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]);
   }
@@ -86,6 +94,7 @@ class ContactFeature {
     std::swap(p, out);
   }
 
+ private:
   // Writes the part of the polygon that is left of the line o -> e or within `tolerance` of it.
   static void cut(const Polygon& p, const Point2& o, const Point2& e, double tolerance,
                   Polygon* out) {

@@ -1,6 +1,7 @@
 // Bindings of tauguard.rigid._rigid: distance, overlap and first contact of convex bodies with
 // convex bodies or meshes. Arguments are checked in Python.
 #include "bodies_binding.hpp"
+#include "manifold.hpp"
 #include "mesh_body.hpp"
 #include "support_distance.hpp"
 
@@ -14,6 +15,8 @@ namespace {
 
 using DistanceRows = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Counts = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Contacts = nb::ndarray<double, nb::shape<-1, 4, 7>, nb::c_contig, nb::device::cpu>;
 using Vectors3 = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
@@ -43,8 +46,7 @@ void meets(const Batch& a, const Batch& b, Hits hit, int threads) {
   const LongCall call;
   if (a.in_place() && b.in_place())
     return interruptible_for(hit.shape(0), threads, 64, [&](auto begin, auto end, auto) {
-      for (auto i = begin; i < end; ++i)
-        hit.data()[i] = meet(a, b, i, a.radius(i), b.radius(i));
+      for (auto i = begin; i < end; ++i) hit.data()[i] = meet(a, b, i, a.radius(i), b.radius(i));
     });
   each_pair(a, b, hit.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
     const auto known = posed_meet(x.row(i), y.row(i), a.radius(i), b.radius(i));
@@ -69,6 +71,24 @@ void impacts(const Batch& a, const Batch& b, Poses pose_a, Vectors linear_a, Vec
   interruptible_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i)
       store(bodies_impact(a, b, i, a.radius(i), b.radius(i), mx[i], my[i]), out.data() + 7 * i);
+  });
+}
+
+// Up to four contacts of each row: points of a and b and distance (7 numbers), and the normal.
+void manifolds(const Batch& a, const Batch& b, double margin, Counts counts, DistanceRows normals,
+               Contacts out, int threads) {
+  const LongCall call;
+  each_pair(a, b, counts.shape(0), threads, 64, [&](auto i, Posed& x, Posed& y) {
+    const double ra = a.radius(i), rb = b.radius(i);
+    const Bodies &p = x.at(i), &q = y.at(i);
+    const SignedDistance g = signed_distance(p, q, i, ra, rb);
+    const Manifold m = manifold_of(p, q, i, ra, rb, margin, g);
+    store(g, normals.data() + 10 * i), counts.data()[i] = m.count;
+    for (int k = 0; k < m.count; ++k) {
+      double* row = out.data() + 7 * (Manifold::most * i + k);
+      std::copy(m.on_a[k].begin(), m.on_a[k].end(), row);
+      std::copy(m.on_b[k].begin(), m.on_b[k].end(), row + 3), row[6] = m.distance[k];
+    }
   });
 }
 
@@ -110,6 +130,8 @@ void mesh_impacts(const Mesh& mesh, const Batch& bodies, Poses pose_a, Vectors l
 void bind_distances(nb::module_& m) {
   m.def("distances", &distances, "a"_a, "b"_a, "out"_a, "threads"_a);
   m.def("meets", &meets, "a"_a, "b"_a, "hit"_a, "threads"_a);
+  m.def("manifolds", &manifolds, "a"_a, "b"_a, "margin"_a, "counts"_a, "distances"_a, "out"_a,
+        "threads"_a);
   m.def("common_points", &common_points, "a"_a, "b"_a, "hit"_a, "out"_a, "threads"_a);
   m.def("time_of_impact", &impacts, "a"_a, "b"_a, "pose_a"_a, "linear_a"_a, "angular_a"_a,
         "pose_b"_a, "linear_b"_a, "angular_b"_a, "out"_a, "threads"_a);

@@ -1,6 +1,7 @@
-// Branch and bound over pairs of boxes, the nearest first (a heap). Boxes further apart than the nearest
-// triangles so far are left out: by the separating axes of the overlap test, whose pad grows by
-// this distance, and by the direction between the nearest points so far, which prunes most pairs.
+// Branch and bound over pairs of boxes, the nearest first (a heap). Boxes further apart than the
+// nearest triangles so far are left out: by the separating axes of the overlap test, whose pad
+// grows by this distance, and by the direction between the nearest points so far, which prunes most
+// pairs.
 #include "mesh_distance.hpp"
 
 #include "mesh_swept.hpp"
