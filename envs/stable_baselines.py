@@ -90,9 +90,8 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
         self.envs.close()
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """A picture of the first copy, and None for the others."""
-        picture = self.envs.render()
-        return [None if picture is None else picture[0]] + [None] * (self.num_envs - 1)
+        """A picture of each copy."""
+        return list(self.envs.render() or [None] * self.num_envs)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute of the vector environment, repeated for each chosen copy."""

@@ -16,7 +16,7 @@ from tauguard.envs.tasks import Entry, Outcome, Task, register, tool_position
 from tauguard.models import SceneObject, Shape
 
 TOP, HALF = 0.25, 0.025  # height of belt and table; half edge of the part [m]
-GRIP = 0.03  # the vacuum cup holds from this distance of the part's upper face on [m]
+GRIP = 0.04  # the vacuum cup holds from this distance of the part's upper face on [m]
 BOARD = Shape("box", (0.13, 0.6, 0.02))
 PART = SceneObject(
     "part",
@@ -41,13 +41,13 @@ class Pick(Task):
     ended = "the part is at the target"
     options = {"begin_held": 0.0}  # fraction of the episodes that begin with the part in the cup
     tolerance = 0.05
-    begin_low, begin_high = (0.42, -0.12), (0.58, 0.12)  # where the part lies (x, y) [m]
+    begin_low, begin_high = (0.42, -0.08), (0.58, 0.08)  # where the part lies (x, y) [m]
     goal_low, goal_high = (0.4, -0.15, TOP + 0.1), (0.6, 0.15, TOP + 0.25)  # [m]
 
     def __init__(self, batch, begin_held):
         super().__init__(batch)
         self.begin_held = begin_held
-        self.above = self.joints_at(np.array([0.5, 0.0, TOP + 0.15]))
+        self.above = self.joints_at(np.array([0.5, 0.0, TOP + 0.1]))
 
     def start(self, i, rng):
         """Put the tool above the table, and the part and its target at drawn places."""

@@ -3,20 +3,46 @@
 from typing import Any
 
 import gymnasium
+import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorEnv, VectorWrapper
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import arm_env
+from tauguard.envs.gym.batch import Batch
+from tauguard.envs.gym.rules import Rule
 from tauguard.envs.gym.settings import positive
+from tauguard.envs.gym.vector import vector_arm_env
 
 
-class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+class Budget(Rule):
+    """Ends an episode once the sum of its costs exceeds a limit [N s]."""
+
+    def __init__(self, batch: Batch, limit: float) -> None:
+        """Set the limit."""
+        super().__init__(batch)
+        if limit != 0:
+            positive("limit", limit)
+        self._limit = float(limit)
+        self.columns["cost_left"] = np.full(batch.rows, self._limit)
+
+    def begin(self, i: int) -> None:
+        """Begin with the full budget."""
+        self.columns["cost_left"][i] = self._limit
+
+    def look(self, i: int) -> None:
+        """Subtract the costs so far."""
+        left = self._limit - self.batch.metrics["cost_sum"][i]
+        self.columns["cost_left"][i], self.over[i] = left, left < 0
+
+
+class CostBudget(gymnasium.Wrapper[Any, Array, Any, Array], RecordConstructorArgs):
     """Ends an episode once the sum of its costs exceeds a budget.
 
     ``info["cost_left"]`` is the rest of the budget; it is below 0 once the budget is exceeded.
     """
 
-    def __init__(self, env: gymnasium.Env[Array, Array], limit: float) -> None:
+    def __init__(self, env: gymnasium.Env[Any, Array], limit: float) -> None:
         """Set the budget.
 
         Args:
@@ -24,27 +50,20 @@ class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             limit: largest sum of ``info["cost"]`` in an episode [N s]; 0 allows no cost.
 
         Raises:
-            ValueError: the limit is below 0 or not finite.
+            ArgumentError: the limit is below 0 or not finite.
         """
         RecordConstructorArgs.__init__(self, limit=limit)
         gymnasium.Wrapper.__init__(self, env)
-        arm_env(env)
-        if limit != 0:
-            positive("limit", limit)
-        self._limit = float(limit)
+        arm_env(env).rules.add(Budget, limit=limit)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode with the full budget."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        return observation, info | {"cost_left": self._limit}
 
-    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Apply the action; the episode is terminated once the budget is exceeded."""
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        left = self._limit - info["cost_sum"]
-        return observation, reward, terminated or left < 0, truncated, info | {"cost_left": left}
+class VectorCostBudget(VectorWrapper):
+    """:class:`CostBudget` of every copy of a vector environment."""
+
+    def __init__(self, env: VectorEnv[Any, Any, Any], limit: float) -> None:
+        """Set the budget; arguments and errors as for :class:`CostBudget`."""
+        super().__init__(env)
+        vector_arm_env(env).rules.add(Budget, limit=limit)
 
 
 class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):

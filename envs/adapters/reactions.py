@@ -1,16 +1,20 @@
 """Reactions to a collision: a wrapper that acts in place of the policy."""
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorEnv, VectorWrapper
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, arm_env
-from tauguard.envs.gym.batch import Override
+from tauguard.envs.gym.base import arm_env
+from tauguard.envs.gym.batch import Batch, Override
+from tauguard.envs.gym.rules import Rule
 from tauguard.envs.gym.settings import one_of
+from tauguard.envs.gym.vector import vector_arm_env
 from tauguard.findings import ArgumentError
 
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
@@ -27,7 +31,7 @@ ADMITTANCE_INERTIA = 0.5
 ADMITTANCE_TIME = 0.1  #: time constant of the admittance [s]
 
 
-class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+class Reaction(gymnasium.Wrapper[Any, Array, Any, Array], RecordConstructorArgs):
     """Let the policy act until the trigger, and the reaction from then to the end of the episode.
 
     * ``continue``: the policy goes on.
@@ -49,7 +53,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
 
     def __init__(
         self,
-        env: gymnasium.Env[Array, Array],
+        env: gymnasium.Env[Any, Array],
         reaction: str = "stop2",
         trigger: str = "alarm",
         deceleration: float | None = None,
@@ -65,120 +69,147 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         Raises:
             ArgumentError: an unknown reaction or trigger, or trigger "alarm" without a detector.
         """
-        RecordConstructorArgs.__init__(
-            self, reaction=reaction, trigger=trigger, deceleration=deceleration
-        )
+        settings: dict[str, Any] = {
+            "reaction": reaction,
+            "trigger": trigger,
+            "deceleration": deceleration,
+        }
+        RecordConstructorArgs.__init__(self, **settings)
         gymnasium.Wrapper.__init__(self, env)
+        arm_env(env).rules.add(Reacting, **settings)
+
+
+class VectorReaction(VectorWrapper):
+    """:class:`Reaction` of every copy of a vector environment."""
+
+    def __init__(
+        self,
+        env: VectorEnv[Any, Any, Any],
+        reaction: str = "stop2",
+        trigger: str = "alarm",
+        deceleration: float | None = None,
+    ) -> None:
+        """Choose the reaction; arguments and errors as for :class:`Reaction`."""
+        super().__init__(env)
+        settings: dict[str, Any] = {
+            "reaction": reaction,
+            "trigger": trigger,
+            "deceleration": deceleration,
+        }
+        vector_arm_env(env).rules.add(Reacting, **settings)
+
+
+@dataclass
+class Course:
+    """The reaction of one copy until now."""
+
+    past: deque[Array]  #: positions of the last two seconds [rad]
+    speed: Array  #: commanded speed [rad/s]
+    measured: Array  #: speed of the joints [rad/s]
+    tau: Array  #: what the admittance yields to [N m]
+    since: float | None = None  #: time since the trigger [s]; None: not triggered
+    returning: list[Array] | None = None  #: speeds of the rest of a retraction [rad/s]
+
+
+class Reacting(Rule):
+    """Replaces actions after the trigger; see :class:`Reaction`."""
+
+    def __init__(
+        self, batch: Batch, reaction: str, trigger: str, deceleration: float | None
+    ) -> None:
+        """Choose the reaction."""
+        super().__init__(batch)
         one_of("reaction", reaction, REACTIONS)
         one_of("trigger", trigger, TRIGGERS)
-        self._arm: ArmEnv = arm_env(env)
-        if trigger == "alarm" and self._arm.batch.sensing is None:
+        if trigger == "alarm" and batch.sensing is None:
             raise ArgumentError("trigger 'alarm': the environment has no detector; pass detector=")
         self.reaction, self.trigger = reaction, trigger
-        compiled = self._arm.compiled
+        compiled = batch.compiled
         n = len(compiled.scene.joint_names)
-        own = compiled.scene.facts.max_acceleration
-        self._deceleration = np.resize(own if deceleration is None else deceleration, n)
+        usual = compiled.scene.facts.max_acceleration
+        self._deceleration = np.resize(usual if deceleration is None else deceleration, n)
         self._period = 1 / compiled.settings.control_rate
         # Critically damped gains: kp = w^2 M and kd = 2 w M.
         self._inertia = compiled.gains.kd**2 / (4 * compiled.gains.kp)
-        self._dead = self._dead_zone()
+        sensing = batch.sensing if trigger == "alarm" else None
+        #: Largest residual without contact [N m]; zero if the trigger is the true contact.
+        self._dead = sensing[0].bounds if sensing else np.zeros(n)
         self._retract_steps = round(RETRACT_TIME / self._period)
-        self._past: deque[Array] = deque(maxlen=round(2.0 / self._period))
-        self._forget()
+        self.columns["reacting"] = np.zeros(batch.rows, dtype=np.bool_)
 
-    def _dead_zone(self) -> Array:
-        """Largest residual without contact [N m]; zero if the trigger is the true contact."""
-        sensing = self._arm.batch.sensing
-        if not sensing or self.trigger != "alarm":
-            return np.zeros(len(self._deceleration))
-        return sensing[0].bounds
+    def begin(self, i: int) -> None:
+        """Let the policy act."""
+        none = np.zeros(len(self._deceleration))
+        past: deque[Array] = deque(maxlen=round(2.0 / self._period))
+        self.memory[i] = Course(past, none, none, none)
+        self.batch.plants[i].override(Override.FREE, none)
+        self.look(i)
 
-    def _forget(self) -> None:
-        self._since: float | None = None
-        self._speed = np.zeros(len(self._deceleration))
-        self._tau = self._measured = np.zeros(len(self._deceleration))
-        self._returning: list[Array] | None = None
-        self._past.clear()
-        self._arm.batch.plants[0].override(Override.FREE, self._speed)
+    def act(self, i: int) -> None:
+        """Replace the action once the reaction has begun."""
+        course = self.memory[i]
+        if course.since is not None and self.reaction != "continue":
+            kind, speed = self._react(course)
+            self.batch.plants[i].override(kind, speed)
+            course.since += self._period
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode."""
-        self._forget()
-        observation, info = self.env.reset(seed=seed, options=options)
-        self._observe(info)
-        return observation, info | {"reacting": self._since is not None}
-
-    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Apply the action, or the reaction in its place."""
-        if self._since is not None and self.reaction != "continue":
-            kind, speed = self._react()
-            self._arm.batch.plants[0].override(kind, speed)
-            self._since += self._period
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self._observe(info)
-        info["reacting"] = self._since is not None
-        return observation, reward, terminated, truncated, info
-
-    def _observe(self, info: dict[str, Any]) -> None:
+    def look(self, i: int) -> None:
         """Store the arm's state, and decide whether the reaction begins."""
-        n = len(self._deceleration)
-        observation = self._arm.batch.observation[0]
-        self._past.append(observation[:n].copy())
-        self._measured = observation[n : 2 * n].copy()
-        if self._since is None and (info["alarm"] if self.trigger == "alarm" else info["force"]):
-            self._since = 0.0
-            self._speed = self._measured
-        self._tau = info["residual"] if self.trigger == "alarm" else info["tau_ext"]
+        batch, course, n = self.batch, self.memory[i], len(self._deceleration)
+        alarm = self.trigger == "alarm"
+        course.past.append(batch.observation[i, :n].copy())
+        course.measured = batch.observation[i, n : 2 * n].copy()
+        if course.since is None and (batch.alarm[i] if alarm else batch.metrics["force"][i]):
+            course.since, course.speed = 0.0, course.measured
+        course.tau = (batch.residual if alarm else batch.tau_ext)[i].copy()
+        self.columns["reacting"][i] = course.since is not None
 
-    def _react(self) -> tuple[int, Array]:
+    def _react(self, course: Course) -> tuple[int, Array]:
         """The replacement of the next action: an :class:`Override`, joint velocities [rad/s]."""
-        assert self._since is not None
+        assert course.since is not None
         if self.reaction == "stop0":
             return (
-                Override.LIMP if self._since < BRAKE_DELAY - 1e-9 else Override.BRAKE
-            ), self._speed
+                Override.LIMP if course.since < BRAKE_DELAY - 1e-9 else Override.BRAKE
+            ), course.speed
         if self.reaction == "admittance":
             step = self._period / ADMITTANCE_INERTIA
             damping = ADMITTANCE_INERTIA / ADMITTANCE_TIME
-            push = np.sign(self._tau) * np.maximum(np.abs(self._tau) - self._dead, 0)
+            push = np.sign(course.tau) * np.maximum(np.abs(course.tau) - self._dead, 0)
             push = push / self._inertia
             # The damping is integrated implicitly, so this is stable for any period.
-            self._speed = (self._speed + step * push) / (1 + step * damping)
-            return Override.VELOCITY, self._speed
-        stopped = self._slow_down()
+            course.speed = (course.speed + step * push) / (1 + step * damping)
+            return Override.VELOCITY, course.speed
+        stopped = self._slow_down(course)
         if self.reaction == "stop1" and stopped:
-            return Override.BRAKE, self._speed
+            return Override.BRAKE, course.speed
         if self.reaction == "retract" and stopped:
-            return Override.VELOCITY, self._backward_velocity()
-        return Override.VELOCITY, self._speed
+            return Override.VELOCITY, self._backward_velocity(course)
+        return Override.VELOCITY, course.speed
 
-    def _slow_down(self) -> bool:
+    def _slow_down(self, course: Course) -> bool:
         """Slow all joints together, so that the arm stays on its path; True once it stands still.
 
         If the contact has already slowed the arm down, the stop continues from the measured speed.
         A speed that depended on time alone would accelerate the arm against the person.
         """
-        squared = float(self._speed @ self._speed)
+        squared = float(course.speed @ course.speed)
         if squared > 0:
-            fraction = float(self._measured @ self._speed) / squared
-            self._speed = self._speed * min(max(fraction, 0.0), 1.0)
-        fastest = (np.abs(self._speed) / self._deceleration).max()
+            fraction = float(course.measured @ course.speed) / squared
+            course.speed = course.speed * min(max(fraction, 0.0), 1.0)
+        fastest = (np.abs(course.speed) / self._deceleration).max()
         if fastest <= self._period:
-            self._speed = np.zeros_like(self._speed)
+            course.speed = np.zeros_like(course.speed)
             return True
-        self._speed = self._speed * (1 - self._period / fastest)
+        course.speed = course.speed * (1 - self._period / fastest)
         return False
 
-    def _backward_velocity(self) -> Array:
+    def _backward_velocity(self, course: Course) -> Array:
         """Velocity backwards along the stored path; zero after the end of the retraction."""
-        if self._returning is None:
-            rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
-            assert self._since is not None
-            gone = each * round(self._since / self._period)  # number of steps back to the trigger
+        if course.returning is None:
+            rows, each = np.array(course.past), round(1 / RETRACT_SPEED)
+            assert course.since is not None
+            gone = each * round(course.since / self._period)  # number of steps back to the trigger
             speeds = -np.diff(rows, axis=0)[::-1] / (each * self._period)
             back = np.repeat(speeds, each, axis=0)[: gone + self._retract_steps]
-            self._returning = list(back)
-        return self._returning.pop(0) if self._returning else np.zeros_like(self._speed)
+            course.returning = list(back)
+        return course.returning.pop(0) if course.returning else np.zeros_like(course.speed)

@@ -6,19 +6,22 @@ import gymnasium
 import mujoco
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorEnv, VectorWrapper
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, arm_env
-from tauguard.envs.gym.batch import Override
+from tauguard.envs.gym.base import arm_env
+from tauguard.envs.gym.batch import Batch, Override
 from tauguard.envs.gym.placing import carried
+from tauguard.envs.gym.rules import Rule
 from tauguard.envs.gym.settings import positive
+from tauguard.envs.gym.vector import vector_arm_env
 from tauguard.findings import ArgumentError
 
 #: Largest distance that is computed [m].
 FAR = 3.0
 
 
-class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+class SpeedAndSeparation(gymnasium.Wrapper[Any, Array, Any, Array], RecordConstructorArgs):
     """Stops the arm (stop category 2) while a body region is nearer than a protective distance S.
 
     ``S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z`` (ISO 13855, as ISO 10218-2 uses it).
@@ -32,7 +35,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
 
     def __init__(
         self,
-        env: gymnasium.Env[Array, Array],
+        env: gymnasium.Env[Any, Array],
         approach_speed: float = 1.6,
         reaction_time: float = 0.1,
         intrusion: float = 0.1,
@@ -53,79 +56,103 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
         Raises:
             ArgumentError: a number below 0, or an environment without body regions.
         """
-        RecordConstructorArgs.__init__(
-            self,
-            approach_speed=approach_speed,
-            reaction_time=reaction_time,
-            intrusion=intrusion,
-            uncertainty=uncertainty,
-            hysteresis=hysteresis,
-        )
+        terms: dict[str, Any] = {
+            "approach_speed": approach_speed,
+            "reaction_time": reaction_time,
+            "intrusion": intrusion,
+            "uncertainty": uncertainty,
+            "hysteresis": hysteresis,
+        }
+        RecordConstructorArgs.__init__(self, **terms)
         gymnasium.Wrapper.__init__(self, env)
+        arm_env(env).rules.add(Separating, **terms)
+
+
+class VectorSpeedAndSeparation(VectorWrapper):
+    """:class:`SpeedAndSeparation` of every copy of a vector environment."""
+
+    def __init__(self, env: VectorEnv[Any, Any, Any], **terms: float) -> None:
+        """Set the terms of S; arguments and errors as for :class:`SpeedAndSeparation`."""
+        super().__init__(env)
+        vector_arm_env(env).rules.add(Separating, **terms)
+
+
+class Separating(Rule):
+    """Holds the arm still near people; see :class:`SpeedAndSeparation`."""
+
+    def __init__(
+        self,
+        batch: Batch,
+        approach_speed: float = 1.6,
+        reaction_time: float = 0.1,
+        intrusion: float = 0.1,
+        uncertainty: float = 0.05,
+        hysteresis: float = 0.05,
+    ) -> None:
+        """Set the terms."""
+        super().__init__(batch)
         positive("approach_speed", approach_speed)
         for name in ("reaction_time", "intrusion", "uncertainty", "hysteresis"):
             value = locals()[name]
             if not (np.isfinite(value) and value >= 0):
                 raise ArgumentError(f"{name} {value}: expected 0 or more")
-        self._arm: ArmEnv = arm_env(env)
-        compiled = self._arm.compiled
+        compiled = batch.compiled
         if not compiled.regions:
             raise ArgumentError("no body regions to keep away from: name some with obstacles=")
-        self._terms = (approach_speed, reaction_time, intrusion + uncertainty, hysteresis)
-        model = compiled.scene.model
+        self._speed, self._reaction, self._hysteresis = approach_speed, reaction_time, hysteresis
+        self._fixed = intrusion + uncertainty
+        model, links = compiled.scene.model, set(compiled.scene.link_bodies.tolist())
         self._geoms = [
             g
             for g in range(model.ngeom)
-            if model.geom_bodyid[g] in set(compiled.scene.link_bodies.tolist())
+            if model.geom_bodyid[g] in links
             and (model.geom_contype[g] or model.geom_conaffinity[g])
         ]
         self._targets = [int(model.body_geomadr[r.body]) for r in compiled.regions]
-        own = compiled.scene.facts.max_acceleration
-        self._deceleration = np.resize(own, len(compiled.scene.joint_names))
-        self._stopped = False
+        usual = compiled.scene.facts.max_acceleration
+        self._deceleration = np.resize(usual, len(compiled.scene.joint_names))
+        self._still = np.zeros(len(self._deceleration))
+        for name in ("separation", "protective_distance"):
+            self.columns[name] = np.zeros(batch.rows)
+        self.columns["stopped"] = np.zeros(batch.rows, dtype=np.bool_)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode."""
-        self._stopped = False
-        observation, info = self.env.reset(seed=seed, options=options)
-        return observation, info | self._judge()
+    def begin(self, i: int) -> None:
+        """Let the arm move unless somebody is near."""
+        self.columns["stopped"][i] = False
+        self.look(i)
 
-    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Apply the action, or hold the arm still if it is stopped."""
-        still = np.zeros(len(self._deceleration))
-        self._arm.batch.plants[0].override(
-            Override.VELOCITY if self._stopped else Override.FREE, still
-        )
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, terminated, truncated, info | self._judge()
+    def act(self, i: int) -> None:
+        """Hold the arm still if it is stopped."""
+        kind = Override.VELOCITY if self.columns["stopped"][i] else Override.FREE
+        self.batch.plants[i].override(kind, self._still)
 
-    def _judge(self) -> dict[str, Any]:
+    def look(self, i: int) -> None:
+        """Compare every distance of a geom of the arm from a region with its S."""
         nearest, needed, inside = FAR, 0.0, False
+        margin = self._hysteresis if self.columns["stopped"][i] else 0.0
         for target in self._targets:
             for geom in self._geoms:
-                distance, speed = self._pair(geom, target)
-                protective = self._protective(speed)
-                margin = self._terms[3] if self._stopped else 0.0
+                distance, speed = self._pair(i, geom, target)
+                protective = self._protective(i, speed)
                 inside |= distance < min(protective + margin, FAR)
                 if distance < nearest:
                     nearest, needed = distance, protective
-        self._stopped = inside
-        return {"separation": nearest, "protective_distance": needed, "stopped": inside}
+        values = {"separation": nearest, "protective_distance": needed, "stopped": inside}
+        for name, value in values.items():
+            self.columns[name][i] = value
 
-    def _pair(self, geom: int, target: int) -> tuple[float, float]:
+    def _pair(self, i: int, geom: int, target: int) -> tuple[float, float]:
         """Distance of an arm's geom from a region [m], and speed of its nearest point [m/s]."""
-        model, data = self._arm.batch.model(0), self._arm.batch.datas[0]
+        model, data = self.batch.model(i), self.batch.datas[i]
         ends = np.zeros(6)
         distance = mujoco.mj_geomDistance(model, data, geom, target, FAR, ends)
         if distance >= FAR:
             return FAR, 0.0
-        return float(distance), self._speed(int(model.geom_bodyid[geom]), ends[:3])
+        return float(distance), self._point_speed(i, int(model.geom_bodyid[geom]), ends[:3])
 
-    def _speed(self, body: int, point: Array) -> float:
+    def _point_speed(self, i: int, body: int, point: Array) -> float:
         """Speed of a point of a link [m/s]."""
-        compiled, data = self._arm.compiled, self._arm.batch.datas[0]
+        compiled, data = self.batch.compiled, self.batch.datas[i]
         model, total = compiled.scene.model, np.zeros(3)
         for joint, dof, link in zip(
             compiled.ids(), compiled.scene.dof_adr, compiled.scene.link_bodies, strict=True
@@ -137,8 +164,8 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
             total += rate * (axis if slide else np.cross(axis, point - data.xanchor[joint]))
         return float(np.linalg.norm(total))
 
-    def _protective(self, speed: float) -> float:
-        approach, reaction, fixed, _ = self._terms
-        data, dofs = self._arm.batch.datas[0], self._arm.compiled.scene.dof_adr
+    def _protective(self, i: int, speed: float) -> float:
+        approach, reaction = self._speed, self._reaction
+        data, dofs = self.batch.datas[i], self.batch.compiled.scene.dof_adr
         stopping = float((np.abs(data.qvel[dofs]) / self._deceleration).max())
-        return approach * (reaction + stopping) + speed * (reaction + stopping / 2) + fixed
+        return approach * (reaction + stopping) + speed * (reaction + stopping / 2) + self._fixed

@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.batch import TOUCHES, Batch, StepMetrics
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.goals import Goals, goal_reward
 from tauguard.envs.gym.randomization import check_options
-from tauguard.envs.gym.rendering import open_view
-from tauguard.envs.gym.settings import one_of
+from tauguard.envs.gym.rendering import HEIGHT, METHODS, WIDTH, Pictures
+from tauguard.envs.gym.rules import Rules
 from tauguard.envs.gym.task import Task, build, task_of
 from tauguard.findings import ArgumentError
 from tauguard.models import Scene
@@ -24,7 +24,7 @@ DIVERGED_REASON = (
     "diverged: a position is not finite, or a speed is beyond 1000 rad/s or m/s; use a smaller "
     "timestep"
 )
-RENDER_MODES = ("rgb_array", "human")
+RENDER_MODES = (*METHODS, "human")
 #: Value of :attr:`StepMetrics.diverged` for an impossible force.
 IMPOSSIBLE = 2
 DIVERGED = StepMetrics._fields.index("diverged")
@@ -76,17 +76,23 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         render_mode: str | None = None,
         task: type[Task] | str | None = None,
         goal: bool = False,
+        height: int = HEIGHT,
+        width: int = WIDTH,
+        view: str | None = None,
         **keywords: Any,
     ) -> None:
         """Compile the scene.
 
         Args:
-            render_mode: "rgb_array", "human" or None.
+            render_mode: "rgb_array", "depth_array" [m], "segmentation_array" (ids of bodies),
+                "human" or None.
             task: a subclass of :class:`tauguard.envs.tasks.Task`, or "module:Name", in place of the
                 environment's own task.
             goal: whether observations are dictionaries of ``observation``, ``achieved_goal`` and
                 ``desired_goal``. The reward is then :meth:`compute_reward`, and a goal stays for
                 the whole episode.
+            height, width: of the pictures [px].
+            view: "front", "left", "right", "top", or the name of a camera of the scene.
             **keywords: see :class:`tauguard.envs.gym.settings.Settings`.
 
         Raises:
@@ -94,9 +100,10 @@ class ArmEnv(gymnasium.Env[Any, Array]):
                 work.
             FileNotFoundError: no such robot file.
         """
-        if render_mode is not None:
-            one_of("render_mode", render_mode, RENDER_MODES)
-        self.render_mode, self._keywords = render_mode, keywords | {"task": task, "goal": goal}
+        self.render_mode = render_mode
+        self.pictures = Pictures(render_mode, height, width, view)
+        shape = {"height": height, "width": width, "view": view}
+        self._keywords = keywords | {"task": task, "goal": goal} | shape
         self.compiled, self.batch, self.task = build(task_of(task, self.task_type), keywords, 1)
         self.metadata = frame_rate(self.compiled)
         self.goals = Goals(self.batch, self.task) if goal else None
@@ -109,7 +116,8 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         self._reward_keys = {name: f"reward_{name}" for name in terms}
         self._looks = bool(self.task.measures or self.batch.own_entries)
         self._leaving = self.batch.objects.leaving
-        self._picture: Any = None
+        #: What acts beside the policy: wrappers add to it.
+        self.rules = Rules(self.batch)
         self._no_reward = dict.fromkeys(terms, 0.0)
         self._was_reset = False
 
@@ -161,6 +169,7 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         super().reset(seed=seed)
         self.batch.draw(0, self.np_random, stated)
         self.task.begin(0, self.np_random, target)
+        self.rules.begin(0)
         self._was_reset = True
         if self.render_mode == "human":
             self.render()
@@ -188,6 +197,8 @@ class ArmEnv(gymnasium.Env[Any, Array]):
                 f"action: shape {values.shape}, expected {self._shape}: "
                 f"{', '.join(entry.name for entry in batch.actions)}"
             )
+        if self.rules:
+            self.rules.act(0)
         batch.step(0, values, self.np_random)
         diverged = bool(self._row[DIVERGED])
         if self._looks and not diverged:
@@ -198,6 +209,9 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         if self._leaving and not over:
             why = batch.objects.reason(0)
             over = bool(why)
+        if self.rules:
+            self.rules.look(0)
+            over = over or bool(self.rules.over()[0])
         reason = divergence(self.compiled, step.diverged) if diverged else why
         if self.goals is not None:
             reached, wanted = task.achieved(0), task.desired(0)
@@ -219,6 +233,7 @@ class ArmEnv(gymnasium.Env[Any, Array]):
             "task": self.task.get_state(),
             "rng": self.np_random.bit_generator.state,
             "begun": self._was_reset,
+            "rules": self.rules.get_state(0),
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -227,19 +242,22 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         Raises:
             ArgumentError: the state is of another environment, or not from :meth:`get_state`.
         """
-        if not isinstance(state, dict) or not {"memory", "task", "rng", "begun"} <= state.keys():
+        known = {"memory", "task", "rng", "begun", "rules"}
+        if not isinstance(state, dict) or not known <= state.keys():
             raise ArgumentError("state: expected what get_state() gave")
         self.batch.set_state(0, state)
         self.task.memory[:] = state["memory"]
         self.task.set_state(state["task"])
         self.np_random.bit_generator.state = state["rng"]
         self._was_reset = state["begun"]
+        self.rules.set_state(0, state["rules"])
 
     def __getstate__(self) -> dict[str, Any]:
         """The keywords and the state of the environment; the window is not copied."""
         return {
             "made": (self.render_mode, self._keywords),
             "spec": self.spec,
+            "rules": self.rules.made,
             "state": self.get_state(),
         }
 
@@ -248,6 +266,8 @@ class ArmEnv(gymnasium.Env[Any, Array]):
         mode, keywords = saved["made"]
         type(self).__init__(self, mode, **keywords)
         self.spec = saved["spec"]
+        for kind, settings in saved["rules"]:
+            self.rules.add(kind, **settings)
         self.set_state(saved["state"])
 
     def _metrics(self) -> Any:
@@ -285,23 +305,23 @@ class ArmEnv(gymnasium.Env[Any, Array]):
             info[key] = getattr(step, key)
         if self.goals is not None:
             info["is_success"] = success
+        if self.rules:
+            info |= {name: rows[0].item() for name, rows in self.rules.columns().items()}
         return info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture (480, 640, 3) in ``rgb_array`` mode; ``human`` mode updates the window."""
+    def render(self) -> Any:
+        """A picture of shape (height, width, 3), or (height, width) of depths or bodies.
+
+        ``human`` mode updates the window.
+        """
         if self.render_mode is None:
             gymnasium.logger.warn("render_mode was not given to make: nothing to render")
             return None
-        if self._picture is None:
-            self._picture = open_view(self.compiled, self.batch.datas[0], self.render_mode)
-        shown: NDArray[np.uint8] | None = self._picture.show(self.batch.target[0])
-        return shown
+        return self.pictures.draw(self.compiled, self.batch.datas[0], self.batch.target[0])
 
     def close(self) -> None:
         """Close the window or the renderer."""
-        if self._picture is not None:
-            self._picture.close()
-            self._picture = None
+        self.pictures.close()
 
 
 def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array, Bools
 from tauguard.envs.gym.base import (
-    RENDER_MODES,
     divergence,
     frame_rate,
     make_spaces,
@@ -24,8 +23,8 @@ from tauguard.envs.gym.base import (
 )
 from tauguard.envs.gym.goals import Goals, goal_reward
 from tauguard.envs.gym.randomization import check_options
-from tauguard.envs.gym.rendering import open_view
-from tauguard.envs.gym.settings import one_of
+from tauguard.envs.gym.rendering import HEIGHT, WIDTH, Pictures
+from tauguard.envs.gym.rules import Rules
 from tauguard.envs.gym.task import Task, build, task_of
 from tauguard.envs.gym.vectorised import check_vectorised
 from tauguard.findings import ArgumentError
@@ -51,6 +50,9 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
         render_mode: str | None = None,
         task: type[Task] | str | None = None,
         goal: bool = False,
+        height: int = HEIGHT,
+        width: int = WIDTH,
+        view: str | None = None,
         **keywords: Any,
     ) -> None:
         """Compile the scene once.
@@ -60,8 +62,8 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
             max_episode_steps: number of actions after which an episode is truncated.
             threads: number of threads; 0 means all processors.
             autoreset_mode: "NextStep", "SameStep" or "Disabled".
-            render_mode: as for the single environment; the first copy is shown.
-            task, goal: as for the single environment.
+            render_mode: as for the single environment; "human" shows the first copy.
+            task, goal, height, width, view: as for the single environment.
             **keywords: as for the single environment.
 
         Raises:
@@ -71,8 +73,7 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
             raise ArgumentError(f"num_envs {num_envs}: expected 1 or more")
         if threads < 0:
             raise ArgumentError(f"threads {threads}: expected 0 (all processors) or more")
-        if render_mode is not None:
-            one_of("render_mode", render_mode, RENDER_MODES)
+        self.pictures = Pictures(render_mode, height, width, view)
         self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         chosen = task_of(task, self.task_type)
@@ -91,7 +92,8 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: list[np.random.Generator] = [seeding.np_random(None)[0]] * num_envs
         self._seeded = False
-        self._picture: Any = None
+        #: What acts beside the policy: wrappers add to it.
+        self.rules = Rules(self.batch)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -144,6 +146,7 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
     ) -> None:
         self.batch.draw(i, self._rngs[i], stated)
         self.task.begin(i, self._rngs[i], target)
+        self.rules.begin(i)
         self._elapsed[i], self._over[i] = 0, False
 
     def step(  # type: ignore[override]
@@ -168,6 +171,9 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
             raise gymnasium.error.ResetNeeded(
                 f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
             )
+        if self.rules:
+            for k in going.nonzero()[0]:
+                self.rules.act(int(k))
         batch.step_all(values, going, self._rngs, self._threads)
         task, diverged = self.task, batch.metrics["diverged"] != 0
         if self._looks:
@@ -178,6 +184,10 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
         left = {} if not batch.objects.leaving else self._left(going & ~diverged & ~overs)
         if left:
             overs = np.isin(np.arange(self.num_envs), list(left)) | overs
+        if self.rules:
+            for k in going.nonzero()[0]:
+                self.rules.look(int(k))
+            overs = overs | self.rules.over()
         if self.goals is not None:
             seen = self.goals.all()
             reached, wanted = seen["achieved_goal"], seen["desired_goal"]
@@ -275,23 +285,38 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
         infos |= {name: getattr(step, name) for name in self.task.measures}
         if self.goals is not None:
             infos["is_success"] = infos["success"]
+        infos |= self.rules.columns()
         shown = mask.copy()
         return infos | {f"_{key}": shown for key in infos}
 
     def render(self) -> Any:
-        """A tuple with a picture of the first copy; None in "human" mode."""
+        """A tuple with a picture of each copy; in "human" mode the first is shown."""
         if self.render_mode is None:
             return None
-        if self._picture is None:
-            self._picture = open_view(self.compiled, self.batch.datas[0], self.render_mode)
-        picture = self._picture.show(self.batch.target[0])
-        return None if picture is None else (picture,)
+        batch, draw = self.batch, self.pictures.draw
+        if self.render_mode == "human":
+            return draw(self.compiled, batch.datas[0], batch.target[0])
+        rows = zip(batch.datas, batch.target, strict=True)
+        return tuple(draw(self.compiled, data, target) for data, target in rows)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the picture."""
-        if self._picture is not None:
-            self._picture.close()
-            self._picture = None
+        """Close the pictures."""
+        self.pictures.close()
+
+
+def vector_arm_env(env: VectorEnv[Any, Any, Any]) -> VectorArmEnv:
+    """The vector environment of arms inside ``env``.
+
+    Raises:
+        ArgumentError: there is none.
+    """
+    inner = env.unwrapped
+    if not isinstance(inner, VectorArmEnv):
+        raise ArgumentError(
+            f"{inner}: expected what gymnasium.make_vec makes of an environment of tauguard; wrap "
+            "the single environments of a SyncVectorEnv"
+        )
+    return inner
 
 
 def causes(step: Any) -> Any:

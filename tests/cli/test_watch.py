@@ -65,6 +65,8 @@ def test_a_file_holds_a_row_an_action(arguments, shown, tmp_path, capsys):
         (["Reach-v0", "--seconds", "0"], "above 0"),
         (["React-v1", "--reaction", "panic"], "stop0"),
         (["React-v1", "--policy", "stil"], "target, random, still"),
+        (["React-v1", "--policy", "numpy:nothing"], "MODULE:NAME"),
+        (["React-v1", "--policy", "numpy:pi"], "cannot be called"),
         (["React-v1", "--policy", str(POLICIES / "Reach-v0.npz")], "tauguard/Reach-v0"),
         (["Reach-v0", "--policy", str(POLICIES / "Reach-v0.npz"), "--set", "obstacles=()"], "114"),
     ],

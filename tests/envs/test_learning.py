@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from tauguard.envs.policies import MlpPolicy
 from tauguard.envs.wrappers import CameraObservation, CostBudget, CostStep
 
 REACH = "tauguard:tauguard/Reach-v0"
@@ -98,9 +99,53 @@ def test_stable_baselines_sees_the_native_copies():
         assert rewards[0] == np.float32(reward)
         assert over.tolist() == [step == 4] * 2
     assert infos[0]["TimeLimit.truncated"]
-    assert {"cost", "success"} <= set(infos[0])
+    keys = {key for key in single.step(action[0])[-1]}
+    assert infos[0].keys() == keys | {"terminal_observation", "TimeLimit.truncated"}
     with pytest.raises(AttributeError, match="constructor"):
         envs.set_attr("control", "torque")
+
+
+@pytest.mark.parametrize("normalised", [False, True])
+@pytest.mark.parametrize(
+    ("method", "goal"), [("PPO", False), ("SAC", False), ("SAC", True), ("TD3", False)]
+)
+def test_a_policy_is_the_one_that_was_trained(method, goal, normalised, tmp_path):
+    sb3 = pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from tauguard.envs.stable_baselines import NativeVecEnv
+
+    envs = NativeVecEnv("tauguard/Reach-v0", 2, goal=goal, obstacles=(), max_episode_steps=20)
+    envs = VecNormalize(envs) if normalised else envs
+    kind, form = "MultiInputPolicy" if goal else "MlpPolicy", {"net_arch": [8, 8]}
+    short = {"n_steps": 16, "batch_size": 16} if method == "PPO" else {"learning_starts": 8}
+    model = getattr(sb3, method)(kind, envs, policy_kwargs=form, seed=0, device="cpu", **short)
+    model.learn(40)
+    if normalised:
+        envs.training = False  # the moments stay as they are
+    MlpPolicy.from_sb3(model).save(tmp_path / "policy.npz")
+    policy, seen = MlpPolicy.load(tmp_path / "policy.npz"), envs.reset()
+    raw = envs.get_original_obs() if normalised else seen
+    for _ in range(5):
+        expected = model.predict(seen, deterministic=True)[0]
+        np.testing.assert_allclose(policy(raw), expected, atol=2e-5)  # single precision
+        seen, *_ = envs.step(expected)
+        raw = envs.get_original_obs() if normalised else seen
+
+
+def test_hindsight_replay_takes_the_native_copies():
+    sb3 = pytest.importorskip("stable_baselines3")
+    from tauguard.envs.stable_baselines import NativeVecEnv
+
+    envs = NativeVecEnv("tauguard/Reach-v0", 2, goal=True, obstacles=(), max_episode_steps=10)
+    replay = {"replay_buffer_class": sb3.HerReplayBuffer, "learning_starts": 25}
+    model = sb3.SAC("MultiInputPolicy", envs, seed=0, device="cpu", batch_size=64, **replay)
+    model.learn(60)
+    batch = model.replay_buffer.sample(200)
+    reached = batch.next_observations["achieved_goal"] - batch.observations["desired_goal"]
+    near = np.linalg.norm(reached.numpy(), axis=1) < envs.envs.task.tolerance
+    np.testing.assert_array_equal(batch.rewards.numpy()[:, 0], np.where(near, 0.0, -1.0))
+    assert near.any()
 
 
 def test_minari_records_a_policy(tmp_path, monkeypatch):

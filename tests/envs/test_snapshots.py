@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, SrqSvr, train
+from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, SrqSvr
+from tauguard.detectors.alarms.training import train
 from tauguard.envs import simulate
 from tauguard.models import cura6, cura6_drive, pin_model
 

@@ -99,7 +99,8 @@ def test_a_stop_in_free_motion_takes_the_time_of_its_deceleration():
     for _ in range(80):
         observation = env.step(np.array([0.5, 0, 0, 0, 0, 0]))[0]
     speed = observation[6]
-    env._observe({"force": 1.0, "alarm": True, "tau_ext": np.zeros(6)})
+    inner.batch.metrics["force"][0] = 1.0
+    inner.rules.look(0)
     taken = 0
     while abs(observation[6]) > 0.02 * speed:
         observation = env.step(np.zeros(6))[0]

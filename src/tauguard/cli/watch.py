@@ -30,8 +30,9 @@ def command(
 
     Args:
         environment: an environment, such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
-        policy: target (straight to the target, Cartesian control), random, still, or a file that
-            examples/learn.py wrote; the file contains the keywords of its training.
+        policy: target (straight to the target, Cartesian control), random, still, a file that
+            examples/learn.py wrote (it contains the keywords of its training), or MODULE:NAME of a
+            function from an observation to an action.
         seconds: simulated time, over one or more episodes.
         seed: seed of the first episode.
         set: keywords of the environment, NAME=VALUE each, as in --set detector=observer.
@@ -57,8 +58,8 @@ def command(
     keywords, learned = parsed(set), None
     if policy not in WORDS:
         learned = policy_of(policy, name)
-        own = {key: value for key, value in learned.environment.items() if key != "id"}
-        keywords = own | keywords
+        trained = getattr(learned, "environment", {})
+        keywords = {key: value for key, value in trained.items() if key != "id"} | keywords
     if policy == "target":
         if keywords.get("control", "cartesian") != "cartesian":
             raise ArgumentError(
@@ -79,11 +80,27 @@ def command(
 
 
 def policy_of(file: str, name: str) -> Any:
-    """The policy in a file; ``ArgumentError`` if it was trained in another environment."""
+    """The policy in a file or a module.
+
+    Raises:
+        ArgumentError: there is none, or it was trained in another environment.
+    """
+    from importlib import import_module
+
     from tauguard.envs.policies import MlpPolicy
 
     if not Path(file).is_file():
-        raise ArgumentError(f"policy {file}: no such file; expected one, or {', '.join(WORDS)}")
+        module, _, attribute = file.partition(":")
+        try:
+            function = getattr(import_module(module), attribute)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise ArgumentError(
+                f"policy {file}: no such file, and no MODULE:NAME ({error}); expected one of "
+                f"these, or {', '.join(WORDS)}"
+            ) from None
+        if not callable(function):
+            raise ArgumentError(f"policy {file}: cannot be called; expected a function")
+        return function
     policy = MlpPolicy.load(file)
     if (trained := policy.environment.get("id", name).removeprefix("tauguard:")) != name:
         raise ArgumentError(f"policy {file}: it was trained in {trained}, not in {name}")
@@ -129,19 +146,19 @@ def run(env: Any, policy: Any, seconds: float, seed: int, save: Path | None, por
     env.action_space.seed(seed)
     period, now, episodes, worst = 1 / inner.compiled.settings.control_rate, 0.0, 0, 0.0
     diverged = 0
-    _, info = env.reset(seed=seed)
+    seen, info = env.reset(seed=seed)
     began = time.perf_counter()
     while now < seconds:
         if view is not None:
             send(view, inner, info, now)
-        action = chosen(env, inner, policy)
-        _, _, terminated, truncated, info = env.step(action)
+        action = policy(seen) if callable(policy) else chosen(env, inner, policy)
+        seen, _, terminated, truncated, info = env.step(action)
         now += period
         worst = max(worst, info["limit_ratio"])
         diverged += info["reason"].startswith("diverged")
         if terminated or truncated:
             episodes += 1
-            _, info = env.reset()
+            seen, info = env.reset()
         if save is None:
             time.sleep(max(0.0, began + now - time.perf_counter()))
     if view is not None:
@@ -159,8 +176,6 @@ def chosen(env: Any, inner: Any, policy: Any) -> Any:
     """The action of the chosen policy."""
     import numpy as np
 
-    if callable(policy):
-        return policy(inner.batch.observation[0])
     if policy == "random":
         return env.action_space.sample()
     if policy == "still":
