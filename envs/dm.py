@@ -3,6 +3,7 @@
 dm_control has no wheels for Python 3.13 and later; there, this module raises ``ImportError``.
 """
 
+import warnings
 from typing import Any
 from xml.etree import ElementTree
 
@@ -18,7 +19,10 @@ from tauguard.models.mjcf import xml_text
 
 try:
     import dm_env
-    from dm_control.mujoco.wrapper.mjbindings import sizes
+
+    with warnings.catch_warnings():  # of glfw, where there is no display
+        warnings.filterwarnings("ignore", module="glfw")
+        from dm_control.mujoco.wrapper.mjbindings import sizes
     from dm_env import specs
 except ImportError as error:
     raise ImportError(
@@ -30,8 +34,10 @@ for _name, _kind in (("mjmodel", mujoco.MjModel), ("mjdata", mujoco.MjData)):
     for _field in [field for field in _table if not hasattr(_kind, field)]:
         del _table[_field]
 
-from dm_control import composer, mjcf  # noqa: E402  (only after the arrays were removed)
-from dm_control.composer.observation import observable  # noqa: E402
+with warnings.catch_warnings():
+    warnings.filterwarnings("ignore", module="glfw")
+    from dm_control import composer, mjcf  # only after the arrays were removed
+    from dm_control.composer.observation import observable
 
 __all__ = ["ArmEntity", "DmEnvironment"]
 

@@ -82,7 +82,7 @@ class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
     def _info(self, infos: dict[str, Any], i: int) -> dict[str, Any]:
         keys = self._keys
         if keys is None:
-            keys = self._keys = tuple(key for key in infos if not key.startswith(("_", "final_")))
+            keys = tuple(key for key in infos if not key.startswith(("_", "final_")))
         return {key: infos[key][i] for key in keys}
 
     def close(self) -> None:
