@@ -180,7 +180,8 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
             for i in (going & ~diverged).nonzero()[0]:
                 task.look(int(i))
         step = self._metrics()
-        terms, successes, task.memory[:], overs = task.score(step, task.memory.copy())
+        terms, successes, task.memory[:], ends = task.score(step, task.memory.copy())
+        overs = ends = np.broadcast_to(ends, diverged.shape)
         left = {} if not batch.objects.leaving else self._left(going & ~diverged & ~overs)
         if left:
             overs = np.isin(np.arange(self.num_envs), list(left)) | overs
@@ -204,8 +205,8 @@ class VectorArmEnv(VectorEnv[Any, Array, Array]):
         if fresh.size:
             step = self._metrics()
         infos = self._infos(terms, successes & going, np.ones_like(going), step)
-        infos["reason"][terminated & successes] = task.ended
-        infos["reason"][terminated & ~successes] = task.failed
+        infos["reason"][terminated & ends & successes] = task.ended
+        infos["reason"][terminated & ends & ~successes] = task.failed
         for i, why in left.items():
             infos["reason"][i] = why
         for i in (successes & going & ~diverged).nonzero()[0] if self.goals is None else ():
