@@ -12,8 +12,12 @@ Faces = NDArray[np.int32]
 
 def merged_corners(vertices: NDArray[np.float64], faces: Faces) -> Faces:
     """Corners of the faces, numbered so that equal positions have equal numbers. Shape (F, 3)."""
-    _, number = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # -0 becomes 0
-    return np.ascontiguousarray(number.ravel()[faces].astype(np.int32))
+    positions = vertices + 0.0  # -0 becomes 0
+    order = np.lexsort(positions.T)
+    new = (positions[order[1:]] != positions[order[:-1]]).any(axis=1)
+    number = np.empty(len(order), dtype=np.int32)
+    number[order] = np.concatenate([[0], np.cumsum(new)])
+    return np.ascontiguousarray(number[faces])
 
 
 def first_of_parts(corners: Faces) -> NDArray[np.intp]:

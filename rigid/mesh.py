@@ -232,12 +232,22 @@ class MeshTree:
             threads: 0 means all processors; the answer does not depend on it.
 
         Raises:
-            ArgumentError: the mesh is open or has inverted faces; the message names them.
+            ArgumentError: the mesh is open or has inverted faces (the message names them), wrong
+                shapes, an entry that is not finite or beyond 1e100.
         """
+        inside = self._windings(self._checked_points(points), threads) > 0
+        return np.asarray(inside)
+
+    def _checked_points(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Points for a query that needs a closed mesh."""
         if self._open_because:
             raise ArgumentError(self._open_because)
-        inside = self._windings(finite("points", points, (None, 3)), threads) > 0
-        return np.asarray(inside)
+        batch = finite("points", points, (None, 3))
+        far = np.abs(batch).max(axis=1, initial=0) > 1e100
+        if far.any():
+            row = int(np.argmax(far))
+            raise ArgumentError(f"points: {batch[row]} in row {row}, expected coordinates to 1e100")
+        return batch
 
     def _windings(self, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:
         out = np.empty(len(points), dtype=np.int32)
@@ -258,9 +268,7 @@ class MeshTree:
             ArgumentError: as :meth:`contains`. For an open mesh use
                 ``tauguard.rigid.distance(tree, Spheres(points, 0))``.
         """
-        if self._open_because:
-            raise ArgumentError(self._open_because)
-        batch = finite("points", points, (None, 3))
+        batch = self._checked_points(points)
         out, face = np.empty((len(batch), 4)), np.empty(len(batch), dtype=np.int32)
         self._mesh.nearest(batch, out, face, thread_count(threads))
         turns = self._windings(batch, threads)

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
+from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid.mesh import MeshContacts, MeshTree, checked_pair
 from tauguard.rigid.motion import common_length, poses
 from tauguard.rigid.results import Distances
 
 Array = NDArray[np.float64]
+#: Largest coordinate of a mesh in the frame of the other; boxes have single precision.
+MOST_COORDINATE = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,8 @@ def mesh_distance(
     """Distance, nearest points, normal and faces of two meshes; see :func:`distance`.
 
     Raises:
-        ArgumentError: trees of different volumes, or a bad pose (named with its row).
+        ArgumentError: trees of different volumes, a bad pose, or meshes more than 1e30 apart
+            (named with the row).
     """
     checked_pair(a, b)
     at_a = poses("pose_a", np.eye(4) if pose_a is None else pose_a)
@@ -53,6 +57,12 @@ def mesh_distance(
     count = common_length({"pose_a": len(at_a), "pose_b": len(at_b)})
     relative = at_b if pose_a is None else _inverse(at_a) @ at_b
     relative = np.ascontiguousarray(np.broadcast_to(relative, (count, 4, 4)))
+    far = np.abs(relative[:, :3, 3]).max(axis=1, initial=0) > MOST_COORDINATE
+    if far.any():
+        raise ArgumentError(
+            f"pose_a, pose_b: the meshes are more than 1e30 apart in row {int(np.argmax(far))}; "
+            "scale the scene down"
+        )
     out, faces = np.empty((count, 10)), np.empty((count, 2), dtype=np.int32)
     a._mesh.distance(b._mesh, relative, out, faces, thread_count(threads))
     if a.closed and b.closed:

@@ -122,11 +122,15 @@ class Distances:
 class MeshDistances(Distances):
     """Signed distance of a mesh and convex bodies, row by row.
 
-    If mesh and body overlap, the distance is that of the body and the deepest triangle alone:
-    moving the body by it separates the body from this triangle, not always from the whole mesh.
+    If the surface and the body overlap, the distance is that of the body and the deepest triangle
+    alone: moving the body by it separates the body from this triangle, not always from the whole
+    mesh. If a corner of the body (of a curved body: its centre) is inside of a closed mesh, the
+    distance is at most minus the corner's depth and the body's radius: no shorter translation takes
+    the body out.
 
     Attributes:
-        face: The triangle nearest to the body, or the deepest one in it. Shape (N,).
+        face: The triangle nearest to the body or to its deepest corner, or the deepest one in the
+            body. Shape (N,).
     """
 
     face: NDArray[np.int32]

@@ -179,8 +179,8 @@ def distance(
     size, both run in exact arithmetic, which takes about a millisecond per pair.
 
     Args:
-        a: N bodies of one kind, with or without radii, or one body. Or a mesh: its surface is
-            tested, not its inside, and the bodies' coordinates are in its frame.
+        a: N bodies of one kind, with or without radii, or one body. Or a mesh, with the bodies'
+            coordinates in its frame. The distance of a body inside of a closed mesh is negative.
         b: As ``a``. The two kinds may differ. For two meshes the rows are poses.
         threads: 0 means all processors; the answer does not depend on it.
         pose_a: Homogeneous matrices that move the bodies ``a`` into the common frame, one for all
@@ -201,7 +201,7 @@ def distance(
     if beside := _mesh_beside(a, b, at_a, at_b):
         mesh, bodies, count, swapped = beside
         out, face = np.empty((count, 10)), np.empty(count, dtype=np.int32)
-        mesh._mesh.distances(bodies, out, face, thread_count(threads))
+        mesh._mesh.distances(bodies, mesh.closed, out, face, thread_count(threads))
         first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
         if swapped:
             first, second, normal = second, first, -normal

@@ -107,10 +107,12 @@ void mesh_meets(const Mesh& mesh, const Batch& bodies, FaceRows faces, int threa
             [&](auto i, const RoundedBody& body) { faces.data()[i] = first_overlap(mesh, body); });
 }
 
-void mesh_distances(const Mesh& mesh, const Batch& bodies, DistanceRows out, FaceRows faces,
-                    int threads) {
+// closed: the mesh has an inside.
+void mesh_distances(const Mesh& mesh, const Batch& bodies, bool closed, DistanceRows out,
+                    FaceRows faces, int threads) {
   each_body(bodies, faces.shape(0), threads, [&](auto i, const RoundedBody& body) {
-    const FaceDistance nearest = nearest_face(mesh, body);
+    FaceDistance nearest = nearest_face(mesh, body);
+    if (closed) nearest = deepest_corner(mesh, body, nearest);
     store(nearest.at, out.data() + 10 * i), faces.data()[i] = nearest.face;
   });
 }
@@ -139,7 +141,7 @@ void bind_distances(nb::module_& m) {
 
 void bind_bodies(nb::class_<Mesh>& mesh) {
   mesh.def("meets", &mesh_meets, "bodies"_a, "faces"_a, "threads"_a);
-  mesh.def("distances", &mesh_distances, "bodies"_a, "out"_a, "faces"_a, "threads"_a);
+  mesh.def("distances", &mesh_distances, "bodies"_a, "closed"_a, "out"_a, "faces"_a, "threads"_a);
   mesh.def("time_of_impact_of_bodies", &mesh_impacts, "bodies"_a, "pose_mesh"_a, "linear_mesh"_a,
            "angular_mesh"_a, "pose_body"_a, "linear_body"_a, "angular_body"_a, "out"_a, "faces"_a,
            "threads"_a);

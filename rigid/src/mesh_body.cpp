@@ -1,5 +1,7 @@
 #include "mesh_body.hpp"
 
+#include "mesh_rays.hpp"
+
 #include <algorithm>
 
 namespace tauguard::rigid {
@@ -176,6 +178,26 @@ FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body) {
     return false;
   });
   return best;
+}
+
+FaceDistance deepest_corner(const Mesh& closed, const RoundedBody& body,
+                            const FaceDistance& of_surface) {
+  // The corners of a curved body's box are not in the body. Its centre is.
+  const bool curved = !is_polytope(body.bodies.kind);
+  const Points<double> corners =
+      curved ? Points<double>{geometry::load(body.bodies.row(0))} : body.points;
+  if (of_surface.at.distance > 0 && winding(closed, corners[0]) <= 0) return of_surface;
+  FaceDistance out = of_surface;
+  for (const Vec3& p : corners) {
+    if (on_surface(closed, p) || winding(closed, p) <= 0) continue;
+    const NearestPoint at = nearest_point(closed, p);
+    const double depth = at.distance + body.rounding;
+    const bool first = out.at.distance > 0;
+    if (!first && depth <= -out.at.distance) continue;
+    const Vec3 n = (1 / at.distance) * (at.point - p);
+    out = {{-depth, at.point, p - body.rounding * n, n}, at.face};
+  }
+  return out;
 }
 
 namespace {

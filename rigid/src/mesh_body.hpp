@@ -37,6 +37,11 @@ struct FaceDistance {
 };
 FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body);
 
+// The same for a closed mesh: if a corner of the body (of a curved body: its centre) is inside, by
+// more than the deepest triangle, minus its depth and the radius.
+FaceDistance deepest_corner(const Mesh& closed, const RoundedBody& body,
+                            const FaceDistance& of_surface);
+
 // `face` receives the triangle that the body touches first, or -1.
 FirstTouch mesh_body_impact(const Mesh& mesh, const RoundedBody& body, const RigidMotion& of_mesh,
                             const RigidMotion& of_body, std::int32_t* face);

@@ -6,6 +6,9 @@ import trimesh
 
 from oracles.moving_bodies import REST, as_hulls, corners_of, motions, placed, rounded
 from tauguard.rigid import (
+    Boxes,
+    Capsules,
+    Cylinders,
     Hulls,
     MeshTree,
     Motion,
@@ -100,7 +103,7 @@ def test_a_mesh_is_touched_when_the_first_of_its_triangles_is(kind, reach, speed
     assert many.time_of_impact.tobytes() == got.time_of_impact.tobytes()
 
 
-def test_inside_a_closed_mesh_the_surface_counts():
+def test_inside_a_closed_mesh_overlap_and_motion_take_the_surface():
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
     faces += [(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
@@ -108,8 +111,7 @@ def test_inside_a_closed_mesh_the_surface_counts():
     balls = Spheres(np.zeros((4, 3)), [0.5, 1.0, np.nextafter(1.0, 0), 9.0])
     np.testing.assert_array_equal(overlap(tree, balls).hit, [False, True, False, True])
     got = distance(tree, balls).distance
-    np.testing.assert_allclose(got[:2], [0.5, 0.0])
-    assert 0 < got[2] < 1e-15
+    np.testing.assert_allclose(got, [-1.5, -2.0, -2.0, -10.0])
     move = Motion(np.eye(4), [2.0, 0, 0], np.zeros(3))
     toi = time_of_impact(tree, Spheres([[0, 0, 0]], 0.5), REST, move).time_of_impact
     np.testing.assert_allclose(toi, 0.25, atol=1e-12)
@@ -118,14 +120,12 @@ def test_inside_a_closed_mesh_the_surface_counts():
 def test_mesh_queries_refuse_what_they_cannot_answer():
     tree = MeshTree(np.eye(3), [[0, 1, 2]])
     ball = Spheres(np.zeros((2, 3)), 1.0)
-    with pytest.raises(ValueError, match=r"both are meshes; MeshTree\.overlap"):
+    with pytest.raises(ValueError, match=r"both are meshes; .*MeshTree\.overlap\(other, pose\)"):
         overlap(tree, tree)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match=r"^a: MeshTree, .*use MeshTree\.sweep for two meshes"):
         sweep(tree, tree, [1, 0, 0])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"a mesh is MeshTree\(mesh\.vertices, mesh\.faces\)"):
         overlap(trimesh.creation.box(), ball)
-    with pytest.raises(ValueError, match="a, b: both are meshes"):
-        distance(tree, tree)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="b: a number beyond 1e30"):
         overlap(tree, Spheres(np.full((1, 3), 1e31), 1.0))
     with pytest.raises(ValueError, match=r"tauguard\.rigid\.overlap or distance"):
@@ -152,3 +152,29 @@ def test_a_pose_is_no_motion():
     tree, ball = MeshTree(np.eye(3), [[0, 1, 2]]), Spheres([[0, 0, 2]], 0.5)
     with pytest.raises(ValueError, match="motion_a: a ndarray, expected a Motion"):
         time_of_impact(tree, ball, np.eye(4), REST)
+
+
+def test_bodies_inside_of_a_closed_mesh_have_a_negative_distance():
+    cube = box_tree(2.0)
+    inside = {
+        "ball": (Spheres([[0, 0, 0.25], [5, 0, 0]], 0.5), [-2.25, 2.5]),
+        "box": (Boxes([[0, 0, 0.5]], [[0.25, 0.25, 0.25]]), [-1.75]),
+        "cylinder": (Cylinders([[0, 0, 1.0]], 0.25, 0.5), [-1.0]),
+        "rod": (Capsules([[0, 0, -1.0]], [[0, 0, 0.5]], 0.25), [-1.75]),
+    }
+    for bodies, wanted in inside.values():
+        found = distance(cube, bodies)
+        np.testing.assert_allclose(found.distance, wanted, atol=1e-12)
+        gap = np.einsum("ij,ij->i", found.point_b - found.point_a, found.normal)
+        np.testing.assert_allclose(gap, wanted, atol=1e-12)
+    swapped = distance(Spheres([[0, 0, 0.25]], 0.5), cube)
+    np.testing.assert_allclose(swapped.distance, [-2.25])
+    assert swapped.normal[0, 2] == -1
+    opened = MeshTree(cube.vertices, cube.faces[1:])
+    assert distance(opened, Spheres([[0, 0, 0.25]], 0.5)).distance[0] > 0
+
+
+def box_tree(half):
+    """A cube about the origin, closed."""
+    shape = trimesh.creation.box(extents=[2 * half] * 3)
+    return MeshTree(shape.vertices, shape.faces)

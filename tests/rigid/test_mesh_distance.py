@@ -162,6 +162,15 @@ def test_depths_of_spheres_are_lower_bounds_that_separate_nearly():
     assert shallow.sum() > 5
 
 
+@pytest.mark.parametrize("scale", [1e-38, 1e-20, 1e20, 1e29])
+def test_tiny_and_huge_meshes(scale):
+    a, poses = ball(1), apart_poses(10, 4)
+    scaled, there = MeshTree(scale * a.vertices, a.faces), poses.copy()
+    there[:, :3, 3] *= scale
+    found = distance(scaled, scaled, pose_b=there).distance
+    np.testing.assert_allclose(found / scale, distance(a, a, pose_b=poses).distance, rtol=1e-12)
+
+
 def test_open_meshes_that_intersect_have_distance_0():
     flat = MeshTree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     found = distance(flat, flat, pose_b=moved([0, 0, 0], [np.pi / 2, 0, 0]))
@@ -178,4 +187,7 @@ def test_bad_arguments():
         distance(a, a, pose_b=np.stack([np.eye(4), 2 * np.eye(4)]))
     with pytest.raises(ValueError, match="pose_a: 2 rows, expected 3 or 1"):
         distance(a, a, pose_a=apart_poses(2, 0), pose_b=apart_poses(3, 0))
+    with pytest.raises(ValueError, match="the meshes are more than 1e30 apart in row 1; scale"):
+        distance(a, a, pose_b=np.stack([np.eye(4), moved([1e31, 0, 0])]))
+    assert distance(a, a, pose_b=moved([1e29, 0, 0])).distance[0] == pytest.approx(1e29)
     assert distance(a, a, pose_b=np.zeros((0, 4, 4))).distance.shape == (0,)

@@ -117,7 +117,7 @@ def test_signed_distances_agree_with_spheres_of_radius_0():
     tree, points = ball(), rng.uniform(-1.5, 1.5, (300, 3))
     ours = tree.signed_distance(points)
     other = distance(tree, Spheres(points, 0.0))
-    np.testing.assert_allclose(np.abs(ours.distance), other.distance, atol=1e-13)
+    np.testing.assert_allclose(ours.distance, other.distance, atol=1e-13)
     assert (np.sign(ours.distance) == np.where(tree.contains(points), -1, 1)).all()
 
 
@@ -224,6 +224,10 @@ def test_open_and_inverted_meshes_say_where():
         tree.cast(np.zeros((3, 3)), np.ones((2, 3)))
     with pytest.raises(ValueError, match="points: "):
         tree.contains([[0, 0, np.nan]])
+    with pytest.raises(ValueError, match=r"points: .* in row 1, expected coordinates to 1e100"):
+        tree.signed_distance([[0, 0, 0], [0, 0, 1e101]])
+    far = tree.signed_distance([[1e100, 0, 0]])
+    assert far.distance[0] == pytest.approx(1e100)
 
 
 def test_empty_batches_and_threads():
