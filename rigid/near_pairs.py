@@ -14,7 +14,7 @@ from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshTree
 from tauguard.rigid.motion import Motion, bounded, poses
 from tauguard.rigid.rounded import Solid, solid_parts
-from tauguard.rigid.shapes import Boxes
+from tauguard.rigid.shapes import SHARP, Boxes
 
 Array = NDArray[np.float64]
 Bodies = Solid | MeshTree
@@ -147,14 +147,15 @@ def _boxes(
             if place is None:
                 out[0] = batch.low, batch.high
             else:
-                _rigid.bounds(Boxes([middle], [half]).grown(np.zeros(1), place), out, threads)
+                around = Boxes([middle], [half])
+                _rigid.bounds(around.grown(SHARP, place, True), out, threads)
         else:
             core, radius = solid_parts("bodies", batch)
             if isinstance(core, HalfSpaces):
                 planes.append(_placed_planes(core.packed, place))
                 where.append(np.arange(first, first + count, dtype=np.intp))
             elif count:
-                _rigid.bounds(core.grown(radius, place), out, threads)
+                _rigid.bounds(core.grown(radius, place, place is not None), out, threads)
         boxes.append(out)
         first += count
     return (
