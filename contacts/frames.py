@@ -43,7 +43,9 @@ def frame_on_mover(model: Any, geom: int) -> tuple[int, Array, Array]:
         quat = model.body_iquat[body]
     mat, mover = _matrix(quat), int(movers(model)[body])
     while body != mover:
-        turn = _matrix(model.body_quat[body] / np.linalg.norm(model.body_quat[body]))
+        unit = model.body_quat[body].copy()
+        mujoco.mju_normalize4(unit)  # as MuJoCo's kinematics do; compiled ones may lack unit length
+        turn = _matrix(unit)
         pos, mat = model.body_pos[body] + turn @ pos, turn @ mat
         body = int(model.body_parentid[body])
     return mover, np.ascontiguousarray(pos, dtype=np.float64), mat.ravel()

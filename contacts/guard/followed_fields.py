@@ -174,7 +174,7 @@ def refuse_values(model: Any) -> None:
     for name, least, end in _targets(model):
         outside = partial(_outside, least=least, end=end)
         _refuse_rows(model, name, outside, "no such object")
-    for name in ("geom_quat", "body_iquat", "body_quat"):
+    for name in ("geom_quat", "body_iquat"):
         _refuse_rows(model, name, _not_unit, "not of unit length")
     plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     _refuse_rows(model, "geom_size", lambda rows: (rows < 0) & ~plane[:, None], "negative")

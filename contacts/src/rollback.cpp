@@ -35,7 +35,6 @@ void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::functi
   report_.rolled_back = true;
   std::fill(in_zone_.begin(), in_zone_.end(), 0);
   speeds_.clear();
-  rows_.begin();
   contacts_allowed_ = more * *e_.ncon + few;
   e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
   if (fresh) budget_.open(e_.qvel);
@@ -132,7 +131,6 @@ bool Stepper::advance(double length) {
   if (length > least_ * whole_ && report_.steps < s_.most) return false;
   report_.unaided = true;
   e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
-  rows_.begin();
   rows_.step(saved_.data(), length, {}, 0, 0);
   return true;
 }

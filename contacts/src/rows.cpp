@@ -53,12 +53,13 @@ void Rows::hold(const Held& held) {
 bool Rows::step(const double* start, double length, const std::vector<Held>& held, int most,
                 double push) {
   push_ = push;
+  copy_.take();
   copy_.option(e_.timestep) = length;
-  copy_.option(e_.integrator) = united_ ? e_.discrete : *e_.integrator;
+  if (united_) copy_.option(e_.integrator) = e_.discrete;
   // Solvers other than Newton do not converge on stiff rows, so pairs would pass through.
   copy_.option(e_.solver) = e_.newton;
   copy_.option(e_.iterations) = std::max(*e_.iterations, least_iterations);
-  copy_.option(e_.disableflags) = *e_.disableflags | (is_discrete() ? e_.refsafe : 0);
+  if (is_discrete()) copy_.option(e_.disableflags) |= e_.refsafe;
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) hold(h);
   const int full = *e_.full[0] + *e_.full[1];

@@ -39,8 +39,6 @@ class Rows {
         geoms_(engine.ngeom, 0),
         flexes_(static_cast<std::size_t>(engine.nflex), 0) {}
 
-  // Call this before the sub-steps of a step: takes the present values of the model.
-  void begin() { copy_.take(); }
   void bind(void* model) { copy_.bind(model); }
   // One mj_step of `length` [s] from the data's state, which `start` contains
   // (mjSTATE_INTEGRATION).

@@ -109,3 +109,17 @@ def test_exclusions_in_any_order_are_those_of_mujoco(seed):
     pairs = geom_pairs(model)
     found = {tuple(sorted(map(int, pair))) for pair in zip(pairs.first, pairs.second, strict=True)}
     assert found == expected
+
+
+@pytest.mark.parametrize("scale", [0.5, 3.0])
+def test_a_quaternion_of_a_body_without_unit_length_is_normalized_as_by_mujoco(scale):
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body><joint axis="0 0 1"/>
+      <geom size=".1"/><body pos="1 0 0" euler="10 20 30"><geom type="box" size=".1 .2 .3"
+      pos=".5 0 0"/></body></body><geom type="plane" size="9 9 1"/></worldbody></mujoco>""")
+    model.body_quat[2] *= scale
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    _, pos, mat = frame_on_mover(model, 2)
+    np.testing.assert_allclose(pos, data.geom_xpos[2] - data.xpos[1], atol=1e-13)
+    np.testing.assert_allclose(mat, data.geom_xmat[2], atol=1e-13)
+    assert GuardedStepper(model, data).step().steps == 1
