@@ -22,6 +22,8 @@ def lengths(name: str, value: ArrayLike, count: int, instead: str = "") -> NDArr
         ArgumentError: another shape, an entry that is not finite or negative, or a zero where
             ``instead`` says what to use.
     """
+    if type(value) in (int, float) and 0 < value < np.inf:  # type: ignore[operator]
+        return sealed(np.full(count, value, dtype=np.float64))
     raw = np.asarray(value)
     raw = np.broadcast_to(raw, (count,)) if raw.ndim == 0 else raw
     out = frozen_finite(name, raw, (count,))
@@ -30,6 +32,13 @@ def lengths(name: str, value: ArrayLike, count: int, instead: str = "") -> NDArr
         row = int(np.argmax(bad))
         wanted = f"more than 0; {instead}" if instead else "0 or more"
         raise ArgumentError(f"{name}: {out[row]} in row {row}; expected {wanted}")
+    return out
+
+
+def _pairs(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Two lengths and a zero in one row. Shape (N, 3)."""
+    out = np.zeros((len(first), 3))
+    out[:, 0], out[:, 1] = first, second
     return out
 
 
@@ -79,8 +88,7 @@ class Cylinders(Core):
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """Centre, radius, half length, 0 and rotation in one row. Shape (N, 15)."""
-        size = np.stack([self.radius, self.half_length, np.zeros(len(self))], axis=1)
-        return placed_rows(self.center, size, self.rotation)
+        return placed_rows(self.center, _pairs(self.radius, self.half_length), self.rotation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +136,7 @@ class Cones(Core):
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """Centre, radius, half height, 0 and rotation in one row. Shape (N, 15)."""
-        size = np.stack([self.radius, self.half_height, np.zeros(len(self))], axis=1)
-        return placed_rows(self.center, size, self.rotation)
+        return placed_rows(self.center, _pairs(self.radius, self.half_height), self.rotation)
 
 
 @dataclass(frozen=True, eq=False)

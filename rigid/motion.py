@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import Rebuilt, frozen_finite
+from tauguard.rigid import _rigid
 from tauguard.rigid.shapes import FROM_QUATERNIONS, ORTHONORMAL_TOLERANCE, not_orthonormal
 
 #: Largest component of the rotation vector of a step [rad]. Computing time and the rounding error
@@ -36,6 +37,8 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
             "pose[:, :3, :3] of np.tile(np.eye(4), (N, 1, 1))"
         )
     batch = frozen_finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
+    if _rigid.first_bad_pose(batch, ORTHONORMAL_TOLERANCE) == len(batch):
+        return batch
     bottom = (batch[:, 3] != (0.0, 0.0, 0.0, 1.0)).any(axis=1)
     if bottom.any():
         row = int(np.argmax(bottom))

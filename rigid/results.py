@@ -1,5 +1,7 @@
 """Results of the queries, row by row, as frozen dataclasses of arrays."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -59,12 +61,15 @@ class Impacts:
         point: A common point at that time, world frame; NaN without a hit. Shape (N, 3).
         normal: Unit contact normal from a to b at that time. NaN without a hit, and where the
             bodies overlap from the start and no normal is defined. Shape (N, 3).
+        depth: Penetration at t = 0 of bodies that overlap from the start, 0 for others; ``None``
+            without ``compute_impact_geometry_on_penetration``. Shape (N,).
     """
 
     hit: NDArray[np.bool_]
     time_of_impact: NDArray[np.float64]
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
+    depth: NDArray[np.float64] | None = field(default=None, kw_only=True, repr=False)
 
     __repr__ = in_a_line
 
@@ -105,6 +110,15 @@ class Distances:
     normal: NDArray[np.float64]
 
     __repr__ = in_a_line
+
+    @classmethod
+    def of_rows(cls, out: NDArray[np.float64]) -> Distances:
+        """Of rows of distance, both points and normal. Shape (N, 10)."""
+        self = object.__new__(Distances)
+        self.__dict__.update(
+            distance=out[:, 0], point_a=out[:, 1:4], point_b=out[:, 4:7], normal=out[:, 7:10]
+        )
+        return self
 
     def within(self, min_distance: float) -> NDArray[np.bool_]:
         """Whether each distance is at most ``min_distance`` [m]. Shape (N,).

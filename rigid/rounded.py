@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import frozen_finite, sealed
+from tauguard.rigid import _rigid
 from tauguard.rigid.curved import Cones, Cylinders, Ellipsoids, HalfSpaces, lengths
 from tauguard.rigid.shapes import (
+    MOST_COORDINATE,
     SHARP,
     Bodies,
     Boxes,
@@ -27,12 +29,22 @@ from tauguard.rigid.shapes import (
 #: Bounded bodies in space without radii.
 Spatial = Tetrahedra | Boxes | Parallelepipeds | Hulls | Cylinders | Cones | Ellipsoids
 
-#: Largest coordinate and radius; products of larger ones would overflow.
-MOST_COORDINATE = 1e100
+
+class Grown(Shape):
+    """A batch of bodies with radii."""
+
+    core: Any
+    radius: NDArray[np.float64]
+
+    @cached_property
+    def ready(self) -> _rigid.Batch | None:
+        """See :class:`Shape`."""
+        fits = self.core.ready is not None and self.radius.max(initial=0.0) <= MOST_COORDINATE
+        return self.core.grown(self.radius) if fits else None
 
 
 @dataclass(frozen=True, eq=False)
-class Rounded(Shape):
+class Rounded(Grown):
     """Convex bodies grown by a ball: every point within ``radius`` of the core.
 
     A rounded box of outer half extents h is ``Rounded(Boxes(center, h - r, rotation), r)``.
@@ -63,7 +75,7 @@ class Rounded(Shape):
 
 
 @dataclass(frozen=True, eq=False)
-class Spheres(Shape):
+class Spheres(Grown):
     """A batch of balls.
 
     Args:
@@ -90,11 +102,11 @@ class Spheres(Shape):
     @cached_property
     def core(self) -> Hulls:
         """The centres as hulls of one point."""
-        return Hulls(self.center, np.arange(len(self) + 1))
+        return Hulls.of_checked(self.center, np.arange(len(self) + 1))
 
 
 @dataclass(frozen=True, eq=False)
-class Capsules(Shape):
+class Capsules(Grown):
     """Segments grown by a ball; a segment may have length zero.
 
     Args:
@@ -125,7 +137,7 @@ class Capsules(Shape):
     def core(self) -> Hulls:
         """The segments as hulls of two points."""
         points = sealed(np.stack([self.start, self.end], axis=1).reshape(-1, 3))
-        return Hulls(points, 2 * np.arange(len(self) + 1))
+        return Hulls.of_checked(points, 2 * np.arange(len(self) + 1))
 
 
 Solid = Bodies | Cylinders | Cones | Ellipsoids | HalfSpaces | Rounded | Spheres | Capsules

@@ -22,6 +22,8 @@ from tauguard.rigid import _rigid
 
 #: Largest deviation of an entry of R^T R from the identity; beyond it R is refused.
 ORTHONORMAL_TOLERANCE = 1e-6
+#: Largest coordinate and radius; products of larger ones would overflow.
+MOST_COORDINATE = 1e100
 #: The radii of bodies without radii.
 SHARP = np.zeros(1)
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
@@ -54,6 +56,11 @@ class Shape(Rebuilt):
 
     def _at(self, index: NDArray[np.int64]) -> Self:
         return type(self)(*(getattr(self, f.name)[index] for f in fields(self) if f.init))  # type: ignore[arg-type]
+
+    @property
+    def ready(self) -> _rigid.Batch | None:
+        """The native form, if :func:`distance` takes the bodies; else ``None``."""
+        raise NotImplementedError
 
     @classmethod
     def from_trimesh(cls, meshes: Any) -> Self:
@@ -140,6 +147,11 @@ class Core(Shape):
         """The native form of the bodies."""
         return _rigid.Batch(self.kind, self.packed, getattr(self, "offsets", _NO_OFFSETS), SHARP)
 
+    @cached_property
+    def ready(self) -> _rigid.Batch | None:
+        """See :class:`Shape`."""
+        return self.native if self.largest <= MOST_COORDINATE else None
+
     @property
     def packed(self) -> NDArray[np.float64]:
         """The numbers of the batch, for native kernels."""
@@ -148,7 +160,7 @@ class Core(Shape):
     @cached_property
     def largest(self) -> float:
         """The largest magnitude in ``packed``."""
-        return float(np.abs(self.packed).max(initial=0.0))
+        return self.native.largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +226,7 @@ class Boxes(Core):
         center = frozen_finite("center", center, (None, 3))
         half_extents = frozen_finite("half_extents", half_extents, (len(center), 3))
         rotation, skew = rotations("rotation", rotation, len(center))
-        if (half_extents < 0).any():
+        if _rigid.first_negative(half_extents) < half_extents.size:
             row, axis = np.argwhere(half_extents < 0)[0]
             raise ArgumentError(
                 f"half_extents: {half_extents[row, axis]} in row {row}; expected 0 or more"
@@ -299,6 +311,13 @@ class PointSets(Core):
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "offsets", _partition(offsets, len(points)))
 
+    @classmethod
+    def of_checked(cls, vertices: NDArray[np.float64], offsets: NDArray[np.int64]) -> Self:
+        """Of immutable arrays that need no checks."""
+        self = object.__new__(cls)
+        self.__dict__.update(vertices=vertices, offsets=offsets)
+        return self
+
     def __len__(self) -> int:
         return len(self.offsets) - 1
 
@@ -357,7 +376,7 @@ def rotations(name: str, value: ArrayLike | None, count: int) -> tuple[NDArray[n
             is not orthonormal (named with its row).
     """
     if value is None:
-        value = np.eye(3)
+        return sealed(np.tile(np.eye(3), (count, 1, 1))), 2.0**-50
     raw = np.asarray(value)
     if raw.ndim == 2 and raw.shape == (3, 3):
         raw = np.broadcast_to(raw, (count, 3, 3))

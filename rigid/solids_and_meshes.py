@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast, get_args, overload
+from collections.abc import Callable
+from typing import Any, Literal, cast, get_args, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
@@ -14,7 +16,15 @@ from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
 from tauguard.rigid.mesh_distance import MeshPairDistances, mesh_distance
 from tauguard.rigid.motion import Motion, bounded, common_length, optional_poses
-from tauguard.rigid.queries import Poses, check_method, posed_pair, row_count, sharp_overlap
+from tauguard.rigid.motion_start import with_start
+from tauguard.rigid.queries import (
+    Poses,
+    check_method,
+    find_witness,
+    posed_pair,
+    row_count,
+    sharp_overlap,
+)
 from tauguard.rigid.results import (
     Distances,
     Impacts,
@@ -24,7 +34,7 @@ from tauguard.rigid.results import (
     Witness,
 )
 from tauguard.rigid.rounded import Solid, solid_parts
-from tauguard.rigid.shapes import Bodies
+from tauguard.rigid.shapes import Bodies, Shape
 
 OverlapMethod = Literal["abfme", "sat", "auto"]
 #: Largest coordinate and radius of bodies in a query with a mesh; meshes have the same limit.
@@ -93,6 +103,10 @@ def overlap(
             arguments, two meshes, two half-spaces, a bad pose, or a coordinate beyond 1e100 of
             bodies with radii and curved bodies (with a mesh: beyond 1e30).
     """
+    if pose_a is None and pose_b is None and type(method) is str and method == "auto":
+        few = _few(_rigid.few_meets, a, b) if type(threads) is int and threads == 1 else None
+        if few is not None:
+            return Overlap(few, lambda: overlap_witness(a, b, few))
     _check_place("method", method)
     check_method(method, get_args(OverlapMethod))
     special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
@@ -114,6 +128,22 @@ def overlap(
     _rigid.meets(first, second, hit, thread_count(threads))
     met = hit.view(np.bool_)
     return Overlap(met, lambda: _witness(first, second, hit, threads))
+
+
+def _few(query: Callable[[Any, Any], Any], a: object, b: object) -> Any:
+    """Ask for a few pairs of bodies in one short call; ``None`` where the general query must."""
+    if not (isinstance(a, Shape) and isinstance(b, Shape)):
+        return None
+    first, second = a.ready, b.ready
+    return None if first is None or second is None else query(first, second)
+
+
+def overlap_witness(a: Any, b: Any, hit: NDArray[np.bool_]) -> Witness:
+    """The witness of an overlap of few rows."""
+    if isinstance(a, Bodies) and isinstance(b, Bodies):
+        return find_witness(a, b, hit)
+    _, first, second = native_pair(a, b)
+    return _witness(first, second, hit.view(np.uint8))
 
 
 def _witness(a: _rigid.Batch, b: _rigid.Batch, hit: NDArray[np.uint8], threads: int = 1) -> Witness:
@@ -194,6 +224,10 @@ def distance(
             have different volumes, a pose that is no rigid motion (named with its row), or a
             coordinate beyond 1e100 (with a mesh: a coordinate of the bodies beyond 1e30).
     """
+    if pose_a is None and pose_b is None and type(threads) is int and threads == 1:
+        table = _few(_rigid.few_distances, a, b)
+        if table is not None:
+            return Distances.of_rows(table)
     _check_place("threads", threads)
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         return mesh_distance(a, b, pose_a, pose_b, threads)
@@ -220,7 +254,15 @@ def _check_place(name: str, value: object) -> None:
 
 @overload
 def time_of_impact(
-    a: Solid, b: Solid, motion_a: Motion, motion_b: Motion, threads: int = 1
+    a: Solid,
+    b: Solid,
+    motion_a: Motion,
+    motion_b: Motion,
+    threads: int = 1,
+    *,
+    target_distance: float = 0.0,
+    stop_at_penetration: bool = True,
+    compute_impact_geometry_on_penetration: bool = False,
 ) -> Impacts: ...
 @overload
 def time_of_impact(
@@ -231,7 +273,15 @@ def time_of_impact(
     a: Solid, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
 ) -> MeshImpacts: ...
 def time_of_impact(
-    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
+    motion_a: Motion,
+    motion_b: Motion,
+    threads: int = 1,
+    *,
+    target_distance: float = 0.0,
+    stop_at_penetration: bool = True,
+    compute_impact_geometry_on_penetration: bool = False,
 ) -> Impacts:
     """The first contact of moving bodies, t in [0, 1].
 
@@ -247,6 +297,14 @@ def time_of_impact(
         motion_a: N motions, or one.
         motion_b: N motions, or one.
         threads: 0 means all processors; the answer does not depend on it.
+        target_distance: Bodies this near to each other count as touching (not for two meshes).
+        stop_at_penetration: Whether bodies that overlap at t = 0 (or are within the target
+            distance) are a hit there. If not, those whose nearest points move apart are a hit only
+            at a later time, at which they approach each other. Until they are apart, the pair is
+            tested at least every 0.1 rad of rotation.
+        compute_impact_geometry_on_penetration: Whether such bodies get the normal and ``depth`` of
+            :func:`distance` at t = 0. The three names are those of parry's ``ShapeCastOptions``.
+            The last two are for convex bodies.
 
     Returns:
         ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b); with a
@@ -262,10 +320,47 @@ def time_of_impact(
         if not isinstance(motion, Motion):
             raise ArgumentError(f"{name}: a {type(motion).__name__}, expected a Motion")
         bounded(name, motion)
+    target = _target(target_distance)
+    special = compute_impact_geometry_on_penetration or not stop_at_penetration
+    for name, side in (("a", a), ("b", b)):
+        if isinstance(side, MeshTree) and special:
+            raise ArgumentError(
+                f"{name}: MeshTree, expected convex bodies with `stop_at_penetration=False` or "
+                "`compute_impact_geometry_on_penetration=True`"
+            )
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        if target > 0:
+            raise ArgumentError("target_distance: two meshes, expected convex bodies on one side")
         return first_touch(a, b, motion_a, motion_b, threads)
+    found = _first_impact(a, b, motion_a, motion_b, threads, target)
+    if not special:
+        return found
+
+    def query(x: Any, y: Any, motion_x: Motion, motion_y: Motion) -> Impacts:
+        return _first_impact(x, y, motion_x, motion_y, threads, target)
+
+    def measure(x: Any, y: Any, pose_x: Array, pose_y: Array) -> Distances:
+        near: Distances = distance(x, y, threads, pose_a=pose_x, pose_b=pose_y)
+        return near
+
+    sides = (a, b, motion_a, motion_b)
+    geometry = compute_impact_geometry_on_penetration
+    return with_start(found, sides, query, measure, target, stop_at_penetration, geometry)
+
+
+def _target(value: object) -> float:
+    if not isinstance(value, int | float | np.number) or not 0 <= value < np.inf:
+        raise ArgumentError(f"target_distance: {value!r:.40}, expected a length of 0 or more")
+    return float(value)
+
+
+def _first_impact(
+    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int,
+    target: float,
+) -> Impacts:  # fmt: skip
+    """The first time at which the bodies, one of which is convex, are within ``target``."""
     lengths = {"motion_a": len(motion_a), "motion_b": len(motion_b)}
-    if beside := _mesh_beside(a, b):
+    if beside := _mesh_beside(a, b, target=target):
         mesh, bodies, count, swapped = beside
         if bodies.curved:
             side = "a" if swapped else "b"
@@ -282,7 +377,7 @@ def time_of_impact(
         normal = -out[:, 4:7] if swapped else out[:, 4:7]
         found = np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], normal
         return MeshImpacts(*found, _faces_of(face, swapped))
-    count, first, second = native_pair(a, b)
+    count, first, second = native_pair(a, b, target=target)
     out = np.empty((common_length({"bodies": count} | lengths), 7))
     moved = (*motion_a.packed, *motion_b.packed)
     _rigid.time_of_impact(first, second, *moved, out, thread_count(threads))
@@ -290,20 +385,31 @@ def time_of_impact(
 
 
 def native_pair(
-    a: Solid | MeshTree, b: Solid | MeshTree, pose_a: Poses = None, pose_b: Poses = None
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
+    pose_a: Poses = None,
+    pose_b: Poses = None,
+    target: float = 0.0,
 ) -> tuple[int, _rigid.Batch, _rigid.Batch]:
-    """The number of rows, and the native forms of both sides."""
+    """The number of rows, and the native forms of both sides, each grown by half of ``target``."""
     (core_a, radius_a), (core_b, radius_b) = (
         solid_parts(name, cast(Solid, solid)) for name, solid in (("a", a), ("b", b))
     )
     if isinstance(core_a, HalfSpaces) and isinstance(core_b, HalfSpaces):
         raise ArgumentError("a, b: two HalfSpaces always overlap unless they are parallel")
     count = row_count(core_a, core_b, pose_a, pose_b)
-    return count, *posed_pair(core_a, core_b, radius_a, radius_b, pose_a, pose_b)
+    if target > 0:
+        radius_a, radius_b = radius_a + 0.5 * target, radius_b + 0.5 * target
+    first, second = posed_pair(core_a, core_b, radius_a, radius_b, pose_a, pose_b)
+    return count, first, second
 
 
 def _mesh_beside(
-    a: Solid | MeshTree, b: Solid | MeshTree, pose_a: Poses = None, pose_b: Poses = None
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
+    pose_a: Poses = None,
+    pose_b: Poses = None,
+    target: float = 0.0,
 ) -> tuple[MeshTree, _rigid.Batch, int, bool] | None:
     """The mesh, the bodies, their number, and whether the mesh is ``b``; ``None`` without a mesh.
 
@@ -332,6 +438,8 @@ def _mesh_beside(
             "vertices are vertices @ normal - offset"
         )
     count = row_count(core, core, pose, None)
+    if target > 0:
+        radius = radius + target
     return mesh, core.grown(radius, pose, pose is not None), count, swapped
 
 

@@ -49,6 +49,14 @@ struct Batch : Bodies {
         poses_(poses),
         index_(index) {}
   double radius(std::size_t i) const { return radii_.data()[radii_.shape(0) == 1 ? 0 : i]; }
+  bool sharp() const { return radii_.shape(0) == 1 && radii_.data()[0] == 0; }
+  // The largest magnitude of the numbers.
+  double largest() const {
+    double most = 0;
+    for (std::size_t i = 0; i < data_.size(); ++i)
+      most = std::max(most, std::fabs(data_.data()[i]));
+    return most;
+  }
   const HullIndex* index() const { return index_; }
   bool in_place() const { return !poses_; }
   // The pose of row i; null without poses.

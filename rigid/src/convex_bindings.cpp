@@ -10,6 +10,7 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using namespace tauguard::rigid;
 using tauguard::geometry::LongCall;
+namespace geometry = tauguard::geometry;
 
 namespace {
 
@@ -27,7 +28,15 @@ void bind_convex(nb::module_& m) {
       .def(nb::init<int, Packed, Offsets, Radii, std::optional<Poses>, const HullIndex*>(),
            "kind"_a, "packed"_a, "offsets"_a, "radii"_a, "poses"_a = nb::none(),
            "index"_a = nb::none(), nb::keep_alive<1, 7>())
+      .def_prop_ro("largest", &Batch::largest)
       .def_prop_ro("curved", [](const Batch& b) { return !is_polytope(b.kind); });
+  m.def(
+      "first_negative",
+      [](Packed values) {
+        const double *p = values.data(), *end = p + values.size();
+        return std::find_if(p, end, [](double x) { return x < 0; }) - p;
+      },
+      "values"_a);
   m.def("has_avx2", [] { return use_avx2(); });
   m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; }, "allowed"_a);
   m.def(
@@ -79,6 +88,23 @@ void bind_convex(nb::module_& m) {
         return std::pair(skew.largest, skew.first_beyond);
       },
       "rotation"_a, "tolerance"_a);
+  m.def(
+      "first_bad_pose",
+      [](Poses poses, double tolerance) {
+        const std::size_t n = poses.shape(0);
+        for (std::size_t i = 0; i < n; ++i) {
+          const double* p = poses.data() + 16 * i;
+          double r[9];
+          for (int k = 0; k < 9; ++k) r[k] = p[4 * (k / 3) + k % 3];
+          const bool bottom = p[12] == 0 && p[13] == 0 && p[14] == 0 && p[15] == 1;
+          const bool turns =
+              box_skew(r, 1, tolerance).first_beyond == 1 &&
+              dot(geometry::load(r), cross(geometry::load(r + 3), geometry::load(r + 6))) > 0;
+          if (!bottom || !turns) return i;
+        }
+        return n;
+      },
+      "poses"_a, "tolerance"_a);
   m.def(
       "pack_boxes",
       [](Packed packed, Rows blocks) {

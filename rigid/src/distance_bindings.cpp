@@ -1,6 +1,9 @@
 // Bindings of tauguard.rigid._rigid: distance, overlap and first contact of convex bodies with
 // convex bodies or meshes. Arguments are checked in Python.
+#include <memory>
+
 #include "bodies_binding.hpp"
+#include "convex_overlap.hpp"
 #include "manifold.hpp"
 #include "mesh_body.hpp"
 #include "support_distance.hpp"
@@ -10,6 +13,7 @@ using namespace nb::literals;
 using namespace tauguard::rigid;
 using tauguard::geometry::interruptible_for;
 using tauguard::geometry::LongCall;
+namespace geometry = tauguard::geometry;
 
 namespace {
 
@@ -40,6 +44,52 @@ void distances(const Batch& a, const Batch& b, DistanceRows out, int threads) {
       g = signed_distance(x.at(i), y.at(i), i, a.radius(i), b.radius(i));
     store(g, out.data() + 10 * i);
   });
+}
+
+// Queries of a few pairs without poses, in the calling thread and without releasing the
+// interpreter: a call takes about a microsecond. They return None where the general functions must
+// be used.
+constexpr std::size_t few = 64;
+
+std::size_t few_rows(const Batch& a, const Batch& b) {
+  const bool planes = a.kind == Kind::half_spaces && b.kind == Kind::half_spaces;
+  const bool fits = (a.count == b.count || a.count == 1 || b.count == 1) && a.count && b.count;
+  const std::size_t n = std::max(a.count, b.count);
+  return fits && n <= few && !planes && (a.kind == Kind::polygons) == (b.kind == Kind::polygons)
+             ? n
+             : 0;
+}
+
+template <class T>
+nb::object owned(T* data, std::initializer_list<std::size_t> shape) {
+  nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  return nb::ndarray<nb::numpy, T>(data, shape, owner).cast();
+}
+
+nb::object few_distances(const Batch& a, const Batch& b) {
+  const std::size_t n = few_rows(a, b);
+  if (!n || a.kind == Kind::polygons) return nb::none();
+  const geometry::RoundToNearest guard;
+  auto out = std::make_unique<double[]>(10 * n);
+  for (std::size_t i = 0; i < n; ++i)
+    store(signed_distance(a, b, i, a.radius(i), b.radius(i)), &out[10 * i]);
+  return owned(out.release(), {n, 10});
+}
+
+nb::object few_meets(const Batch& a, const Batch& b) {
+  const std::size_t n = few_rows(a, b);
+  if (!n) return nb::none();
+  const geometry::RoundToNearest guard;
+  const auto core = [](const Batch& x) { return x.sharp() && x.kind <= Kind::polygons; };
+  auto out = std::make_unique<bool[]>(n);
+  if (core(a) && core(b)) {
+    const RowMethod decide = row_method(a.kind, b.kind);
+    std::uint8_t hit[few];
+    for (std::size_t i = 0; i < n; ++i) decide(a, b, i, hit), out[i] = hit[i];
+  } else {
+    for (std::size_t i = 0; i < n; ++i) out[i] = meet(a, b, i, a.radius(i), b.radius(i));
+  }
+  return owned(out.release(), {n});
 }
 
 void meets(const Batch& a, const Batch& b, Hits hit, int threads) {
@@ -132,6 +182,8 @@ void mesh_impacts(const Mesh& mesh, const Batch& bodies, Poses pose_a, Vectors l
 void bind_distances(nb::module_& m) {
   m.def("distances", &distances, "a"_a, "b"_a, "out"_a, "threads"_a);
   m.def("meets", &meets, "a"_a, "b"_a, "hit"_a, "threads"_a);
+  m.def("few_distances", &few_distances, "a"_a, "b"_a);
+  m.def("few_meets", &few_meets, "a"_a, "b"_a);
   m.def("manifolds", &manifolds, "a"_a, "b"_a, "margin"_a, "counts"_a, "distances"_a, "out"_a,
         "threads"_a);
   m.def("common_points", &common_points, "a"_a, "b"_a, "hit"_a, "out"_a, "threads"_a);

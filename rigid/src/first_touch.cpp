@@ -51,6 +51,25 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
 
 namespace {
 
+// Whether balls of the sum `reach` of both radii never meet, while b's centre moves from `between`,
+// relative to a's, by `move`. Errors are relative to the distance, however far the bodies move.
+bool never_near(const Vec3& between, const Vec3& move, double reach) {
+  const double most = largest(move);
+  Vec3 nearest = between;
+  if (most > 0) {
+    // Subnormal and huge lengths are scaled by powers of two, which is exact.
+    const int e = std::ilogb(most);
+    Vec3 u;
+    for (int k = 0; k < 3; ++k) u[k] = std::ldexp(move[k], -e);
+    const double length = norm(u);
+    u = (1 / length) * u;
+    const double along = dot(between, u);
+    if (along < 0)
+      nearest = std::ldexp(-along, -e) >= length ? between + move : between - along * u;
+  }
+  return norm(nearest) > reach * (1 + 0x1p-40) + 0x1p-40 * norm(between);
+}
+
 FirstTouch turned(FirstTouch t) {
   for (double& x : t.normal) x = -x;
   return t;
@@ -75,6 +94,11 @@ FirstTouch supports_impact(const Bodies& a, const Bodies& b, std::size_t row, do
   }
   SupportShape x(first.shape, first.frame, motion_a, origin),
       y(second.shape, second.frame, motion_b, origin);
+  if (!x.half_space()) {
+    x.move_to(0), y.move_to(0);
+    const double reach = x.reach() + x.radius() + y.reach() + y.radius();
+    if (never_near(y.centre() - x.centre(), y.linear() - x.linear(), reach)) return no_touch;
+  }
   const Touch touch = first_contact(x, y, 0, 0);
   if (!touch.hit) return no_touch;
   FirstTouch out = no_touch;
@@ -107,6 +131,9 @@ FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, doub
   const Vec3 origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
   MovingBody x = moving_body(a, row, motion_a, origin), y = moving_body(b, row, motion_b, origin);
   x.rounding = rounding_a, y.rounding = rounding_b;
+  const double reach = x.radius() + y.radius() + rounding_a + rounding_b;
+  if (never_near(motion_b.x0 - motion_a.x0, motion_b.linear - motion_a.linear, reach))
+    return no_touch;
   return first_touch(first_contact(x, y, 0, 1), x, y, origin);
 }
 

@@ -120,6 +120,7 @@ SignedDistance above(const Bodies& half_space, const Bodies& body, std::size_t r
   const Vec3 origin = placed->frame.at;
   const SupportShape shape(*placed, origin);
   Vec3 low = shape.support(-1.0 * n);
+  const double level = dot(n, low);
   const double tolerance = 1e-11 * shape.reach();
   if (is_polytope(body.kind)) {  // the mean of the vertices that are equally low
     Vec3 sum{};
@@ -128,9 +129,9 @@ SignedDistance above(const Bodies& half_space, const Bodies& body, std::size_t r
       const Vec3 x = v - origin;
       if (dot(n, x - low) <= tolerance) sum += x, ++count;
     }
-    if (count > 1) low = (1 / count) * sum;
+    if (count > 1) low = (1 / count) * sum, low = low + (level - dot(n, low)) * n;
   }
-  const double start = exact_height(plane, origin) / length, height = start + dot(n, low);
+  const double start = exact_height(plane, origin) / length, height = start + level;
   const double scale = shape.reach() + std::fabs(start) + radius_a + radius_b;
   SignedDistance g{height, origin + low - height * n, origin + low, n};
   int sign = 0;

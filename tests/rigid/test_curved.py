@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from oracles.convex_bodies import KINDS
@@ -119,6 +119,7 @@ numbers = st.one_of(st.integers(-2, 2).map(float), st.floats(-1e3, 1e3, width=32
 
 
 @settings(max_examples=150, deadline=None)
+@example([0.0] * 10 + [1e-9, 100.0], 0.0, 0.0, (0, -1, 0))
 @given(st.lists(numbers, min_size=12, max_size=12), numbers, st.sampled_from([0, 0.5, 2.0]),
        st.sampled_from([(0, 0, 1), (0, -1, 0), (0.6, 0.8, 0), (1 / 3, 2 / 3, 2 / 3)]))  # fmt: skip
 def test_half_spaces_and_hulls_are_exact(values, offset, radius, normal):
