@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from oracles.curved_bodies import CURVED, NAMES, Sets, errors_of
-from tauguard.rigid import distance
+from tauguard.rigid import HalfSpaces, distance
 
 pytestmark = pytest.mark.slow
 PAIRS = [p for p in itertools.combinations_with_replacement(NAMES, 2) if set(p) & set(CURVED)]
@@ -23,3 +23,17 @@ def test_bounds(kinds, slow_seed):
         overlapping += int((got.distance <= 0).sum())
     print(f"{'-'.join(kinds)}: 100000 pairs, {overlapping} overlap, errors {worst}")
     assert worst.max() <= 1e-9
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_half_spaces(kind, slow_seed):
+    rng, n = np.random.default_rng(slow_seed), 100_000
+    body, normal = Sets(kind, rng, n), rng.normal(size=(n, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    offset = rng.uniform(-2, 2, n)
+    got = distance(HalfSpaces(normal, offset), body.bodies()).distance
+    want = -body.height(-normal[:, None])[:, 0] - offset
+    size = np.linalg.norm(body.center, axis=1) + np.linalg.norm(body.size, axis=1)
+    worst = (np.abs(got - want) / size).max()
+    print(f"half-spaces-{kind}: 100000 pairs, {(got <= 0).sum()} overlap, error {worst:.1e}")
+    assert worst <= 3e-14
