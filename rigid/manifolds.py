@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.mesh import MeshTree
-from tauguard.rigid.motion import optional_poses
+from tauguard.rigid.motion import PoseLike, optional_poses
 from tauguard.rigid.rounded import Solid
 from tauguard.rigid.solids_and_meshes import native_pair
 
@@ -52,8 +52,8 @@ def contacts(
     margin: float = 0.0,
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Contacts:
     """Up to four contact points of each pair of convex bodies ``a[i]`` and ``b[i]``.
 

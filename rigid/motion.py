@@ -18,6 +18,10 @@ from tauguard.rigid.shapes import FROM_QUATERNIONS, ORTHONORMAL_TOLERANCE, not_o
 MOST_TURN = 1e4
 
 
+#: Poses (4, 4) or (N, 4, 4), or none.
+PoseLike = ArrayLike | None
+
+
 def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """``value`` as homogeneous matrices of shape (N, 4, 4); a (4, 4) matrix is a batch of one.
 
@@ -61,7 +65,7 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return batch
 
 
-def optional_poses(name: str, value: ArrayLike | None) -> NDArray[np.float64] | None:
+def optional_poses(name: str, value: PoseLike) -> NDArray[np.float64] | None:
     """As :func:`poses`; ``None`` stays ``None``."""
     return None if value is None else poses(name, value)
 

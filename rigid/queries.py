@@ -21,7 +21,7 @@ from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
 from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
-from tauguard.rigid.motion import common_length, optional_poses
+from tauguard.rigid.motion import PoseLike, common_length, optional_poses
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.rounded import no_body
 from tauguard.rigid.shapes import (
@@ -100,8 +100,8 @@ def sweep(
     method: SweepMethod = "auto",
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Impacts:
     """The first contact of ``b[i]``, which moves by ``t * displacement[i]``, with ``a[i]``.
 

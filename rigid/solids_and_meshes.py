@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Literal, cast, get_args, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.findings import ArgumentError
@@ -15,7 +15,7 @@ from tauguard.rigid import _rigid
 from tauguard.rigid.curved import HalfSpaces
 from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
 from tauguard.rigid.mesh_distance import MeshPairDistances, mesh_distance
-from tauguard.rigid.motion import Motion, bounded, common_length, optional_poses
+from tauguard.rigid.motion import Motion, PoseLike, bounded, common_length, optional_poses
 from tauguard.rigid.motion_start import with_start
 from tauguard.rigid.queries import (
     Poses,
@@ -48,8 +48,8 @@ def overlap(
     method: OverlapMethod = "auto",
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Overlap: ...
 @overload
 def overlap(
@@ -58,7 +58,7 @@ def overlap(
     method: OverlapMethod = "auto",
     threads: int = 1,
     *,
-    pose_b: ArrayLike | None = None,
+    pose_b: PoseLike = None,
 ) -> MeshOverlap: ...
 @overload
 def overlap(
@@ -67,7 +67,7 @@ def overlap(
     method: OverlapMethod = "auto",
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
+    pose_a: PoseLike = None,
 ) -> MeshOverlap: ...
 def overlap(
     a: Solid | MeshTree,
@@ -75,8 +75,8 @@ def overlap(
     method: OverlapMethod = "auto",
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Overlap | MeshOverlap:
     """Whether the convex bodies ``a[i]`` and ``b[i]`` share a point; touching is a hit.
 
@@ -162,8 +162,8 @@ def distance(
     b: Solid,
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Distances: ...
 @overload
 def distance(
@@ -171,24 +171,24 @@ def distance(
     b: MeshTree,
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> MeshPairDistances: ...
 @overload
 def distance(
-    a: MeshTree, b: Solid, threads: int = 1, *, pose_b: ArrayLike | None = None
+    a: MeshTree, b: Solid, threads: int = 1, *, pose_b: PoseLike = None
 ) -> MeshDistances: ...
 @overload
 def distance(
-    a: Solid, b: MeshTree, threads: int = 1, *, pose_a: ArrayLike | None = None
+    a: Solid, b: MeshTree, threads: int = 1, *, pose_a: PoseLike = None
 ) -> MeshDistances: ...
 def distance(
     a: Solid | MeshTree,
     b: Solid | MeshTree,
     threads: int = 1,
     *,
-    pose_a: ArrayLike | None = None,
-    pose_b: ArrayLike | None = None,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
 ) -> Distances:
     """Signed distance, nearest points and normal of the bodies ``a[i]`` and ``b[i]``.
 
