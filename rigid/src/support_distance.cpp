@@ -69,9 +69,20 @@ SignedDistance of_pair(const SupportShape& a, const SupportShape& b) {
   const double size = a.reach() + b.reach();
   Distance d = distance_of(a, b, {}, INFINITY);
   if (!d.overlap && d.upper - d.lower > sharp * size) sharpen(a, b, size, &d);
+  // Very flat cores can stop the descent early; it goes on from the best direction.
+  for (int again = 0; again < 8 && !d.overlap && d.upper - d.lower > 10 * sharp * size; ++again) {
+    const Vec3 guess = again % 2 ? d.on_b - d.on_a : d.n;
+    Distance next = distance_of(a, b, guess, INFINITY);
+    if (next.overlap) break;
+    if (next.lower < d.lower) next.lower = d.lower, next.n = d.n;
+    if (next.upper > d.upper) next.upper = d.upper, next.on_a = d.on_a, next.on_b = d.on_b;
+    d = next;
+    sharpen(a, b, size, &d);
+  }
   if (!d.overlap && d.lower > rounding) {
     const Vec3 middle = 0.5 * (d.on_a + d.on_b), way = d.on_b - d.on_a;
-    if (d.upper > 1e-5 * size) return {d.upper, d.on_a, d.on_b, (1 / d.upper) * way};
+    // lower <= n . way <= upper
+    if (d.upper > 1e-5 * size) return {dot(d.n, way), d.on_a, d.on_b, d.n};
     return {d.lower, middle - (0.5 * d.lower) * d.n, middle + (0.5 * d.lower) * d.n, d.n};
   }
   penetration(a, b, &d, resolution, most_faces);

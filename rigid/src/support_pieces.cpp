@@ -193,26 +193,33 @@ class Stationary {
   Vec3 n_;
 };
 
-bool sharpen_from(const SupportShape& a, const SupportShape& b, double size, double tilt,
-                  Distance* d) {
-  Stationary search(a, b, d->n, tilt);
-  if (!search.run(size)) return false;
+void sharpen_from(const SupportShape& a, const SupportShape& b, double size, const Vec3& start,
+                  double tilt, Distance* d) {
+  Stationary search(a, b, start, tilt);
+  if (!search.run(size)) return;
   const Vec3 n = search.n();
   const double s = dot(n, b.support(-1.0 * n) - a.support(n));
-  if (!(s >= d->lower - 1e-15 * size)) return false;
+  if (!(s >= d->lower - 1e-15 * size)) return;
   const Vec3 way = search.on_b() - search.on_a();
-  if (!(norm(way - s * n) <= 1e-9 * size)) return false;
+  if (!(norm(way - s * n) <= 1e-9 * size)) return;
   d->lower = s, d->n = n, d->on_a = search.on_a(), d->on_b = search.on_b(), d->upper = norm(way);
-  return true;
 }
 
 }  // namespace
 
 bool sharpen(const SupportShape& a, const SupportShape& b, double size, Distance* d) {
-  const double tilt = std::sqrt(std::max(0.0, d->upper - d->lower) / size);
-  for (const double angle : {0.0, std::min(tilt, 0.3), 1e-3, 1e-5})
-    if (sharpen_from(a, b, size, angle, d)) return true;
-  return false;
+  const Vec3 way = d->on_b - d->on_a;
+  const double length = norm(way), lower = d->lower,
+               tilt = std::sqrt(std::max(0.0, d->upper - lower) / size);
+  const Vec3 starts[2] = {d->n, length > 0 ? (1 / length) * way : d->n};
+  const Distance before = *d;
+  for (const double angle : {0.0, std::min(tilt, 0.3), 1e-3, 1e-5, 1e-2, 1e-4, 0.1})
+    for (const Vec3& start : starts) {
+      sharpen_from(a, b, size, start, angle, d);
+      const bool improved = !(d->on_a == before.on_a && d->on_b == before.on_b);
+      if (improved && std::fabs(d->upper - std::fabs(d->lower)) <= 1e-12 * size) return true;
+    }
+  return !(d->on_a == before.on_a && d->on_b == before.on_b);
 }
 
 }  // namespace tauguard::rigid
