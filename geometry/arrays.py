@@ -98,7 +98,7 @@ def frozen_finite(
     """As :func:`finite`, but an immutable copy."""
     if type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == len(shape):
         fits = all(n is None or n == have for n, have in zip(shape, value.shape, strict=True))
-        if fits and value.size:
+        if fits and 0 < value.size <= 1000:  # longer products start the threads of BLAS
             array: NDArray[np.float64] = np.frombuffer(value.tobytes()).reshape(value.shape)
             if math.isfinite(np.vdot(array, array)):  # only if all entries are
                 return array
