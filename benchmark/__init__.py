@@ -10,6 +10,6 @@ __getattr__, __dir__, __all__ = on_demand(
     __name__,
     {
         "fetching": "fetch",
-        "manifest": "DataSet data_folder sets",
+        "manifest": "DataSet data_folder is_complete sets",
     },
 )

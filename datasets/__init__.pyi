@@ -11,7 +11,12 @@ from tauguard.datasets.columns import Reading as Reading
 from tauguard.datasets.configuration import Configuration as Configuration
 from tauguard.datasets.configuration import Split as Split
 from tauguard.datasets.configuration import load_configuration as load_configuration
+from tauguard.datasets.dataset_folder import configuration_in as configuration_in
 from tauguard.datasets.generation import generate_dataset as generate_dataset
+from tauguard.datasets.inspection import episode_line as episode_line
+from tauguard.datasets.inspection import inspect_dataset as inspect_dataset
+from tauguard.datasets.inspection import simulated_again as simulated_again
+from tauguard.datasets.inspection_figure import draw_inspection as draw_inspection
 from tauguard.datasets.plans import SPEEDS as SPEEDS
 from tauguard.datasets.plans import TRAINING_PAYLOADS as TRAINING_PAYLOADS
 from tauguard.datasets.plans import DemoPlan as DemoPlan
@@ -20,9 +25,12 @@ from tauguard.datasets.plans import demo_plan as demo_plan
 from tauguard.datasets.plans import free_episodes as free_episodes
 from tauguard.datasets.plans import struck_episodes as struck_episodes
 from tauguard.datasets.plans import torque_scale as torque_scale
+from tauguard.datasets.reader import arms_of as arms_of
 from tauguard.datasets.reader import episodes_of_splits as episodes_of_splits
 from tauguard.datasets.reader import read as read
 from tauguard.datasets.recordings import simulate_all as simulate_all
 from tauguard.datasets.recordings import write_dataset as write_dataset
+from tauguard.datasets.schedule import class_order as class_order
 from tauguard.datasets.twin_episodes import TwinEpisodes as TwinEpisodes
 from tauguard.datasets.twin_episodes import twin_contacts as twin_contacts
+from tauguard.datasets.workers import Terminated as Terminated

@@ -157,6 +157,25 @@ def missing(folder: Path) -> list[str]:
     ]
 
 
+def inspect_dataset(folder: Path, verify: bool = False) -> dict[str, Any]:
+    """The content of a dataset, and with ``verify`` the result of reading all its bytes.
+
+    Returns:
+        As :func:`report`, with ``damaged`` (faults by file; None: not verified) and ``unchecked``
+        (files without a checksum).
+
+    Raises:
+        FileError: no dataset, or ``dataset.json`` is damaged.
+    """
+    damaged = dict(verified(folder)) if verify else None
+    if damaged and HEAD in damaged:
+        raise FileError(f"{folder}: " + "; ".join(f"{k}: {v}" for k, v in damaged.items()))
+    return report(folder) | {
+        "damaged": damaged,
+        "unchecked": unchecked(folder) if verify else [],
+    }
+
+
 def verified(folder: Path) -> list[tuple[str, str]]:
     """Names and faults of damaged, missing and foreign files; reads every byte.
 
@@ -236,7 +255,7 @@ def report(folder: Path) -> dict[str, Any]:
     }
 
 
-def line_of(folder: Path, name: str) -> dict[str, Any]:
+def episode_line(folder: Path, name: str) -> dict[str, Any]:
     """The manifest's line of an episode, ``split/number``.
 
     Raises:
@@ -248,7 +267,7 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
     raise FileError(f"{folder}: no episode {name!r}; expected split/number, such as train/0")
 
 
-def same_again(
+def simulated_again(
     folder: Path, line: dict[str, Any], robot: str | Path | None = None
 ) -> tuple[Trace | None, bool]:
     """Simulate an episode again: the trace, and whether it equals the stored samples.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 COLOURS = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
 
 
-def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
+def draw_inspection(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     """Draw counts by class, severity by kind, hours by speed and payload, and one collision."""
     from matplotlib.figure import Figure
 

@@ -14,7 +14,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 import tauguard
 from tauguard.datasets import free_episodes, struck_episodes
 from tauguard.envs import CollisionPlan, Episode, simulate
-from tauguard.replay.video import frames
+from tauguard.replay import video_frames
 
 SPAN, STEP = (-0.2, 0.3), 0.008  # time shown about the onset, time per frame [s]
 SLOWER = 8
@@ -37,7 +37,7 @@ def main(target="struck.gif"):
 
     t = trace.t - onset
     seconds, rate = SPAN[1] - SPAN[0], 1 / STEP
-    pictures = list(frames(trace, onset + SPAN[0], seconds, rate, (320, 380), VIEW))
+    pictures = list(video_frames(trace, onset + SPAN[0], seconds, rate, (320, 380), VIEW))
     shown = (t >= SPAN[0]) & (t <= SPAN[1])
     figure = plt.figure(figsize=(8.4, 3.6), dpi=90, layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.17, 1))

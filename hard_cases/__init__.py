@@ -7,6 +7,6 @@ a method is skipped.
 
 from tauguard.hard_cases.adapter import Adapter, adapters
 from tauguard.hard_cases.case import Case, load_cases
-from tauguard.hard_cases.verdicts import run
+from tauguard.hard_cases.verdicts import run, verdicts
 
-__all__ = ["Adapter", "Case", "adapters", "load_cases", "run"]
+__all__ = ["Adapter", "Case", "adapters", "load_cases", "run", "verdicts"]

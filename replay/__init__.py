@@ -11,9 +11,12 @@ os.environ.setdefault("RERUN_ANALYTICS", "0")
 __getattr__, __dir__, __all__ = on_demand(
     __name__,
     {
+        "browser": "BrowserReplay",
         "events": "EventFolder command_to_open",
+        "live": "LiveView",
         "plot": "plot",
         "rrd": "write_rrd",
         "state_view": "StateView",
+        "video": "video_frames write_video",
     },
 )

@@ -24,7 +24,7 @@ VIEW = (140.0, -18.0, 2.0)
 AROUND = 1.6
 
 
-def frames(
+def video_frames(
     trace: Trace,
     start: float = 0.0,
     seconds: float | None = None,

@@ -1,6 +1,7 @@
 """Imports point one way, and light packages load no heavy library."""
 
 import ast
+import importlib
 import re
 import subprocess
 import sys
@@ -98,6 +99,23 @@ def test_shared_modules_use_no_package_and_nothing_else_stands_beside_them():
             beside = packages_imported(path) - ALLOWED.keys() - SHARED
             beside -= ENTRY | {"__version__", *tauguard.__all__} if package == "cli" else set()
             assert not beside, f"{path.relative_to(ROOT)} imports {sorted(beside)}"
+
+
+#: Public modules that are no packages; the docstring of ``tauguard.envs`` names those of envs.
+MODULES = {"tauguard.environments", "tauguard.envs.policies", "tauguard.envs.wrappers"}
+
+
+@pytest.mark.parametrize("path", sorted(FOLDERS["cli"].glob("*.py")), ids=lambda path: path.stem)
+def test_commands_import_public_names_only(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        module = getattr(node, "module", None) or ""
+        if not isinstance(node, ast.ImportFrom) or module.split(".")[0] != "tauguard":
+            continue
+        if module in MODULES or module.removeprefix("tauguard.").split(".")[0] in SHARED | {"cli"}:
+            continue
+        public = {*importlib.import_module(module).__all__, "__version__"}
+        private = {alias.name for alias in node.names} - public
+        assert not private, f"{path.name}: {sorted(private)} of {module}"
 
 
 def test_the_product_does_not_know_the_studies():

@@ -22,7 +22,7 @@ from tauguard.traces import Trace
 
 Array = NDArray[Any]
 
-VERSION = "v3.0"
+LEROBOT_VERSION = "v3.0"
 TASK = "move between random poses; collisions are labelled"
 #: Rows of a data file: about 100 MB (LeRobot's default) with six joints.
 ROWS_A_FILE = 1_000_000
@@ -194,7 +194,7 @@ def _write_meta(
     stats = {name: _stats(name, episodes) for name in described}
     write_atomic(folder / "meta/stats.json", json.dumps(stats, indent=1) + "\n")
     info = {
-        "codebase_version": VERSION,
+        "codebase_version": LEROBOT_VERSION,
         "robot_type": robot,
         "total_episodes": len(episodes),
         "total_frames": episodes[-1]["dataset_to_index"],

@@ -63,7 +63,7 @@ def test_every_episode_is_there_once_with_its_labels(tiny, tiny_toml):
 
 def test_what_is_read_is_what_was_simulated(tiny, tiny_toml):
     line = next(x for x in lines(tiny) if x["collisions"])
-    _, same = inspection.same_again(tiny, line)
+    _, same = inspection.simulated_again(tiny, line)
     assert same
     trace = next(t for t in read(tiny) if t.meta["key"] == line["key"])
     configuration = load_configuration(tiny_toml)

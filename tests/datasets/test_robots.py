@@ -64,16 +64,16 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     for text in (json.dumps(line), (tmp_path / "1" / HEAD).read_text()):
         assert str(tmp_path) not in text
     own = described.parent / "robots" / "other.toml"
-    _, same = inspection.same_again(tmp_path / "1", line, own)
+    _, same = inspection.simulated_again(tmp_path / "1", line, own)
     assert same
     with pytest.raises(ValueError, match=r"its file other\.toml is not here; .* by `robot=`"):
-        inspection.same_again(tmp_path / "1", line)
+        inspection.simulated_again(tmp_path / "1", line)
     with pytest.raises(ValueError, match="arm cura6 comes with the package"):
-        inspection.same_again(tmp_path / "1", line | {"arm": "cura6"}, own)
+        inspection.simulated_again(tmp_path / "1", line | {"arm": "cura6"}, own)
 
     (described.parent / "robots" / "arm.xml").write_text(random_arm(SEED + 1))
     with pytest.raises(ValueError, match=r"arm other: .*other\.toml is not what the dataset was"):
-        inspection.same_again(tmp_path / "1", line, own)
+        inspection.simulated_again(tmp_path / "1", line, own)
     with pytest.raises(ValueError, match="holds another dataset"):
         generate_dataset(load_configuration(described), tmp_path / "1", workers=1)
 

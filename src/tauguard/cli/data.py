@@ -26,8 +26,7 @@ def command(
         from_: address of a mirror that has the originals under SET/PATH (default: the publishers').
         to: folder (default: the one that TAUGUARD_DATA names, else a folder of the user's cache).
     """
-    from tauguard.benchmark.fetching import fetch
-    from tauguard.benchmark.manifest import data_folder
+    from tauguard.benchmark import data_folder, fetch
 
     folder = to or data_folder()
     if task == "list":
@@ -43,7 +42,7 @@ def command(
 
 def print_list(folder: Path) -> None:
     """Print every set with its arm, contacts, minutes, licence, size and state in the folder."""
-    from tauguard.benchmark.manifest import is_complete, sets
+    from tauguard.benchmark import is_complete, sets
     from tauguard.report import table
 
     rows, elsewhere = [], []

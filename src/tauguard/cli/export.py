@@ -25,19 +25,18 @@ def command(
         splits: names of the splits to write (default: all).
         arm: write only this arm's episodes.
     """
-    from tauguard.datasets.dataset_folder import configuration_in
-    from tauguard.datasets.reader import arms_of, read
+    from tauguard.datasets import arms_of, configuration_in, read
+    from tauguard.datasets.exports import LEROBOT_VERSION, write_lerobot, write_minari
 
     configuration = configuration_in(folder)
     traces = read(folder, splits or None, arm)
     if to == "minari":
-        from tauguard.datasets.exports.minari import write_minari
-
         count = write_minari(traces, out, configuration.rate)
         print(f"{out}: {count} episodes, for minari.load_dataset({out!r})")
         return
-    from tauguard.datasets.exports.lerobot import VERSION, write_lerobot
-
     robots = (arm,) if arm else arms_of(folder, splits or None)
     count = write_lerobot(traces, Path(out), configuration.rate, "+".join(robots))
-    print(f"{out}: {count} episodes as LeRobotDataset {VERSION}; on the hub, tag it {VERSION}")
+    print(
+        f"{out}: {count} episodes as LeRobotDataset {LEROBOT_VERSION}; "
+        f"on the hub, tag it {LEROBOT_VERSION}"
+    )

@@ -31,9 +31,7 @@ def command(
     """
     import time
 
-    from tauguard.datasets.configuration import load_configuration
-    from tauguard.datasets.generation import generate_dataset
-    from tauguard.datasets.workers import Terminated
+    from tauguard.datasets import Terminated, generate_dataset, load_configuration
 
     if workers is not None and workers < 1:
         raise ArgumentError(f"--workers {workers}: expected 1 or more")

@@ -18,8 +18,7 @@ def command(
         case: names of cases, or beginnings of names (default: all).
         json: write a row for every answer here as JSON.
     """
-    from tauguard.hard_cases import adapters, load_cases, run
-    from tauguard.hard_cases.verdicts import verdicts
+    from tauguard.hard_cases import adapters, load_cases, run, verdicts
     from tauguard.report import machine, table, versions, write_json
 
     cases = [one for one in load_cases() if not case or one.name.startswith(case)]

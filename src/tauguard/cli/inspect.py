@@ -39,8 +39,7 @@ def command(
         robot: with --episode, the robot file of an arm that is not in the package. The dataset
             contains only the file's hash and the parameters for training, not the shapes.
     """
-    from tauguard.datasets import inspection
-    from tauguard.datasets.dataset_folder import HEAD
+    from tauguard.datasets import draw_inspection, inspect_dataset
     from tauguard.report import write_json
 
     if (mcap or robot) is not None and episode is None:
@@ -48,17 +47,10 @@ def command(
     if episode is not None:
         simulate_again(folder, episode, mcap, robot)
         return
-    damaged = dict(inspection.verified(folder)) if verify else None
-    if damaged and HEAD in damaged:
-        raise ArgumentError(f"{folder}: " + "; ".join(f"{k}: {v}" for k, v in damaged.items()))
-    report = inspection.report(folder)
-    report["damaged"] = damaged
-    report["unchecked"] = inspection.unchecked(folder) if verify else []
+    report = inspect_dataset(folder, verify)
     print(page(report))
     if figure is not None:
-        from tauguard.datasets.inspection_figure import draw
-
-        draw(figure, folder, report)
+        draw_inspection(figure, folder, report)
     if json is not None:
         write_json(json, report)
     if report["damaged"] or (verify and report["leaks"]):
@@ -99,7 +91,7 @@ def page(report: Mapping[str, Any]) -> str:
 
 def classes(name: str, one: Mapping[str, Any]) -> list[str]:
     """Collisions of a split by class, as achieved and as planned."""
-    from tauguard.datasets.schedule import class_order
+    from tauguard.datasets import class_order
 
     lines = [f"{name}: collisions that happened (planned)"]
     for what in ("kind", "link", "severity"):
@@ -138,11 +130,11 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
 
 def simulate_again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> None:
     """Simulate one episode again and compare it with the stored one."""
-    from tauguard.datasets.inspection import line_of, same_again
+    from tauguard.datasets import episode_line, simulated_again
     from tauguard.traces import write_mcap
 
-    line = line_of(folder, name)
-    trace, same = same_again(folder, line, robot)
+    line = episode_line(folder, name)
+    trace, same = simulated_again(folder, line, robot)
     print(f"{name}: {line['outcome']}; {line['rows']} rows, key {line['key'][:12]}")
     print("simulated again: the same bytes" if same else "simulated again: OTHER bytes")
     if mcap is not None and trace is not None:

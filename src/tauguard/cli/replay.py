@@ -91,7 +91,7 @@ def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> P
 
 def serve(shown: Path, port: int) -> None:
     """Serve a recording, or a folder with a page that links to its recordings."""
-    from tauguard.replay.browser import BrowserReplay
+    from tauguard.replay import BrowserReplay
 
     if not shown.exists():
         raise FileNotFoundError(f"{shown}: no such file or folder")

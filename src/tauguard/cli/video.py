@@ -36,7 +36,7 @@ def command(
     """
     from tauguard.cli import expect
     from tauguard.cli.replay import newest
-    from tauguard.replay.video import frames, write_video
+    from tauguard.replay import video_frames, write_video
     from tauguard.traces import read_mcap
 
     expect("--slower", slower, 1e-3, 1e6)
@@ -52,7 +52,7 @@ def command(
     if target.exists() and out is None:
         raise FileExistsError(f"{target} is there already: name the file to write with --out")
     trace = read_mcap(source)
-    pictures = frames(trace, start, seconds, rate * slower, (height, width))
+    pictures = video_frames(trace, start, seconds, rate * slower, (height, width))
     try:
         count = write_video(target, pictures, rate)
     except RuntimeError as error:  # no OpenGL

@@ -124,7 +124,7 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
 
 def opened(inner: Any, save: Path | None, port: int) -> Any:
     """Open the viewer or, with ``save``, a writer of an .rrd file, and lay out the charts."""
-    from tauguard.replay.live import LiveView
+    from tauguard.replay import LiveView
 
     view = LiveView(inner.compiled.shown(), save, port)
     charts = {
