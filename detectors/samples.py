@@ -64,7 +64,7 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
         raise ArgumentError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
             f"{1e3 * dt:g} ms: "
-            + (f"resample it to that (--resample {plain_rate(dt):g}), or " if trace.dt < dt else "")
+            + (f"resample it to that (`resample={plain_rate(dt):g}`), or " if trace.dt < dt else "")
             + "train a detector on recordings of its rate"
         )
 
