@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -132,7 +133,8 @@ def train_and_score(
             fitted = detector.fit(traces, arm)
         alarm, scores = _with_rate(fitted, found, per_hour)
     text = traces[0].attachments.get("arm.xml")
-    robot = None if text is None else StoredRobot.of_text("arm.xml", text)
+    name = Path(traces[0].meta.get("arm", "cura6")).stem or "arm"
+    robot = None if text is None else StoredRobot.of_text(f"{name}.xml", text)
     usual = UsualInput.of(traces, alarm.detector.arm)
     alarm = replace(alarm, inputs=usual, robot=robot)
     _check_usable(alarm, traces)

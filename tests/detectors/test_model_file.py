@@ -88,6 +88,7 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_but_json_a
     assert (container["format"], container["kind"]) == ("tauguard model", "collision-alarm")
     assert container["version"] == files.VERSION
     assert set(container["made_with"]) == {"tauguard", "mujoco", "numpy", "scikit-learn"}
+    assert container["arm"]["file"] == "cura6.xml"
     assert container["arm"]["joints"] == list(alarm.detector.arm.robot.joint_names)
     regressor = alarm.detector.regressor
     np.testing.assert_array_equal(
