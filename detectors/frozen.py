@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+from tauguard.findings import ArgumentError
+
 
 class Frozen:
     """Base of frozen dataclasses whose cached native parts are neither copied nor pickled."""
@@ -15,3 +17,18 @@ class Frozen:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+
+
+class Unshared:
+    """An object with native state, which a shallow copy would share with the original."""
+
+    def __copy__(self) -> Any:
+        """Refuse.
+
+        Raises:
+            ArgumentError: always.
+        """
+        raise ArgumentError(
+            f"copy.copy of {type(self).__name__}: both copies would continue the same native "
+            "state; make a new stream with `stream()`"
+        )

@@ -19,7 +19,7 @@ from tauguard.detectors.events import (
 )
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.features.front_end import NativeStream, plain_residual
-from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.frozen import Frozen, Unshared
 from tauguard.detectors.samples import same_rate
 from tauguard.detectors.scores.baselines import FittedThresholds
 from tauguard.detectors.scores.method import FittedMethod
@@ -164,7 +164,7 @@ def _finite(score: Array, trace: Trace) -> Array:
     return score
 
 
-class AlarmStream:
+class AlarmStream(Unshared):
     """An alarm computed sample by sample along one recording.
 
     Attributes:

@@ -23,7 +23,7 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
 from tauguard.detectors.estimation.velocity import SLOWEST
 from tauguard.detectors.events import undisturbed_rows
-from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.frozen import Frozen, Unshared
 from tauguard.detectors.samples import check_trace, common_interval
 from tauguard.findings import ArgumentError
 from tauguard.traces.trace import Trace
@@ -69,7 +69,7 @@ class Scaling(Frozen):
         return found
 
 
-class NativeStream:
+class NativeStream(Unshared):
     """The scores of one recording, computed sample by sample.
 
     Attributes:

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import pickle
+from copy import copy as shallow_copy
 from pathlib import Path
 
 import mujoco
@@ -129,6 +130,13 @@ def test_a_stream_scores_as_the_batch_does(fitted, unseen, name, begin, count, n
 def test_a_stream_scores_as_the_batch_does_while_it_settles(detector, unseen):
     trace = first(unseen[1], 3_300)
     assert streamed(detector.stream(), trace).tobytes() == detector.scores(trace).tobytes()
+
+
+def test_a_shallow_copy_of_a_stream_with_native_state_is_refused(detector):
+    stream = detector.stream()
+    if hasattr(stream, "native"):
+        with pytest.raises(ValueError, match="both copies would continue the same native state"):
+            shallow_copy(stream)
 
 
 def test_hard_collisions_score_above_free_motion(detector, unseen):
