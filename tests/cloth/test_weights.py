@@ -99,6 +99,18 @@ def test_edges_apart_by_the_minimum_distance_have_the_nearest_points():
     assert 0.24 < gap < 0.25 + 1e-6
 
 
+@pytest.mark.parametrize("vertex", [True, False])
+def test_normals_follow_the_order_of_the_vertices(vertex):
+    x = np.random.default_rng(6).normal(size=(2000, 2, 4, 3))
+    found = (vertex_face if vertex else edge_edge)(x[:, 0], x[:, 1])
+    at = x[:, 0] + found.toi.clip(0, 1)[:, None, None] * (x[:, 1] - x[:, 0])
+    a, b, c, d = at[found.hit].transpose(1, 0, 2)
+    wanted = np.cross(c - b, d - b) if vertex else np.cross(b - a, d - c)
+    wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+    assert found.hit.sum() > 100
+    np.testing.assert_allclose(found.normal[found.hit], wanted, atol=1e-9)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_frames_describe_as_single_queries_do(kind):
     """Pairs that share no vertex, far from each other, in one mesh."""
