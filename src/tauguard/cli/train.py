@@ -169,14 +169,16 @@ def labelled_motion(
 ) -> Detector:
     """Train on labelled recordings."""
     import tauguard as tg
+    from tauguard.detectors import make_detector
 
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ArgumentError(
             f"--calibration {calibration}: the same folder as --traces; give other recordings"
         )
+    settings = make_detector(method)  # before the recordings are read, which takes a while
     return tg.train(
         tg.read_logs(traces, arm=arm),
-        method=method,
+        method=settings,
         false_alarms_per_hour=rate,
         folds=3 if folds is None else folds,
         calibration=None if calibration is None else tg.read_logs(calibration),
