@@ -7,6 +7,8 @@
 #include "support_distance.hpp"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "support_pieces.hpp"
 #include "tauguard/geometry/scratch.hpp"
@@ -63,6 +65,43 @@ double along(const SupportShape& a, const SupportShape& b, const Vec3& n) {
   return dot(n, b.support(-1.0 * n) - a.support(n));
 }
 
+// Looks for the least depth from directions all over the sphere, where the polytope of an overlap
+// ended before its nearest face was final. Returns whether d was improved.
+bool search(const SupportShape& a, const SupportShape& b, double size, Distance* d) {
+  constexpr int directions = 256, rounds = 40;
+  std::array<std::pair<double, Vec3>, directions> tried;
+  for (int k = 0; k < directions; ++k) {  // a Fibonacci lattice
+    const double z = 1 - (2 * k + 1.0) / directions, turn = k * M_PI * (3 - std::sqrt(5.0)),
+                 across = std::sqrt(1 - z * z);
+    const Vec3 n = {across * std::cos(turn), across * std::sin(turn), z};
+    tried[k] = {along(a, b, n), n};
+  }
+  std::partial_sort(tried.begin(), tried.begin() + 8, tried.end(),
+                    [](const auto& x, const auto& y) { return x.first > y.first; });
+  bool improved = false;
+  for (int k = 0; k < 8; ++k) {
+    auto [value, n] = tried[k];
+    double step = 0.1;
+    for (int round = 0; round < rounds; ++round) {
+      Vec3 side{};
+      side[geometry::smallest_axis(n)] = 1;
+      const Vec3 e = cross(n, side), u = (1 / norm(e)) * e, v = cross(n, u);
+      const Vec3 from = n;
+      for (const Vec3& t : {u, -1.0 * u, v, -1.0 * v}) {
+        const Vec3 m = from + step * t, unit = (1 / norm(m)) * m;
+        const double x = along(a, b, unit);
+        if (x > value) value = x, n = unit;
+      }
+      if (n == from) step *= 0.5;
+    }
+    Distance next = *d;
+    next.lower = value, next.n = n;
+    const bool exact = sharpen(a, b, size, &next);
+    if (next.lower > d->lower && exact) *d = next, improved = true;
+  }
+  return improved;
+}
+
 SignedDistance of_pair(const SupportShape& a, const SupportShape& b) {
   // Rounding of the support points: about a dozen operations lead to each coordinate.
   const double rounding = 64 * unit_roundoff * (a.magnitude() + b.magnitude());
@@ -88,7 +127,9 @@ SignedDistance of_pair(const SupportShape& a, const SupportShape& b) {
   penetration(a, b, &d, resolution, most_faces);
   const double inner = d.lower, outer = along(a, b, d.n);
   d.lower = outer;
-  if (inner - outer > sharp * size && sharpen(a, b, size, &d)) {
+  bool sharpened = inner - outer > sharp * size && sharpen(a, b, size, &d);
+  if (inner - d.lower > 1e-9 * size) sharpened = search(a, b, size, &d) || sharpened;
+  if (sharpened) {
     const double depth = -std::min(0.0, d.lower);
     const Vec3 middle = 0.5 * (d.on_a + d.on_b);
     return {-depth, middle + (0.5 * depth) * d.n, middle - (0.5 * depth) * d.n, d.n};
