@@ -9,7 +9,9 @@ from tauguard.lazy import on_demand
 __getattr__, __dir__, __all__ = on_demand(
     __name__,
     {
+        "arms": "ARMS Arm logs",
         "fetching": "fetch",
         "manifest": "DataSet data_folder is_complete sets",
+        "tauguard.detectors.evaluation.matching": "Contact",
     },
 )

@@ -70,9 +70,9 @@ def fetch(
     with _alone(folder):
         remove_parts(folder)
         failed = []
-        for one in wanted:
+        for dataset in wanted:
             try:
-                _fetch_set(one, base, folder, report)
+                _fetch_set(dataset, base, folder, report)
             except _SetError as error:
                 failed.append(str(error))
     if failed:
@@ -84,31 +84,33 @@ class _SetError(Exception):
     """A set is not complete; the next one may be."""
 
 
-def _fetch_set(one: DataSet, base: str | None, folder: Path, report: Report) -> None:
-    report(one.notice().rstrip())
-    with _room_on_disk(folder, one):
+def _fetch_set(dataset: DataSet, base: str | None, folder: Path, report: Report) -> None:
+    report(dataset.notice().rstrip())
+    with _room_on_disk(folder, dataset):
         (folder / "licences").mkdir(exist_ok=True)
-        write_changed(folder / "licences" / f"{one.name}.txt", one.notice())
-        store, loaded, made = folder / "originals" / one.name, 0, 0
-        known = [log for log in one.converted if log.sha256]
-        if len(known) == len(one.converted) and all(is_complete(folder, log) for log in known):
-            report(f"{one.name}: complete, {len(known)} files in {folder}")
+        write_changed(folder / "licences" / f"{dataset.name}.txt", dataset.notice())
+        store, loaded, made = folder / "originals" / dataset.name, 0, 0
+        hashed_logs = [log for log in dataset.converted if log.sha256]
+        if len(hashed_logs) == len(dataset.converted) and all(
+            is_complete(folder, log) for log in hashed_logs
+        ):
+            report(f"{dataset.name}: complete, {len(hashed_logs)} files in {folder}")
             return
-        for original in one.originals:
+        for original in dataset.originals:
             if not is_complete(store, original):
-                _download(_address(one, original, base), store, original)
+                _download(_address(dataset, original, base), store, original)
                 loaded += 1
-        for log in one.converted:
-            made += _convert(one, log, store, folder)
+        for log in dataset.converted:
+            made += _convert(dataset, log, store, folder)
     report(
-        f"{one.name}: {loaded} of {len(one.originals)} files downloaded, {made} of "
-        f"{len(one.converted)} converted, in {folder}"
+        f"{dataset.name}: {loaded} of {len(dataset.originals)} files downloaded, {made} of "
+        f"{len(dataset.converted)} converted, in {folder}"
     )
 
 
-def _address(one: DataSet, original: Original, base: str | None) -> str:
+def _address(dataset: DataSet, original: Original, base: str | None) -> str:
     path = urllib.parse.quote(original.path)
-    return f"{one.base}{path}" if base is None else f"{base.rstrip('/')}/{one.name}/{path}"
+    return f"{dataset.base}{path}" if base is None else f"{base.rstrip('/')}/{dataset.name}/{path}"
 
 
 def _download(url: str, store: Path, original: Original) -> None:
@@ -117,8 +119,8 @@ def _download(url: str, store: Path, original: Original) -> None:
         if attempt:
             time.sleep(PAUSE * 2 ** (attempt - 1))
         content, trouble, final = _transfer(url)
-        if not trouble and (got := hashed(content, original.hash)) != original.hash:
-            trouble = f"{len(content)} bytes with the hash {got}, expected {original.hash}"
+        if not trouble and (actual := hashed(content, original.hash)) != original.hash:
+            trouble = f"{len(content)} bytes with the hash {actual}, expected {original.hash}"
             trouble += f" of {original.bytes} bytes" if original.bytes else ""
         if not trouble:
             target = store / original.path
@@ -152,15 +154,17 @@ def _transfer(url: str) -> tuple[bytes, str, bool]:
     return content.getvalue(), "", False
 
 
-def _convert(one: DataSet, log: Converted, store: Path, folder: Path) -> bool:
+def _convert(dataset: DataSet, log: Converted, store: Path, folder: Path) -> bool:
     """Make one log of its originals, unless it is there; whether it was made."""
     if log.sha256 and is_complete(folder, log):
         return False
     contents = [(store / path).read_bytes() for path in log.originals]
     try:
-        content = CONVERSIONS[one.conversion](contents)
+        content = CONVERSIONS[dataset.conversion](contents)
     except (ValueError, IndexError, KeyError, struct.error) as error:
-        raise FileError(f"{log.originals[0]} of {one.name} cannot be converted: {error}") from None
+        raise FileError(
+            f"{log.originals[0]} of {dataset.name} cannot be converted: {error}"
+        ) from None
     if log.sha256 and hashed(content, "") != log.sha256:
         raise FileError(
             f"{log.path}: the conversion gives the hash {hashed(content, '')}, expected "
@@ -172,7 +176,7 @@ def _convert(one: DataSet, log: Converted, store: Path, folder: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _room_on_disk(folder: Path, one: DataSet) -> Iterator[None]:
+def _room_on_disk(folder: Path, dataset: DataSet) -> Iterator[None]:
     """Say what to do if the disk is full."""
     try:
         yield
@@ -180,9 +184,9 @@ def _room_on_disk(folder: Path, one: DataSet) -> Iterator[None]:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
             raise
         raise FileError(
-            f"{folder}: no room on the disk for {one.name} ({one.size / 1e6:.0f} MB of originals, "
-            "and as much again for the logs); make room, or name another folder in TAUGUARD_DATA, "
-            "and run the same command again: complete files are kept"
+            f"{folder}: no room on the disk for {dataset.name} ({dataset.size / 1e6:.0f} MB of "
+            "originals, and as much again for the logs); make room, or name another folder in "
+            "TAUGUARD_DATA, and run the same command again: complete files are kept"
         ) from error
 
 

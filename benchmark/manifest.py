@@ -93,12 +93,12 @@ def _set(name: str, entry: dict[str, Any]) -> DataSet:
     originals = [Original(folder + path, size, sha) for path, size, sha in entry.pop("files")]
     by_path = {original.path: original for original in originals}
     converted = []
-    for path, source, *known in entry.pop("logs"):
+    for path, source, *hashes in entry.pop("logs"):
         named = [f"{folder}{source}/{part}".replace("//", "/") for part in parts]
         sources = tuple(n for n in named if n in by_path) or (folder + source,)
         if entry["conversion"] == "same":
-            known = [by_path[sources[0]].bytes, by_path[sources[0]].hash]
-        converted.append(Converted(path, sources, *known))
+            hashes = [by_path[sources[0]].bytes, by_path[sources[0]].hash]
+        converted.append(Converted(path, sources, *hashes))
     entry["needs"] = tuple(entry.pop("needs", ()))
     return DataSet(name, originals=tuple(originals), converted=tuple(converted), **entry)
 
@@ -109,19 +109,20 @@ def chosen(name: str) -> list[DataSet]:
     Raises:
         ArgumentError: no such set, or one that tauguard does not fetch.
     """
-    known = sets()
+    by_name = sets()
     if name == "all":
-        return [one for one in known.values() if one.base]
-    if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+        return [dataset for dataset in by_name.values() if dataset.base]
+    if name not in by_name:
+        near = difflib.get_close_matches(name, by_name, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(by_name)}"
         raise ArgumentError(f"no data set {name!r}: {hint}")
-    one = known[name]
-    if not one.base:
+    dataset = by_name[name]
+    if not dataset.base:
         raise ArgumentError(
-            f"{name} is not fetched by tauguard: get it at {one.page} (licence: {one.licence})"
+            f"{name} is not fetched by tauguard: get it at {dataset.page} "
+            f"(licence: {dataset.licence})"
         )
-    return [*(known[other] for other in one.needs), one]
+    return [*(by_name[other] for other in dataset.needs), dataset]
 
 
 def data_folder() -> Path:
@@ -143,7 +144,7 @@ def hashed(content: bytes, like: str) -> str:
 def is_complete(folder: Path, part: Original | Converted) -> bool:
     """Whether a file is in the folder with the right content (if a hash of it is known)."""
     path = folder / part.path
-    known = part.hash if isinstance(part, Original) else part.sha256
+    expected = part.hash if isinstance(part, Original) else part.sha256
     if not path.is_file() or (part.bytes and path.stat().st_size != part.bytes):
         return False
-    return not known or hashed(path.read_bytes(), known) == known
+    return not expected or hashed(path.read_bytes(), expected) == expected

@@ -175,7 +175,7 @@ def chance(starts: Array, spans: Array, span: Interval, shifts: int = Rule.shift
     """
     hits = np.zeros(len(spans))
     length = span[1] - span[0]
-    for k in range(shifts if len(starts) and length > 0 else 0):
+    for k in range(shifts if len(starts) and len(spans) and length > 0 else 0):
         moved = np.sort(span[0] + (starts - span[0] + length * k / shifts) % length)
         hits += np.isfinite(_first_in(moved, spans))
     return hits / max(shifts, 1)

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned, touched
+from tauguard.benchmark.arms import ARMS, files, initial_arm, is_there
+from tauguard.benchmark.arms import logs as logs_of
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import CollisionAlarm, make_detector
 from tauguard.detectors.alarms.training import train
@@ -15,12 +16,18 @@ from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tauguard.envs import simulate
 from tauguard.models import Mismatch
+from tauguard.traces.resample import resampled
 from tauguard.traces.trace import Trace
 
 #: Samples of a simulation that are kept [Hz].
 RATE = 500.0
 #: One in this many collision-free logs of a real arm is left out of training.
 LEFT_OUT = 3
+
+
+def thinned(trace: Trace, rate: float) -> Trace:
+    """The trace at ``rate`` [Hz], without truth."""
+    return replace(resampled(trace, rate), truth=None)
 
 
 def trained(traces: Sequence[Trace], rate: float, per_hour: float) -> CollisionAlarm:
@@ -53,8 +60,8 @@ def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
     yield simulated(quick, seed)
     if quick:
         return
-    for arm in available():
-        if "free" in arm.free:
+    for arm in ARMS.values():
+        if is_there(arm) and any("/free/" in pattern for pattern in arm.free) and not arm.blind:
             yield real(arm.name)
 
 
@@ -75,13 +82,12 @@ def simulated(quick: bool, seed: int) -> ArmLogs:
 
 def real(name: str) -> ArmLogs:
     """A real arm, trained on two thirds of its collision-free logs and tested on all others."""
-    arm = next(arm for arm in ARMS if arm.name == name)
-    free = recordings(replace(arm, free=("free",)))
+    arm = ARMS[name]
+    every = {log.name: log for log, _ in logs_of(name)}
+    free = [path.stem for path in files(arm, "free") if path.parent.name == "free"]
     own = [log for k, log in enumerate(free) if k % LEFT_OUT]
-    training = [free[log] for log in own]
-    detector = FreeMotion().fit(training, nominal(arm))
+    training = [every[log] for log in own]
+    detector = FreeMotion().fit(training, initial_arm(arm))
     usual = UsualInput.of([r.trace for r in training], detector.arm)
     alarm = CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual)
-    others = recordings(arm) | {log: one.recording for log, one in touched(arm).items()}
-    logs = {log: r.trace for log, r in (free | others).items() if log not in own}
-    return ArmLogs(name, alarm, logs)
+    return ArmLogs(name, alarm, {log: r.trace for log, r in every.items() if log not in own})

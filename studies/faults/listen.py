@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.faults.arms import trained
-from studies.real_arms.arms import thinned
+from studies.faults.arms import thinned, trained
 from tauguard.datasets import read_log
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import load_model, save_model

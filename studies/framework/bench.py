@@ -32,6 +32,7 @@ def command(
     detector: str | None = None,
     robot: str | None = None,
     keep: Path | None = None,
+    alarms: Path | None = None,
     workers: int | None = None,
     tables: bool = False,
     json: Path | None = None,
@@ -50,10 +51,13 @@ def command(
         name: a study, or one part as STUDY-PART: `tauguard bench list` names them; or `all`.
         quick: a shorter run, 60 s or less per part on 2 cores (a full run takes up to 30 minutes).
         seed: seed of every random input.
-        detector: module:Class of your own, an additional method of the study `detection`.
+        detector: module:Class of your own, an additional method of the studies `detection` and
+            `real_arms-table`.
         robot: arms by name or file, separated by commas, for the parts that take any arm.
         keep: folder of the job cache. Jobs with results in the cache are not run again, unless
             versions or the sources of simulation and detectors have changed.
+        alarms: folder with a card and alarms of a method on the benchmark's logs, for
+            `real_arms-table`.
         workers: processes of the parts that use several (default: all processors).
         tables: print every table.
         json: write the rows here as JSON.
@@ -66,7 +70,7 @@ def command(
     if name == "all":
         from studies.framework.collect import collect
 
-        if detector or robot or keep or workers or tables or json or figure:
+        if detector or robot or keep or alarms or workers or tables or json or figure:
             raise ValueError("bench all takes --quick, --seed and --out alone")
         if collect(out, all_parts(), quick=quick, seed=seed):
             raise SystemExit(1)
@@ -74,7 +78,8 @@ def command(
     if workers is not None and workers < 1:
         raise ValueError(f"--workers {workers}: expected 1 or more")
     Workers.count = workers
-    options = {"detector": detector, "robot": robot, "keep": str(keep) if keep else None}
+    options = {"detector": detector, "robot": robot}
+    options |= {"keep": str(keep) if keep else None, "alarms": str(alarms) if alarms else None}
     given = {option: value for option, value in options.items() if value is not None}
     chosen = _taking(find(name), given, name)
     for full, one in chosen.items():

@@ -17,17 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.real_arms.arms import (
-    ARMS,
-    BEGINS,
-    ENDS,
-    available,
-    folder,
-    nominal,
-    recordings,
-    sensor_spans,
-    touched,
-)
+from tauguard.benchmark.arms import ARMS, files, initial_arm, is_there, logs
+from tauguard.benchmark.contacts import BEGINS, ENDS, sensor_spans
 from tauguard.detectors import ArmModel, Diagnoser, Diagnosis
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Load
@@ -61,28 +52,29 @@ NOTES = {
 
 def measure(quick: bool, seed: int) -> list[Row]:
     """All rows, or one row that says that the data are absent."""
-    arm = next((a for a in ARMS if a.name == ARM), None)
-    if arm is None or arm not in available():
-        return [{"study": "force", "log": "no logs: set TAUGUARD_DATA to their folder"}]
-    free, start = recordings(arm), nominal(arm)
-    fitted = FreeMotion().fit(list(free.values()), start).carrying(Load())
-    trace = touched(arm)[LOG].recording.trace
+    arm = ARMS[ARM]
+    if not is_there(arm):
+        return [{"study": "force", "log": f"no logs: run `tauguard data fetch {ARM}`"}]
+    free = [log for log, _ in logs(ARM, "free")]
+    fitted = FreeMotion().fit(free, initial_arm(arm)).carrying(Load())
+    trace = next(log.trace for log, _ in logs(ARM, "contact") if log.name == LOG)
     force = sensor()
     found = CollisionAlarm(fitted, 1.0, CONFIRMATION).detect(trace).alarms
-    surface, _ = arm_surface(folder() / ARM / f"{ARM}.urdf", fitted.arm.robot.joint_names)
+    surface, _ = arm_surface(arm.file, fitted.arm.robot.joint_names)
     causes = Diagnoser.of(fitted.arm, surface, True).diagnose(trace, found)
     size = np.linalg.norm(force, axis=1)
     spans = sensor_spans(trace.t, size)
     rows = [row for cause in causes if (row := _beside(trace.t, size, cause)) is not None]
     limit = np.full(fitted.arm.robot.joints, np.inf)
-    twin = fit_twin(fitted.arm, [r.trace for r in free.values()], limit)
+    twin = fit_twin(fitted.arm, [log.trace for log in free], limit)
     rows += pushed(fitted.arm, twin.drive.friction, trace, force, spans)
     return [*rows, *_errors(rows)]
 
 
 def sensor() -> Array:
     """Force of the log [N], in the sensor's frame, shape (T, 3)."""
-    table = np.genfromtxt(folder() / ARM / "contact" / f"{LOG}.csv", delimiter=",", names=True)
+    file = next(path for path in files(ARMS[ARM], "contact") if path.stem == LOG)
+    table = np.genfromtxt(file, delimiter=",", names=True)
     return np.stack([table[f"F{axis}"] for axis in "xyz"], axis=1)
 
 
