@@ -109,10 +109,10 @@ def test_no_page_is_lost():
 
 
 def test_the_manual_stays_short_enough_to_be_read():
-    """No page over 1,900 words, the manual under 22,500, lines of prose within 120 characters."""
+    """No page over 1,900 words, the manual under 24,500, lines of prose within 120 characters."""
     words = {page: len(page.read_text().split()) for page in PAGES[1:]}
     assert max(words.values()) <= 1_900, max(words, key=words.get)
-    assert sum(words.values()) <= 22_500
+    assert sum(words.values()) <= 24_500
     for page in PAGES:
         for number, line in enumerate(page.read_text().splitlines(), 1):
             assert len(line) <= 120 or line.startswith("|") or "](" in line, f"{page}:{number}"
