@@ -451,7 +451,7 @@ def test_a_field_of_ones_own_detector_loads_with_the_same_bits(
     same(load_model(path).detector.x, x)
 
 
-@pytest.mark.parametrize("x", REFUSED, ids=lambda x: f"{type(x).__name__} {x!r:.30}")
+@pytest.mark.parametrize("x", REFUSED, ids=lambda x: type(x).__name__)
 def test_a_field_that_no_file_can_keep_is_refused_before_training(x, unseen, arm, monkeypatch):
     monkeypatch.setattr(Own, "fit", lambda self, traces, arm: pytest.fail("it was trained"))
     with pytest.raises(ArgumentError, match=r"^Own\.x[.0-9]*( \.\.\.)?: "):
