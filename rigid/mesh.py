@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
-from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
+from tauguard.geometry import finite, frozen, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.closed import check_closed, first_of_parts, merged_corners
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
@@ -103,8 +103,6 @@ class MeshTree:
             raise ArgumentError(f"faces: {len(triangles)} rows, at most {2**28 - 1} fit")
         if np.abs(points).max() > 1e30:
             raise ArgumentError("vertices: a coordinate beyond 1e30; scale the mesh down")
-        if 0 < np.abs(points).max() < 1e-40:
-            raise ArgumentError("vertices: all coordinates are below 1e-40; scale the mesh up")
         if volume not in self.volumes:
             raise ArgumentError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
         self._vertices, self._faces, self._volume = points, triangles, volume
@@ -179,7 +177,7 @@ class MeshTree:
     @cached_property
     def _corners(self) -> NDArray[np.int32]:
         """Corners of the faces; those at the same position have the same number. Shape (F, 3)."""
-        return merged_corners(self._vertices, self._faces)
+        return frozen(merged_corners(self._vertices, self._faces))
 
     @cached_property
     def _open_because(self) -> str:
@@ -194,22 +192,22 @@ class MeshTree:
     def used_corners(self) -> NDArray[np.float64]:
         """The corners of faces, each position once. Shape (C, 3)."""
         rows = np.unique(self._corners, return_index=True)[1]
-        return np.ascontiguousarray(self._vertices[self._faces.ravel()[rows]])
+        return frozen(self._vertices[self._faces.ravel()[rows]])
 
     @cached_property
     def part_corners(self) -> NDArray[np.float64]:
         """A corner of each part: of faces that are connected by corners. Shape (P, 3)."""
-        return np.asarray(self._vertices[self._faces[first_of_parts(self._corners), 0]])
+        return frozen(self._vertices[self._faces[first_of_parts(self._corners), 0]])
 
     @cached_property
     def low(self) -> NDArray[np.float64]:
         """The smallest coordinates of corners of faces. Shape (3,)."""
-        return np.asarray(self.used_corners.min(axis=0))
+        return frozen(self.used_corners.min(axis=0))
 
     @cached_property
     def high(self) -> NDArray[np.float64]:
         """The largest coordinates of corners of faces. Shape (3,)."""
-        return np.asarray(self.used_corners.max(axis=0))
+        return frozen(self.used_corners.max(axis=0))
 
     @property
     def closed(self) -> bool:
@@ -240,6 +238,7 @@ class MeshTree:
 
     def _checked_points(self, points: ArrayLike) -> NDArray[np.float64]:
         """Points for a query that needs a closed mesh."""
+        check_magnitude(self)
         if self._open_because:
             raise ArgumentError(self._open_because)
         batch = finite("points", points, (None, 3))
@@ -293,6 +292,7 @@ class MeshTree:
             ArgumentError: wrong shapes or lengths, an entry that is not finite, a direction of
                 length 0, or an origin beyond 1e100 (named with its row).
         """
+        check_magnitude(self)
         rays = [
             finite(name, np.atleast_2d(np.asarray(value)), (None, 3))
             for name, value in (("origins", origins), ("directions", directions))
@@ -317,7 +317,7 @@ class MeshTree:
         """Unit normals of the faces; 0 for a face without area. Shape (F, 3)."""
         a, b, c = np.moveaxis(self._vertices[self._faces], 1, 0)
         normal = np.cross(unit_vectors(b - a), unit_vectors(c - a))
-        return unit_vectors(normal)
+        return frozen(unit_vectors(normal))
 
     def self_contacts(self, limit: int = 10_000_000) -> MeshContacts:
         """Pairs of faces of this mesh that intersect: self-intersection at rest.
@@ -372,6 +372,16 @@ class MeshTree:
         return self.time_of_impact(other, Motion(start, move, np.zeros(3)), threads)
 
 
+def check_magnitude(*sides: object) -> None:
+    """Raise an ``ArgumentError`` for a mesh whose squared lengths lose their digits."""
+    for mesh in sides:
+        if isinstance(mesh, MeshTree) and 0 < np.abs(mesh._vertices).max() < 1e-40:
+            raise ArgumentError(
+                "all coordinates of a mesh are below 1e-40; scale the scene up for distances, rays "
+                "and motions"
+            )
+
+
 def checked_pair(tree: MeshTree, other: MeshTree) -> None:
     """Raise an ``ArgumentError`` if ``other`` is no mesh, or has another kind of volume."""
     if not isinstance(other, MeshTree):
@@ -406,6 +416,7 @@ def first_touch(
     a: MeshTree, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int
 ) -> MeshImpacts:
     """The first contact of two moving meshes, whose volumes may differ."""
+    check_magnitude(a, b)
     count = common_length({"motion_a": len(motion_a), "motion_b": len(motion_b)})
     out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
     moved = (*motion_a.packed, *motion_b.packed)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.arrays import in_a_line
 from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
-from tauguard.rigid.mesh import MeshContacts, MeshTree, checked_pair
+from tauguard.rigid.mesh import MeshContacts, MeshTree, check_magnitude, checked_pair
 from tauguard.rigid.motion import common_length, poses
 from tauguard.rigid.results import Distances
 
@@ -52,6 +52,7 @@ def mesh_distance(
             (named with the row).
     """
     checked_pair(a, b)
+    check_magnitude(a, b)
     at_a = poses("pose_a", np.eye(4) if pose_a is None else pose_a)
     at_b = poses("pose_b", np.eye(4) if pose_b is None else pose_b)
     count = common_length({"pose_a": len(at_a), "pose_b": len(at_b)})

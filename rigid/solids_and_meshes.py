@@ -13,7 +13,7 @@ from tauguard.findings import ArgumentError
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.curved import HalfSpaces
-from tauguard.rigid.mesh import MeshOverlap, MeshTree, first_touch
+from tauguard.rigid.mesh import MeshOverlap, MeshTree, check_magnitude, first_touch
 from tauguard.rigid.mesh_distance import MeshPairDistances, mesh_distance
 from tauguard.rigid.motion import Motion, PoseLike, bounded, common_length, optional_poses
 from tauguard.rigid.motion_start import with_start
@@ -233,6 +233,7 @@ def distance(
         return mesh_distance(a, b, pose_a, pose_b, threads)
     at_a, at_b = optional_poses("pose_a", pose_a), optional_poses("pose_b", pose_b)
     if beside := _mesh_beside(a, b, at_a, at_b):
+        check_magnitude(a, b)
         mesh, bodies, count, swapped = beside
         out, face = np.empty((count, 10)), np.empty(count, dtype=np.int32)
         mesh._mesh.distances(bodies, mesh.closed, out, face, thread_count(threads))
@@ -361,6 +362,7 @@ def _first_impact(
     """The first time at which the bodies, one of which is convex, are within ``target``."""
     lengths = {"motion_a": len(motion_a), "motion_b": len(motion_b)}
     if beside := _mesh_beside(a, b, target=target):
+        check_magnitude(a, b)
         mesh, bodies, count, swapped = beside
         if bodies.curved:
             side = "a" if swapped else "b"

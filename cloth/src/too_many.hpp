@@ -6,9 +6,9 @@
 
 namespace tauguard::cloth {
 
-struct TooMany : std::invalid_argument {
+struct TooMany : std::runtime_error {
   TooMany(const std::string& what, std::size_t limit)
-      : std::invalid_argument("limit: more than " + std::to_string(limit) + " " + what +
+      : std::runtime_error("limit: more than " + std::to_string(limit) + " " + what +
                               " in this step; a larger limit= allows them and takes more memory") {}
 };
 

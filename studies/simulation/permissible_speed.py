@@ -25,9 +25,9 @@ REGIONS = ("hand", "lower_arm", "chest")
 DELAYS = (0.005, 0.02, 0.05, 0.1)
 NOTES = {
     "contact": "force in MuJoCo over the predicted one: 2.5 %, 50 %, 97.5 % of the contacts. peak: "
-    "of 0.6 s (free: until they part); lasting: after 0.5 s, if above 20 N are predicted",
+    "of 0.6 s (free: until they part); lasting: after 0.5 s, if above 20 N are predicted.",
     "at_limit": "contacts at the permissible speed. force_over_limit: the larger of peak and "
-    "lasting force in MuJoCo over its limit; above, above_1_1: fraction of contacts above 1, 1.1",
+    "lasting force in MuJoCo over its limit; above, above_1_1: fraction of contacts above 1, 1.1.",
 }
 
 
