@@ -36,7 +36,7 @@ NOTES = {
     "identification": "error: root mean square of the torque error on held-out logs, mean over "
     "joints [N m]; explained: 1 - error^2 / variance of the torque, worst moving joint and median; "
     "parameters: those that the logs determine, of all; ratio: time over tauguard's in this run, "
-    "which includes the detector's bounds",
+    "which includes the detector's bounds.",
 }
 NAMES = ("ur5", "ur10e", "ur3", "kuka_med7")  # the first one in a quick run
 #: Most samples of the peer's regressor, and the width of the fit to velocities [s].

@@ -58,10 +58,10 @@ SIZE = (11, 8.5)  #: of the figure [inch]
 QUICK = ("ur5",)
 NOTES = {
     "table": "found: with its 95 % interval; by chance: mean over shifts of the alarms; false "
-    "alarms in free min, an hour with the exact 95 % interval",
-    "summary": "sha256 of the table as CSV",
+    "alarms in free min, an hour with the exact 95 % interval.",
+    "summary": "sha256 of the table as CSV.",
     "rank": "by contacts found beyond chance: mean, over arms and truths, of the fraction found "
-    "less that by chance; methods of the table at 60 false alarms an hour",
+    "less that by chance; methods of the table at 60 false alarms an hour.",
 }
 
 
