@@ -9,7 +9,7 @@ namespace tauguard::cloth {
 struct TooMany : std::runtime_error {
   TooMany(const std::string& what, std::size_t limit)
       : std::runtime_error("limit: more than " + std::to_string(limit) + " " + what +
-                              " in this step; a larger limit= allows them and takes more memory") {}
+                           " in this step; a larger limit= allows them and takes more memory") {}
 };
 
 }  // namespace tauguard::cloth
