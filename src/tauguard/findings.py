@@ -18,6 +18,12 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 if TYPE_CHECKING:
     import pandas
 
+__all__ = [
+    "ArgumentError", "FileError", "Finding", "Findings", "LogError", "MismatchError",
+    "ModelFileError", "RefusedError", "TauguardError", "as_flags", "cause", "note", "preceded_by",
+    "raise_errors",
+]  # fmt: skip
+
 Severity = Literal["note", "warning", "error"]
 
 
