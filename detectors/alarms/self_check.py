@@ -56,7 +56,7 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 def check_alarms(alarm: CollisionAlarm) -> None:
     """Refuse a detector that alarms at no impact, or all the time while the arm is at rest.
 
-        A learned score and the thresholds on the residual are checked separately.
+    A learned score and the thresholds on the residual are checked separately.
 
     Raises:
         ArgumentError: says which of the two, or that a score is not a number.

@@ -16,7 +16,7 @@ import numpy as np
 
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.alarms.beside_free_motion import BesideFreeMotion
-from tauguard.detectors.alarms.self_check import check_alarms, check_ranges
+from tauguard.detectors.alarms.self_check import check_alarms, check_ranges, standing_then_hit
 from tauguard.detectors.calibration.identification import Subsets
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.detectors.calibration.recording import (
@@ -144,12 +144,20 @@ def train_and_score(
 def _check_usable(alarm: CollisionAlarm, traces: Sequence[Trace]) -> None:
     """Refuse a detector that no model file would be read with.
 
+    A method of the user's own that cannot score a trace of bare signals is not judged here.
+
     Raises:
         ArgumentError: says how much motion it was trained on, and how much is needed.
     """
+    detector = alarm.detector
     try:
         with np.errstate(all="ignore"):
             check_ranges(alarm)
+            bare, _ = standing_then_hit(detector.arm, detector.dt, detector.settle)
+            try:
+                detector.scores(bare)
+            except Exception:
+                return
             check_alarms(alarm)
     except ArgumentError as error:
         free = [float(t.t[-1] - t.t[0]) for t in traces if not _collisions(t)]
