@@ -104,7 +104,7 @@ class Calibration(Result):
             rows.append(row)
         return rows
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """The source of the scale, a table of the joints, and one of the held-out logs."""
         source = SOURCES[self.scale] + (f" {self.preset}" if self.scale == "preset" else "")
         parts = [f"scale of the torques: from {source}", table(list(map(self._text, self.rows())))]

@@ -208,7 +208,7 @@ class LogDetection(Result):
         causes = causes or [{}] * len(self.alarms)
         return [a._asdict() | cause for a, cause in zip(self.alarms, causes, strict=True)]
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """Alarms, faults, and the number of alarms per hour or the comparison with the labels."""
         return "\n".join(_lines(self.to_dict()))
 

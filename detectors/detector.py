@@ -210,7 +210,7 @@ class Detector(Result):
             result["false_alarms_per_hour"] = rate
         return result
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """What it was trained on, and its card, guarantee or expected rate of false alarms."""
         lines = [self._trained_on()]
         if self.validation is not None and isinstance(self.alarm.detector, FittedFreeMotion):

@@ -55,7 +55,7 @@ class Evaluation(Result):
         """The metrics and the findings as JSON values."""
         return {**self.metrics, "findings": finding_rows(self.findings)}
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """The metrics as a page of text."""
         page = text(self.metrics)
         diagnosis = self.metrics.get("diagnosis")

@@ -110,7 +110,7 @@ class Listening(Result):
             f"{len(session.faults())} faults, {session.ended}; state at the end: {session.state})"
         )
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """Collisions, faults, events of the connection, latencies and the state at the end."""
         result = self.to_dict()
         lines = [

@@ -11,7 +11,7 @@ import numpy as np
 
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.dynamics.same_arm import arm_difference
-from tauguard.findings import ArgumentError, Findings, MismatchError
+from tauguard.findings import ArgumentError, Findings, MismatchError, note
 from tauguard.models import BODY_REGIONS, BodyRegion, Robot, pin_model
 from tauguard.results import Result, Row, finding_rows
 from tauguard.speed.arm_states import ContactArm
@@ -117,10 +117,14 @@ class SpeedLimits(Result):
             f"{slow} of them too fast)"
         )
 
-    def __str__(self) -> str:
+    def text(self) -> str:
+        """Assumptions and findings, the lowest regions of each segment, what to slow down."""
         from tauguard.speed.page import text
 
         return text(self)
+
+    def __str__(self) -> str:
+        return self.text()
 
 
 def speed_limits(
@@ -169,6 +173,15 @@ def speed_limits(
     settings = options or SpeedOptions()
     if delay is not None and detector is not None:
         raise ArgumentError("give `delay=` or `detector=`, not both")
+    if not isinstance(robot, str | Path | Robot | None):
+        raise ArgumentError(
+            f"robot: {type(robot).__name__}; expected a name, a file or a Robot (a calibration is "
+            "a file after its `save`)"
+        )
+    if not isinstance(stop, Stop | None):
+        raise ArgumentError(f"stop: {stop!r:.40}; expected a `Stop`, such as Stop(category=2)")
+    if isinstance(detector, str | Path):
+        raise ArgumentError("detector: a file; expected what `tauguard.load_detector` returns")
     if delay is not None and not delay >= 0:
         raise ArgumentError(f"delay {delay} s: expected 0 or more")
     if not margin >= 1:
@@ -192,11 +205,19 @@ def speed_limits(
         None if detector is None else _delay_model(detector, motion, arm),
     )  # fmt: skip
     limits, segments = search.run()
+    findings = search.findings()
     if check and limits:
         limits = search.simulated(limits)
+        worst = max((x.simulated for x in limits if x.simulated > 0), default=0.0)
+        if worst > 1.02:
+            text = (
+                f"in MuJoCo, forces at the permissible speed reach {worst:.2f} of the limits over "
+                f"the margin; give `margin={margin * worst:.2f}`"
+            )
+            findings = Findings((*findings, note("check", text)))
     return SpeedLimits(
         motion, source if isinstance(source, str) else source.file, face, search.stop,
-        tuple(limits), tuple(segments), search.detection, margin, search.findings(),
+        tuple(limits), tuple(segments), search.detection, margin, findings,
     )  # fmt: skip
 
 

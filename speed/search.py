@@ -104,14 +104,9 @@ class Search:
         """What a reader must know of the assumptions."""
         made: list[Finding] = []
         source = self.arm.armature_source
-        if not any(word in source for word in ("given", "file", "calibrat")):
-            made.append(
-                note(
-                    "rotor-inertia",
-                    f"rotor inertia: {source}; forces grow with it, so identify it with "
-                    "`calibrate` or give it",
-                )
-            )
+        known = any(word in source for word in ("given", "file", "calibrat"))
+        advice = "" if known else "; forces grow with it, so identify it with `tauguard calibrate`"
+        made.append(note("rotor-inertia", f"rotor inertia: {source}{advice}"))
         made.append(
             note(
                 "limits",

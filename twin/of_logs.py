@@ -98,7 +98,7 @@ class TwinOfLogs(Result):
             "findings": finding_rows(self.findings),
         }
 
-    def __str__(self) -> str:
+    def text(self) -> str:
         """How similar twin and arm are, or why this is not known."""
         if self.likeness is None:
             why = (

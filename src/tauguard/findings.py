@@ -102,9 +102,16 @@ class TauguardError(ValueError):
             Finding(self.code, "error", found) if isinstance(found, str) else found
             for found in findings
         )
-        causes = [str(finding) for finding in self.findings if finding.severity == "error"]
+        causes = self.causes
         more = len(causes) - self.shown
         super().__init__("; ".join(causes[: self.shown]) + (f"; and {more} more" * (more > 0)))
+
+    @property
+    def causes(self) -> list[str]:
+        """The texts of the errors; they name words of ``accept=`` only if all can be accepted."""
+        errors = [finding for finding in self.findings if finding.severity == "error"]
+        acceptable = all(finding.accept for finding in errors)
+        return [str(finding) if acceptable else finding.text for finding in errors]
 
     def __reduce__(self) -> tuple[type[TauguardError], tuple[Finding, ...]]:
         return type(self), tuple(self.findings)

@@ -36,11 +36,13 @@ class Result:
 
         return pandas.DataFrame(self.rows())
 
+    def text(self) -> str:
+        """The result as text, without its findings."""
+        return "\n".join(line for line in (repr(self), text_table(self.rows())) if line)
+
     def __str__(self) -> str:
-        lines = [repr(self), text_table(self.rows())]
-        if self.findings:
-            lines.append(str(self.findings))
-        return "\n".join(line for line in lines if line)
+        """The text, and then each finding in a line."""
+        return "\n".join([self.text(), *finding_lines(self.findings)])
 
     def _repr_html_(self) -> str:
         notes = "".join(f"<li>{html.escape(line)}</li>" for line in finding_lines(self.findings))

@@ -61,6 +61,6 @@ def command(
     source = free.robot or robot
     target = arm.save(out or beside.with_name(f"{beside.stem}.calibrated{source.suffix}"))
     print_findings(arm.findings)
-    print(f"{arm}\n{target}: written")
+    print(f"{arm.text()}\n{target}: written")
     if json is not None:
         write_json(json, {"name": "calibrate", "robot": str(target), **arm.to_dict()})

@@ -96,7 +96,7 @@ def command(
             read, quiet=seconds, gains=gains, payload=carried, at_tool=at_tool
         )
     print_findings(found.findings)
-    print(found)
+    print(found.text())
     if json is not None:
         write_json(json, found.to_dict())
     if out is not None:

@@ -63,7 +63,7 @@ def command(
     for name, found in parts:
         metrics = found.to_dict()
         rows.append(metrics if data is None else {"split": name, **metrics})
-        print(f"{len(found.names)} recordings in {name}\n{found}")
+        print(f"{len(found.names)} recordings in {name}\n{found.text()}")
         if figure is not None:
             found.draw(figure if data is None else figure.with_stem(f"{figure.stem}-{name}"))
     if errors is not None:

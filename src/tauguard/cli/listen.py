@@ -103,7 +103,7 @@ def command(
 
         keep = record is not None
         result = tg.listen(detector, source, torque=torque, seconds=seconds, report=put, keep=keep)
-    print(result)
+    print(result.text())
     if record is not None:
         save(record, result)
     if json is not None:

@@ -18,4 +18,4 @@ def print_findings(findings: Iterable[Finding]) -> None:
 
 def causes(error: TauguardError) -> list[str]:
     """The errors among the findings, with arguments as flags."""
-    return [as_flags(str(one)) for one in error.findings if one.severity == "error"]
+    return [as_flags(text) for text in error.causes]

@@ -68,6 +68,7 @@ def command(
         json: write the results here as JSON.
     """
     import tauguard
+    from tauguard.findings import as_flags
     from tauguard.models import BODY_REGIONS, read_regions
     from tauguard.report import write_json
     from tauguard.speed import Stop, Tool, read_waypoints
@@ -87,7 +88,7 @@ def command(
         margin=margin,
         check=check,
     )
-    print(result)
+    print(as_flags(result.text()))
     if table is not None:
         write_rows(table, result.rows())
     if picture is not None:

@@ -107,7 +107,7 @@ def command(
         trained = tg.train(logs, gains=gains, false_alarms_per_hour=rate, accept=accept)
     trained.save(target)
     print_findings(trained.findings)
-    print(f"{target}: {trained}")
+    print(f"{target}: {trained.text()}")
     if card is not None:
         trained.card().draw(card)
         print(f"{card}: drawn")

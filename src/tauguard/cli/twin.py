@@ -59,7 +59,7 @@ def command(
     twin = tg.identify_twin(free, gains=gains, accept=accept, judge=others)
     print_findings(twin.findings)
     files = twin.save(out)
-    print(twin)
+    print(twin.text())
     if figure is not None and twin.likeness is not None:
         twin.draw(figure)
         print(f"{figure}: drawn")
