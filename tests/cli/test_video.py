@@ -28,7 +28,7 @@ CART = SceneObject(
 
 def run(*arguments, **chosen):
     """Without a display, and without MUJOCO_GL unless it is chosen."""
-    windows = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+    windows = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
     plain = {name: value for name, value in os.environ.items() if name not in windows}
     return subprocess.run(
         [sys.executable, "-c", MAIN, "video", *map(str, arguments)],
