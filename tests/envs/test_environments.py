@@ -338,7 +338,7 @@ def test_human_mode_without_a_display_says_what_would_work(monkeypatch):
     if sys.platform == "linux":
         with pytest.raises(RuntimeError, match="'rgb_array' or"):
             env.reset(seed=0)
-    with pytest.raises(ValueError, match="rgb_array.*human"):
+    with pytest.raises(ValueError, match=r"rgb_array.*human"):
         ReachEnv(render_mode="ascii")
 
 
