@@ -42,6 +42,25 @@ def _pairs(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[n
     return out
 
 
+def _set_axial(
+    body: object,
+    center: ArrayLike,
+    radius: ArrayLike,
+    name: str,
+    half: ArrayLike,
+    rotation: ArrayLike | None,
+) -> None:
+    """Check and copy the arrays of bodies with an axis; ``name`` is that of half their length."""
+    middle = frozen_finite("center", center, (None, 3))
+    count = len(middle)
+    object.__setattr__(body, "center", middle)
+    line = "a segment is Capsules(start, end, 0)"
+    object.__setattr__(body, "radius", lengths("radius", radius, count, line))
+    disc = "a disc is a cylinder with a small half length"
+    object.__setattr__(body, name, lengths(name, half, count, disc))
+    object.__setattr__(body, "rotation", rotations("rotation", rotation, count)[0])
+
+
 @dataclass(frozen=True, eq=False)
 class Cylinders(Core):
     """Cylinders, whose axis is the z axis of ``rotation``.
@@ -73,14 +92,7 @@ class Cylinders(Core):
         rotation: ArrayLike | None = None,
     ) -> None:
         """Check and copy the arrays."""
-        middle = frozen_finite("center", center, (None, 3))
-        count = len(middle)
-        object.__setattr__(self, "center", middle)
-        line = "a segment is Capsules(start, end, 0)"
-        object.__setattr__(self, "radius", lengths("radius", radius, count, line))
-        disc = "a disc is a cylinder with a small half length"
-        object.__setattr__(self, "half_length", lengths("half_length", half_length, count, disc))
-        object.__setattr__(self, "rotation", rotations("rotation", rotation, count)[0])
+        _set_axial(self, center, radius, "half_length", half_length, rotation)
 
     def __len__(self) -> int:
         return len(self.center)
@@ -121,14 +133,7 @@ class Cones(Core):
         rotation: ArrayLike | None = None,
     ) -> None:
         """Check and copy the arrays."""
-        middle = frozen_finite("center", center, (None, 3))
-        count = len(middle)
-        object.__setattr__(self, "center", middle)
-        line = "a segment is Capsules(start, end, 0)"
-        object.__setattr__(self, "radius", lengths("radius", radius, count, line))
-        disc = "a disc is a cylinder with a small half length"
-        object.__setattr__(self, "half_height", lengths("half_height", half_height, count, disc))
-        object.__setattr__(self, "rotation", rotations("rotation", rotation, count)[0])
+        _set_axial(self, center, radius, "half_height", half_height, rotation)
 
     def __len__(self) -> int:
         return len(self.center)

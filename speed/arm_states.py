@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -133,12 +134,12 @@ class ArmStates:
             q, qd, np.asarray(np.linalg.inv(mass), np.float64), gravity, linear[:, which] + turning
         )
 
-    @property
+    @cached_property
     def velocity(self) -> Array:
         """Velocities of the points [m/s], shape (S, K, 3)."""
         return np.asarray(np.einsum("skij,sj->ski", self.jacobian, self.qd))
 
-    @property
+    @cached_property
     def mobility(self) -> Array:
         """J M^-1 J^T of the points [1/kg], shape (S, K, 3, 3)."""
         half = self.jacobian @ self.inverse_mass[:, None]
